@@ -1,0 +1,363 @@
+//! Time: frame rates as exact ratios, and which samples an evaluation asks for.
+//!
+//! Everything in seconds is f64 and stays on the host. What reaches a kernel is a
+//! whole number of frames from the middle of a segment (or, for explicit times,
+//! one f32 distance from that middle), so a frame 24 hours into a set is as exact
+//! as the first.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// More samples of one track than this are refused.
+pub const MAX_FRAMES: u64 = 1 << 40;
+
+/// A key this close (in frames) after the last frame still has a frame: key times
+/// are rarely whole multiples of the frame time to the last bit.
+const LAST_FRAME_TOLERANCE: f64 = 1e-6;
+
+/// Frames per second as a ratio: 30000/1001 is exact, 29.97 is not.
+///
+/// ```
+/// use tumble::FrameRate;
+/// let ntsc: FrameRate = "30000/1001".parse()?;
+/// assert_eq!(ntsc, FrameRate::new(30_000, 1_001)?);
+/// assert_eq!("12.5".parse::<FrameRate>()?, FrameRate::new(25, 2)?);
+/// # Ok::<(), tumble::FramesError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FrameRate {
+    frames: u64,
+    seconds: u64,
+}
+
+impl FrameRate {
+    /// `frames` in `seconds` seconds, reduced.
+    ///
+    /// # Errors
+    /// When either is zero or exceeds 2^53 (no longer exact in f64).
+    pub fn new(frames: u64, seconds: u64) -> Result<Self, FramesError> {
+        let exact = 1..=1u64 << f64::MANTISSA_DIGITS;
+        let divisor = gcd(frames, seconds).max(1);
+        let rate = Self { frames: frames / divisor, seconds: seconds / divisor };
+        if !exact.contains(&rate.frames) || !exact.contains(&rate.seconds) {
+            return Err(FramesError::Rate { given: format!("{frames}/{seconds}") });
+        }
+        Ok(rate)
+    }
+
+    /// Frames per second, rounded to f64.
+    pub fn per_second(self) -> f64 {
+        self.frames as f64 / self.seconds as f64
+    }
+
+    /// How many frames fit into `seconds`, not rounded to a whole number.
+    pub(crate) fn frames_in(self, seconds: f64) -> f64 {
+        seconds * self.frames as f64 / self.seconds as f64
+    }
+
+    /// The time of frame `frame`, seconds after frame 0.
+    pub fn time_of(self, frame: u64) -> f64 {
+        // The product is exact for every count of frames that can be asked for at
+        // the usual rates.
+        frame as f64 * self.seconds as f64 / self.frames as f64
+    }
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+impl fmt::Display for FrameRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.seconds {
+            1 => write!(f, "{}", self.frames),
+            seconds => write!(f, "{}/{seconds}", self.frames),
+        }
+    }
+}
+
+impl FromStr for FrameRate {
+    type Err = FramesError;
+
+    /// `25`, `12.5`, `1e-3` or `30000/1001`; decimals are taken exactly.
+    fn from_str(text: &str) -> Result<Self, FramesError> {
+        let refuse = || FramesError::Rate { given: text.to_owned() };
+        let (frames, seconds) = match text.split_once('/') {
+            Some((frames, seconds)) => {
+                (frames.parse().map_err(|_| refuse())?, seconds.parse().map_err(|_| refuse())?)
+            }
+            None => decimal_ratio(text).ok_or_else(refuse)?,
+        };
+        Self::new(frames, seconds).map_err(|_| refuse())
+    }
+}
+
+/// `12.5e1` as digits over a power of ten.
+fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
+    let (mantissa, exponent) = match text.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
+        None => (text, 0),
+    };
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits = format!("{whole}{}", fraction.trim_end_matches('0'));
+    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let places = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
+    let power = 10u64.checked_pow(places.unsigned_abs())?;
+    let digits: u64 = digits.parse().ok()?;
+    if places < 0 { Some((digits, power)) } else { Some((digits.checked_mul(power)?, 1)) }
+}
+
+/// Which samples of every track to evaluate: frames at a rate, or explicit times.
+///
+/// Before its first key and after its last a track holds its end values.
+///
+/// ```
+/// use tumble::Frames;
+/// let frames = Frames::fps(25);                       // from the first key to the last
+/// let second = Frames::fps(60).between(1.0, 2.0);     // 61 frames
+/// let sparse = Frames::at(vec![0.0, 0.125, 7.5]);     // any times, in any order
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    request: Request,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Request {
+    Rate { rate: FrameRate, start: Option<f64>, end: Option<f64> },
+    Shared(Vec<f64>),
+    PerTrack(Vec<f64>),
+}
+
+/// Why samples were refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FramesError {
+    /// No frame rate.
+    #[error("`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001")]
+    Rate {
+        /// What was given.
+        given: String,
+    },
+    /// The range ends before it starts.
+    #[error("the range ends at {end} s, before it starts at {start} s")]
+    ReversedRange {
+        /// Start, seconds.
+        start: f64,
+        /// End, seconds.
+        end: f64,
+    },
+    /// A time is NaN or infinite.
+    #[error("time {index} is {time}; times are finite numbers of seconds")]
+    TimeNotFinite {
+        /// Its place in the list, from 0.
+        index: usize,
+        /// The offending time.
+        time: f64,
+    },
+    /// Times given for each track must divide evenly among the tracks.
+    #[error("{times} times do not divide among {tracks} tracks; give every track the same number")]
+    Uneven {
+        /// Number of times given.
+        times: usize,
+        /// Number of tracks in the set.
+        tracks: usize,
+    },
+    /// More samples than [`MAX_FRAMES`] or than memory can address.
+    #[error(
+        "{tracks} tracks × {frames:.0} frames are {bytes:.3e} bytes; at most {MAX_FRAMES} frames can be asked for"
+    )]
+    TooMany {
+        /// Number of tracks.
+        tracks: usize,
+        /// Samples of each.
+        frames: f64,
+        /// Bytes of the result.
+        bytes: f64,
+    },
+    /// Two neighbouring keys lie so far apart that frames between them cannot be
+    /// counted in 32 bits.
+    #[error("track {track}: {frames:.3e} frames between key {key} and the next; the limit is 2^32")]
+    GapTooLong {
+        /// The track's place in the set.
+        track: usize,
+        /// The key before the gap.
+        key: usize,
+        /// Frames in the gap.
+        frames: f64,
+    },
+}
+
+impl Frames {
+    /// Whole frames per second, from the set's first key to its last.
+    ///
+    /// # Panics
+    /// For 0: a rate is positive. [`Frames::rate`] takes checked rates.
+    pub fn fps(frames_per_second: u32) -> Self {
+        Self::rate(FrameRate::new(u64::from(frames_per_second), 1).expect("a positive frame rate"))
+    }
+
+    /// Frames at an exact rate, from the set's first key to its last: frame `k` at
+    /// `start + k / rate`, for every `k` with a time not past the end.
+    pub fn rate(rate: FrameRate) -> Self {
+        Self { request: Request::Rate { rate, start: None, end: None } }
+    }
+
+    /// The same rate from `start` to `end`, seconds; no effect on explicit times.
+    #[must_use]
+    pub fn between(mut self, from: f64, to: f64) -> Self {
+        if let Request::Rate { start, end, .. } = &mut self.request {
+            (*start, *end) = (Some(from), Some(to));
+        }
+        self
+    }
+
+    /// Explicit times, seconds, the same for every track, in any order.
+    pub fn at(times: Vec<f64>) -> Self {
+        Self { request: Request::Shared(times) }
+    }
+
+    /// Explicit times of each track's own, one track after another.
+    pub fn at_each(times: Vec<f64>) -> Self {
+        Self { request: Request::PerTrack(times) }
+    }
+
+    /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
+    ///
+    /// # Errors
+    /// A [`FramesError`] when the request does not fit the set.
+    pub fn resolve(
+        &self,
+        tracks: usize,
+        span: Option<(f64, f64)>,
+    ) -> Result<Timeline, FramesError> {
+        let finite = |times: &[f64]| match times.iter().position(|time| !time.is_finite()) {
+            Some(index) => Err(FramesError::TimeNotFinite { index, time: times[index] }),
+            None => Ok(()),
+        };
+        let (first, last) = span.unwrap_or((0.0, 0.0));
+        let (ticks, count) = match &self.request {
+            Request::Rate { rate, start, end } => {
+                let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
+                finite(&[start, end])?;
+                if end < start {
+                    return Err(FramesError::ReversedRange { start, end });
+                }
+                let count = (rate.frames_in(end - start) + LAST_FRAME_TOLERANCE).floor() + 1.0;
+                check_size(tracks, count)?;
+                (Ticks::Frames { rate: *rate, start }, count as usize)
+            }
+            Request::Shared(times) => {
+                finite(times)?;
+                check_size(tracks, times.len() as f64)?;
+                (Ticks::Times { times: times.clone(), stride: 0 }, times.len())
+            }
+            Request::PerTrack(times) => {
+                finite(times)?;
+                if tracks == 0 || !times.len().is_multiple_of(tracks) {
+                    return Err(FramesError::Uneven { times: times.len(), tracks });
+                }
+                let stride = times.len() / tracks;
+                (Ticks::Times { times: times.clone(), stride }, stride)
+            }
+        };
+        Ok(Timeline { ticks, count })
+    }
+}
+
+fn check_size(tracks: usize, frames: f64) -> Result<(), FramesError> {
+    let bytes = tracks as f64 * frames * size_of::<glam::Quat>() as f64;
+    if frames > MAX_FRAMES as f64 || bytes > isize::MAX as f64 {
+        return Err(FramesError::TooMany { tracks, frames, bytes });
+    }
+    Ok(())
+}
+
+/// The samples of one evaluation: [`Frames`] resolved against a set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timeline {
+    pub(crate) ticks: Ticks,
+    count: usize,
+}
+
+/// What a sample index means.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Ticks {
+    /// Frame `k` lies at `start + k / rate`.
+    Frames { rate: FrameRate, start: f64 },
+    /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
+    /// one list for all tracks.
+    Times { times: Vec<f64>, stride: usize },
+}
+
+impl Timeline {
+    /// Samples of each track.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is nothing to evaluate.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The time of a sample in seconds.
+    ///
+    /// # Panics
+    /// When `sample` is not below [`Timeline::len`].
+    pub fn time(&self, track: usize, sample: usize) -> f64 {
+        assert!(sample < self.count, "sample {sample} of {}", self.count);
+        match &self.ticks {
+            Ticks::Frames { rate, start } => start + rate.time_of(sample as u64),
+            Ticks::Times { times, stride } => times[track * stride + sample],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_exact_ratios() {
+        for (text, frames, seconds) in [
+            ("25", 25, 1),
+            ("29.97", 2997, 100),
+            ("30000/1001", 30_000, 1_001),
+            ("1e9", 1_000_000_000, 1),
+            ("1e-9", 1, 1_000_000_000),
+            ("50/2", 25, 1),
+            ("12.50", 25, 2),
+        ] {
+            assert_eq!(text.parse(), FrameRate::new(frames, seconds), "{text}");
+        }
+        for text in ["0", "-1", "nan", "inf", "30fps", "", "1/0", "0/5", "1e99", ".", "1 0", "+-5"] {
+            assert!(text.parse::<FrameRate>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_last_key_keeps_its_frame() {
+        let set = |last| Some((0.1, last));
+        // 0.1 + 20 s is not 20.1 in binary.
+        let frames = Frames::fps(25).resolve(1, set(0.1 + 20.0)).unwrap();
+        assert_eq!(frames.len(), 501);
+        assert_eq!(Frames::fps(25).resolve(1, set(20.09)).unwrap().len(), 500);
+        assert_eq!(Frames::fps(1).resolve(1, set(0.1)).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn impossible_requests_are_refused_before_any_work() {
+        let span = Some((0.0, 1e9));
+        let error = Frames::fps(1_000_000).resolve(4, span).unwrap_err();
+        assert!(matches!(error, FramesError::TooMany { tracks: 4, .. }), "{error}");
+        let reversed = Frames::fps(1).between(2.0, 1.0).resolve(1, span).unwrap_err();
+        assert_eq!(reversed, FramesError::ReversedRange { start: 2.0, end: 1.0 });
+        let nan = Frames::at(vec![0.0, f64::NAN]).resolve(1, span).unwrap_err();
+        assert!(matches!(nan, FramesError::TimeNotFinite { index: 1, .. }));
+        let uneven = Frames::at_each(vec![0.0; 3]).resolve(2, span).unwrap_err();
+        assert_eq!(uneven, FramesError::Uneven { times: 3, tracks: 2 });
+    }
+}

@@ -1,0 +1,1 @@
+//! Textbook f64 evaluation.

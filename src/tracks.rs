@@ -1,0 +1,356 @@
+//! What was loaded: tracks of unit quaternions with their key times.
+//!
+//! The first stop on the path of the data. A [`TrackSet`] knows no method, no
+//! frame rate and no device; it is checked once, when keys are pushed, and
+//! everything behind it trusts it: every track has at least one key, times are
+//! finite and strictly increasing, keys are unit quaternions.
+
+use std::ops::Range;
+
+use glam::{DQuat, Quat};
+
+use crate::numeric::{canonical, to_f64, unit_f32};
+
+/// Norms further from 1 than this are refused by [`TrackSet::push`]: such a key
+/// is more likely a mistake than a rotation.
+pub const NORM_TOLERANCE: f64 = 0.1;
+
+/// A set of keyframe tracks: the input of every evaluation.
+///
+/// Keys are f32 unit quaternions, `x y z w` in memory; times are f64 seconds.
+/// Tracks may differ in their number of keys and in their times.
+///
+/// ```
+/// use glam::Quat;
+/// let mut set = tumble::TrackSet::new();
+/// let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+/// set.push("hinge", &[0.0, 2.0], &keys)?;
+/// assert_eq!((set.track_count(), set.key_count()), (1, 2));
+/// # Ok::<(), tumble::TrackError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrackSet {
+    keys: Vec<Quat>,
+    times: Vec<f64>,
+    tracks: Vec<TrackRange>,
+    names: Vec<String>,
+    box_length: Option<f64>,
+}
+
+/// Where a track's keys and times lie in the pools of its set; tracks whose
+/// times are equal share them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct TrackRange {
+    first_key: usize,
+    first_time: usize,
+    len: usize,
+}
+
+/// One track, borrowed from its [`TrackSet`].
+#[derive(Debug, Clone, Copy)]
+pub struct Track<'a> {
+    /// The track's name, when it was given one.
+    pub name: Option<&'a str>,
+    /// Key times in seconds, strictly increasing.
+    pub times: &'a [f64],
+    /// Unit keys, one for each time.
+    pub keys: &'a [Quat],
+}
+
+/// Why keys were refused. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrackError {
+    /// A track must have at least one key.
+    #[error("track {track} has no keys; give it at least one")]
+    Empty {
+        /// The track's place in the set.
+        track: usize,
+    },
+    /// Each key needs one time.
+    #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
+    LengthMismatch {
+        /// The track's place in the set.
+        track: usize,
+        /// Number of keys given.
+        keys: usize,
+        /// Number of times given.
+        times: usize,
+    },
+    /// A time is NaN or infinite.
+    #[error("track {track}, key {key}: time {time} is not finite")]
+    TimeNotFinite {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// The offending time, seconds.
+        time: f64,
+    },
+    /// Times must increase strictly.
+    #[error(
+        "track {track}, key {key}: time {time} s does not come after {previous} s; sort the keys and remove duplicates"
+    )]
+    TimeNotIncreasing {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// The offending time, seconds.
+        time: f64,
+        /// The time before it, seconds.
+        previous: f64,
+    },
+    /// The quaternion is not close to unit length.
+    #[error(
+        "track {track}, key {key}: quaternion norm is {norm}; a rotation has norm 1 (±{NORM_TOLERANCE})"
+    )]
+    NotUnit {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// Its norm.
+        norm: f64,
+    },
+}
+
+impl TrackSet {
+    /// An empty set.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Appends a track. `times` are seconds, strictly increasing; `keys` are
+    /// rotations, one for each time. Keys that are unit to within f32 rounding are
+    /// kept bit for bit, others (norm within 0.1 of 1) are normalised.
+    ///
+    /// # Errors
+    /// A [`TrackError`] that names the key; the set is then unchanged.
+    pub fn push(
+        &mut self,
+        name: impl Into<String>,
+        times: &[f64],
+        keys: &[Quat],
+    ) -> Result<(), TrackError> {
+        let track = self.tracks.len();
+        check_times(track, times, keys.len())?;
+        let first_key = self.keys.len();
+        for (key, &quat) in keys.iter().enumerate() {
+            match unit_key(track, key, quat) {
+                Ok(unit) => self.keys.push(unit),
+                Err(error) => {
+                    self.keys.truncate(first_key);
+                    return Err(error);
+                }
+            }
+        }
+        let first_time = self.share_or_append(times);
+        self.tracks.push(TrackRange { first_key, first_time, len: keys.len() });
+        let name = name.into();
+        if !name.is_empty() {
+            self.names.resize(track, String::new());
+            self.names.push(name);
+        }
+        Ok(())
+    }
+
+    /// A set whose tracks all have the same key times, as in a `.dat` file.
+    /// `keys` holds one track after another, `times.len()` keys each.
+    ///
+    /// # Errors
+    /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
+    pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
+        let mut set = Self::new();
+        if times.is_empty() || !keys.len().is_multiple_of(times.len()) {
+            return Err(TrackError::LengthMismatch { track: 0, keys: keys.len(), times: times.len() });
+        }
+        for track in keys.chunks(times.len()) {
+            set.push("", times, track)?;
+        }
+        Ok(set)
+    }
+
+    /// Records the length of the boxes (a length, not a duration).
+    #[must_use]
+    pub fn with_box_length(mut self, length: f64) -> Self {
+        self.box_length = Some(length);
+        self
+    }
+
+    /// The length of the boxes, when the input gave one.
+    pub fn box_length(&self) -> Option<f64> {
+        self.box_length
+    }
+
+    /// Number of tracks.
+    pub fn track_count(&self) -> usize {
+        self.tracks.len()
+    }
+
+    /// Number of keys of all tracks together.
+    pub fn key_count(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Whether the set has no tracks.
+    pub fn is_empty(&self) -> bool {
+        self.tracks.is_empty()
+    }
+
+    /// The track at `index`.
+    ///
+    /// # Panics
+    /// Never for `index < track_count()`; use [`TrackSet::tracks`] to walk them.
+    pub fn track(&self, index: usize) -> Track<'_> {
+        let TrackRange { first_key, first_time, len } = self.tracks[index];
+        Track {
+            name: self.names.get(index).map(String::as_str).filter(|name| !name.is_empty()),
+            times: &self.times[first_time..first_time + len],
+            keys: &self.keys[first_key..first_key + len],
+        }
+    }
+
+    /// Every track in order.
+    pub fn tracks(&self) -> impl ExactSizeIterator<Item = Track<'_>> {
+        (0..self.tracks.len()).map(|index| self.track(index))
+    }
+
+    /// The track's name, or `box1`, `box2` … by its place when it has none.
+    pub fn track_name(&self, index: usize) -> String {
+        self.track(index).name.map_or_else(|| format!("box{}", index + 1), str::to_owned)
+    }
+
+    /// First and last key time over all tracks, seconds; `None` when empty.
+    pub fn time_span(&self) -> Option<(f64, f64)> {
+        self.tracks()
+            .map(|track| (track.times[0], track.times[track.times.len() - 1]))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// The tracks in `range` as a set of their own.
+    ///
+    /// # Panics
+    /// When the range passes [`TrackSet::track_count`].
+    pub fn select(&self, range: Range<usize>) -> Self {
+        let mut set = Self { box_length: self.box_length, ..Self::default() };
+        for index in range {
+            let track = self.track(index);
+            let first_time = set.share_or_append(track.times);
+            let first_key = set.keys.len();
+            set.keys.extend_from_slice(track.keys);
+            if let Some(name) = track.name {
+                set.names.resize(set.tracks.len(), String::new());
+                set.names.push(name.to_owned());
+            }
+            set.tracks.push(TrackRange { first_key, first_time, len: track.keys.len() });
+        }
+        set
+    }
+
+    /// Files hold many tracks with one list of times: keep it once.
+    fn share_or_append(&mut self, times: &[f64]) -> usize {
+        if let Some(last) = self.tracks.last()
+            && self.times[last.first_time..last.first_time + last.len] == *times
+        {
+            return last.first_time;
+        }
+        let first = self.times.len();
+        self.times.extend_from_slice(times);
+        first
+    }
+}
+
+fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
+    if times.len() != keys {
+        return Err(TrackError::LengthMismatch { track, keys, times: times.len() });
+    }
+    if times.is_empty() {
+        return Err(TrackError::Empty { track });
+    }
+    if let Some(key) = times.iter().position(|time| !time.is_finite()) {
+        return Err(TrackError::TimeNotFinite { track, key, time: times[key] });
+    }
+    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        Some(i) => Err(TrackError::TimeNotIncreasing {
+            track,
+            key: i + 1,
+            time: times[i + 1],
+            previous: times[i],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// f32 rounding moves a unit quaternion's squared norm by at most 4 × 2^-24 or
+/// so; below this the key is kept as it is, so that loading is idempotent.
+const ROUNDING: f64 = 4.0e-7;
+
+fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
+    let exact: DQuat = to_f64(quat);
+    let norm = exact.length();
+    if !((norm - 1.0).abs() <= NORM_TOLERANCE) {
+        return Err(TrackError::NotUnit { track, key, norm });
+    }
+    if (norm - 1.0).abs() <= ROUNDING {
+        return Ok(Quat::from_array(quat.to_array().map(canonical)));
+    }
+    Ok(unit_f32(exact))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_track_leaves_the_set_unchanged() {
+        let mut set = TrackSet::new();
+        set.push("a", &[0.0], &[Quat::IDENTITY]).unwrap();
+        let before = set.clone();
+        let keys = [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)];
+        let error = set.push("b", &[0.0, 1.0], &keys).unwrap_err();
+        assert_eq!(error, TrackError::NotUnit { track: 1, key: 1, norm: 2.0 });
+        assert_eq!(set, before);
+        let bad_times = [
+            (vec![], TrackError::LengthMismatch { track: 1, keys: 1, times: 0 }),
+            (
+                vec![f64::INFINITY],
+                TrackError::TimeNotFinite { track: 1, key: 0, time: f64::INFINITY },
+            ),
+        ];
+        for (times, expected) in bad_times {
+            assert_eq!(set.push("", &times, &[Quat::IDENTITY]).unwrap_err(), expected);
+        }
+        assert_eq!(set.push("", &[], &[]).unwrap_err(), TrackError::Empty { track: 1 });
+        let decreasing = set.push("", &[1.0, 1.0], &[Quat::IDENTITY; 2]).unwrap_err();
+        assert!(matches!(decreasing, TrackError::TimeNotIncreasing { key: 1, .. }));
+    }
+
+    #[test]
+    fn equal_times_are_kept_once_and_names_stay_with_their_tracks() {
+        let times = [0.0, 1.0];
+        let keys = [Quat::IDENTITY; 2];
+        let mut set = TrackSet::new();
+        set.push("", &times, &keys).unwrap();
+        set.push("hip", &times, &keys).unwrap();
+        set.push("", &[0.0, 2.0], &keys).unwrap();
+        assert_eq!(set.times.len(), 4);
+        assert_eq!(set.track_name(0), "box1");
+        assert_eq!(set.track_name(1), "hip");
+        assert_eq!(set.track_name(2), "box3");
+        assert_eq!(set.select(1..3).track_name(0), "hip");
+        assert_eq!(set.time_span(), Some((0.0, 2.0)));
+    }
+
+    #[test]
+    fn a_nearly_unit_key_is_normalised_and_a_unit_key_is_kept() {
+        let unit = Quat::from_rotation_y(0.3);
+        let long = Quat::from_array(unit.to_array().map(|c| c * 1.01));
+        let mut set = TrackSet::new();
+        set.push("", &[0.0, 1.0], &[unit, long]).unwrap();
+        let keys = set.track(0).keys;
+        assert_eq!(keys[0].to_array(), unit.to_array());
+        assert!(keys[1].angle_between(unit) < 1e-6);
+        assert!((f64::from(keys[1].length()) - 1.0).abs() < 1e-6);
+    }
+}
