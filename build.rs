@@ -1,1 +1,109 @@
-fn main(){}
+//! WGSL to SPIR-V at build time: parse, validate, emit, and run the exactness
+//! pass, so that a broken or inexact shader is a build error. The shaders own
+//! every constant and layout that they share with Rust; this writes them out as
+//! Rust constants.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use naga::back::spv;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+#[allow(dead_code, unreachable_pub)]
+#[path = "src/spirv.rs"]
+mod spirv;
+
+/// Every pipeline: its name, and the files that are joined into it.
+const PIPELINES: [(&str, &[&str]); 5] = [
+    ("arc_frames", &["kernel", "distance_in_frames", "sine_cosine", "evaluate_arc"]),
+    ("arc_times", &["kernel", "distance_in_seconds", "sine_cosine", "evaluate_arc"]),
+    ("cumulative_frames", &["kernel", "distance_in_frames", "sine_cosine", "evaluate_cumulative"]),
+    ("cumulative_times", &["kernel", "distance_in_seconds", "sine_cosine", "evaluate_cumulative"]),
+    ("canary", &["sine_cosine", "canary"]),
+];
+
+fn main() {
+    println!("cargo::rerun-if-changed=shaders");
+    println!("cargo::rerun-if-changed=src/spirv.rs");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let mut constants = BTreeMap::new();
+    let mut layouts = BTreeMap::new();
+    for (name, files) in PIPELINES {
+        let source: String = files.iter().map(|file| read_shader(file)).collect();
+        let module = naga::front::wgsl::parse_str(&source)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
+        let words = compile(name, &source, &module);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR is writable");
+        collect_constants(&module, &mut constants);
+        collect_layouts(name, &module, &mut layouts);
+    }
+    let mut rust = String::new();
+    for (name, value) in constants {
+        writeln!(rust, "pub(crate) const {name}: {value};").unwrap();
+    }
+    for (name, value) in layouts {
+        writeln!(rust, "pub(crate) const {name}: usize = {value};").unwrap();
+    }
+    fs::write(out.join("shader_constants.rs"), rust).expect("OUT_DIR is writable");
+}
+
+fn read_shader(file: &str) -> String {
+    let path = Path::new("shaders").join(file).with_extension("wgsl");
+    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())) + "\n"
+}
+
+fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
+    let info = Validator::new(ValidationFlags::all(), Capabilities::IMMEDIATES)
+        .validate(module)
+        .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+    let options = spv::Options {
+        lang_version: (1, 3), // what Vulkan 1.1 takes
+        // Loops here end: their bounds are data that the host wrote.
+        force_loop_bounding: false,
+        flags: spv::WriterFlags::empty(),
+        ..spv::Options::default()
+    };
+    let words = spv::write_vec(module, &info, &options, None)
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
+    spirv::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// `const` declarations become Rust constants of the same name.
+fn collect_constants(module: &naga::Module, constants: &mut BTreeMap<String, String>) {
+    for (_, constant) in module.constants.iter() {
+        let Some(name) = &constant.name else { continue };
+        let naga::Expression::Literal(literal) = module.global_expressions[constant.init] else {
+            continue;
+        };
+        let typed = match literal {
+            naga::Literal::F32(value) => format!("f32 = {value:?}"),
+            naga::Literal::U32(value) => format!("u32 = {value}"),
+            naga::Literal::I32(value) => format!("i32 = {value}"),
+            _ => continue,
+        };
+        constants.insert(name.clone(), typed);
+    }
+}
+
+/// Offsets and sizes of the structs in buffers, for assertions beside their Rust
+/// counterparts: `ARC_SEGMENT_MIDDLE`, `ITEM_SIZE`.
+fn collect_layouts(pipeline: &str, module: &naga::Module, layouts: &mut BTreeMap<String, u32>) {
+    for (_, ty) in module.types.iter() {
+        let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) else {
+            continue;
+        };
+        let form = pipeline.split('_').next().unwrap_or_default().to_uppercase();
+        let name = match name.as_str() {
+            "Segment" => format!("{form}_SEGMENT"),
+            other => other.to_uppercase(),
+        };
+        layouts.insert(format!("{name}_SIZE"), *span);
+        for member in members {
+            let field = member.name.as_deref().unwrap_or_default().to_uppercase();
+            layouts.insert(format!("{name}_{field}"), member.offset);
+        }
+    }
+}

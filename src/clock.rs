@@ -303,6 +303,15 @@ impl Timeline {
         self.count == 0
     }
 
+    /// The same samples for a set that has only some of the tracks.
+    pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
+        let mut own = self.clone();
+        if let Ticks::Times { times, stride: 1.. } = &mut own.ticks {
+            *times = times[tracks.start * self.count..tracks.end * self.count].to_vec();
+        }
+        own
+    }
+
     /// The time of a sample in seconds.
     ///
     /// # Panics

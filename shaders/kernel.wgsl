@@ -1,0 +1,71 @@
+// The one entry point of every form. Joined with a form (`Segment`, `evaluate`),
+// a `distance_from_middle` and `sine_cosine` by the build.
+
+// A run of samples of one track that lie in one segment, or hold one constant.
+struct Item {
+    // Which segment; or which constant, when `count` carries HOLD.
+    source: u32,
+    // Where the first sample goes in `rotations`.
+    output: u32,
+    // Number of samples, at most ITEM_SAMPLES; with HOLD for a constant.
+    count: u32,
+    // The first sample's distance from the segment's middle: frames, or the place
+    // of its entry in `distances`.
+    first: i32,
+    // parameter = distance * scale + offset
+    scale: f32,
+    offset: f32,
+}
+
+struct Launch {
+    // The items of this dispatch: their place in `items`, and how many.
+    first_item: u32,
+    item_count: u32,
+    // Distance in `rotations` between neighbouring samples of a track.
+    stride: u32,
+}
+
+const WORKGROUP: u32 = 64;
+const ITEM_SAMPLES: u32 = 16;
+const HOLD: u32 = 0x80000000;
+
+// Magnitudes below 2^-64 become +0: drivers may or may not flush subnormals.
+const TINY_BITS: u32 = 0x1f800000;
+
+@group(0) @binding(0) var<storage, read> segments: array<Segment>;
+@group(0) @binding(1) var<storage, read> constants: array<vec4f>;
+@group(0) @binding(2) var<storage, read> items: array<Item>;
+@group(0) @binding(3) var<storage, read> distances: array<f32>;
+@group(0) @binding(4) var<storage, read_write> rotations: array<vec4f>;
+
+var<immediate> launch: Launch;
+
+fn canonical(q: vec4f) -> vec4f {
+    let magnitude = bitcast<vec4u>(q) & vec4u(0x7fffffffu);
+    return select(q, vec4f(0.0), magnitude < vec4u(TINY_BITS));
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(global_invocation_id) invocation: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let index = invocation.y * (groups.x * WORKGROUP) + invocation.x;
+    if index >= launch.item_count {
+        return;
+    }
+    let item = items[launch.first_item + index];
+    if (item.count & HOLD) != 0u {
+        let constant = constants[item.source];
+        let count = item.count & ~HOLD;
+        for (var j = 0u; j < count; j++) {
+            rotations[item.output + j * launch.stride] = constant;
+        }
+        return;
+    }
+    let segment = segments[item.source];
+    for (var j = 0u; j < item.count; j++) {
+        let parameter = distance_from_middle(item.first, j) * item.scale + item.offset;
+        rotations[item.output + j * launch.stride] = canonical(evaluate(segment, parameter));
+    }
+}

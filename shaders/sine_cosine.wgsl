@@ -1,0 +1,25 @@
+// Sine and cosine for |angle| <= pi/2, from operations that every driver rounds
+// alike. Minimax polynomials in z = angle², their leading terms exact; the
+// approximation is within 5.0e-9 (sine) and 4.4e-10 (cosine).
+// Twin: src/cpu/sine_cosine.rs.
+
+const SINE_3: f32 = -0.16666656732559204;
+const SINE_5: f32 = 0.008333008736371994;
+const SINE_7: f32 = -0.00019806048658210784;
+const SINE_9: f32 = 2.598925448182854e-6;
+
+const COSINE_2: f32 = -0.5;
+const COSINE_4: f32 = 0.041666656732559204;
+const COSINE_6: f32 = -0.001388858538120985;
+const COSINE_8: f32 = 2.4770179152255878e-5;
+const COSINE_10: f32 = -2.620901966565725e-7;
+
+// x: sine, y: cosine.
+fn sine_cosine(angle: f32) -> vec2f {
+    let z = angle * angle;
+    let sine_tail = ((SINE_9 * z + SINE_7) * z + SINE_5) * z + SINE_3;
+    let sine = sine_tail * (z * angle) + angle;
+    let cosine_tail = (((COSINE_10 * z + COSINE_8) * z + COSINE_6) * z + COSINE_4) * z + COSINE_2;
+    let cosine = cosine_tail * z + 1.0;
+    return vec2f(sine, cosine);
+}

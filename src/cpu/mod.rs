@@ -1,0 +1,13 @@
+//! The CPU: the f32 twins of the shaders, and the walk over tracks and samples
+//! that feeds them.
+
+pub(crate) mod canary;
+mod dispatch;
+mod engine;
+mod evaluate;
+mod evaluate_arc;
+mod evaluate_cumulative;
+mod sine_cosine;
+
+pub use dispatch::VectorWidth;
+pub(crate) use engine::CpuEngine;

@@ -1,0 +1,482 @@
+//! The engine: sets go in, clips stay on its device, rotations come out.
+
+use std::sync::Arc;
+
+use glam::Quat;
+
+use crate::clip::ClipData;
+use crate::clock::{Frames, FramesError, Timeline};
+use crate::cpu::{CpuEngine, VectorWidth};
+use crate::gpu::{
+    self, CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, PhysicalDevice, VulkanEngine,
+    VulkanError, VulkanHandles,
+};
+use crate::method::{Interpolation, InterpolationError};
+use crate::rotations::{Layout, Rotations};
+use crate::segment::segment_size;
+use crate::tracks::TrackSet;
+
+/// Where an engine evaluates: the CPU, or one Vulkan device.
+#[derive(Clone)]
+pub enum Device {
+    /// The f32 twins of the shaders, on all cores.
+    Cpu,
+    /// A Vulkan device.
+    Vulkan(VulkanDevice),
+}
+
+/// A Vulkan device, not yet opened.
+#[derive(Clone)]
+pub struct VulkanDevice {
+    physical: PhysicalDevice,
+}
+
+impl VulkanDevice {
+    /// Name, kind and limits.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.physical.info
+    }
+}
+
+impl Device {
+    /// Every Vulkan device that can compute, fastest kind first. The CPU is always
+    /// there and not listed.
+    ///
+    /// # Errors
+    /// When there is no Vulkan loader, or it fails.
+    pub fn list() -> Result<Vec<Self>, VulkanError> {
+        Self::list_with(false)
+    }
+
+    /// As [`Device::list`], with the Khronos validation layer watching every call
+    /// to the devices ([`Engine::validation_messages`]).
+    ///
+    /// # Errors
+    /// Also when the layer is not installed.
+    pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
+        let devices = gpu::list(validation)?;
+        Ok(devices.into_iter().map(|physical| Self::Vulkan(VulkanDevice { physical })).collect())
+    }
+
+    /// The first Vulkan device, else the CPU.
+    pub fn auto() -> Self {
+        Self::list().ok().and_then(|devices| devices.into_iter().next()).unwrap_or(Self::Cpu)
+    }
+
+    /// Its name: the driver's, or `CPU`.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Cpu => "CPU",
+            Self::Vulkan(device) => &device.info().name,
+        }
+    }
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Device").field(&self.name()).finish()
+    }
+}
+
+/// How results of a Vulkan device reach the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Transfer {
+    /// In place where the device shares the host's memory, else staged.
+    #[default]
+    Automatic,
+    /// The kernel writes into memory that the host reads.
+    InPlace,
+    /// The kernel writes into the device's memory; copies bring it over.
+    Staged,
+}
+
+/// Choices for an [`Engine`]; none of them changes a bit of any result.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct EngineOptions {
+    /// Bytes of device memory to use besides results; no limit by default.
+    pub memory: Option<u64>,
+    /// Worker threads of the CPU; by default the process's shared ones.
+    pub threads: Option<usize>,
+    /// The widest vector instructions to use on the CPU; by default all there are.
+    pub vector_width: Option<VectorWidth>,
+    /// How results come back from a Vulkan device.
+    pub transfer: Transfer,
+    /// Use a device although its canaries fail: its bits may differ.
+    pub allow_inexact: bool,
+}
+
+/// Why an evaluation failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The samples asked for do not fit the set.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// A track cannot be interpolated as asked.
+    #[error(transparent)]
+    Interpolation(#[from] InterpolationError),
+    /// The Vulkan device could not be used, or stopped working.
+    #[error(transparent)]
+    Vulkan(#[from] VulkanError),
+    /// The output given is not as large as the result.
+    #[error("the output has room for {given} rotations; the result has {needed}")]
+    OutputLength {
+        /// Rotations that it holds.
+        given: usize,
+        /// Rotations of the result.
+        needed: usize,
+    },
+    /// The system refused worker threads.
+    #[error("worker threads could not be started: {reason}")]
+    Threads {
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl From<EvaluateError> for Error {
+    fn from(error: EvaluateError) -> Self {
+        match error {
+            EvaluateError::Vulkan(error) => Self::Vulkan(error),
+            EvaluateError::Frames(error) => Self::Frames(error),
+        }
+    }
+}
+
+/// Evaluates sets on one device.
+///
+/// ```
+/// use glam::Quat;
+/// use tumble::{Device, Engine, Frames, TrackSet, method};
+///
+/// let mut set = TrackSet::new();
+/// let keys = [0.0, 1.0, 0.5].map(Quat::from_rotation_y);
+/// set.push("door", &[0.0, 1.0, 2.5], &keys)?;
+///
+/// let engine = Engine::new(Device::Cpu)?;
+/// let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
+/// let rotations = clip.evaluate(&Frames::fps(25))?;
+/// assert_eq!((rotations.tracks(), rotations.samples()), (1, 63));
+/// assert_eq!(rotations.get(0, 25), Some(keys[1]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// Cloning is cheap; clones share the device. Calls from several threads are
+/// allowed; a Vulkan device serves them one after another.
+#[derive(Clone)]
+pub struct Engine {
+    backend: Arc<Backend>,
+}
+
+enum Backend {
+    Cpu(CpuEngine),
+    Vulkan { engine: VulkanEngine, canaries: Vec<CanaryReport>, info: Box<DeviceInfo> },
+}
+
+impl Engine {
+    /// Opens a device with the default options.
+    ///
+    /// # Errors
+    /// When the device cannot be opened, or fails a canary.
+    pub fn new(device: Device) -> Result<Self, Error> {
+        Self::with_options(device, &EngineOptions::default())
+    }
+
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// When the device cannot be opened, or fails a canary and
+    /// [`EngineOptions::allow_inexact`] is off.
+    pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
+        match device {
+            Device::Cpu => {
+                let width = options.vector_width.unwrap_or(VectorWidth::Avx512);
+                let engine = CpuEngine::new(width, options.threads)
+                    .map_err(|error| Error::Threads { reason: error.to_string() })?;
+                Ok(Self { backend: Arc::new(Backend::Cpu(engine)) })
+            }
+            Device::Vulkan(VulkanDevice { physical }) => {
+                let info = physical.info.clone();
+                Self::trusted(VulkanEngine::new(physical, options)?, info, options)
+            }
+        }
+    }
+
+    /// Evaluates on an application's own Vulkan device.
+    ///
+    /// # Errors
+    /// As [`Engine::with_options`].
+    ///
+    /// # Safety
+    /// The handles must be valid and belong together, must outlive the engine and
+    /// all of its clips and results, and nobody else may use the queue while the
+    /// engine does.
+    #[allow(unsafe_code)] // the promise is the caller's to make
+    pub unsafe fn from_vulkan(
+        handles: VulkanHandles,
+        options: &EngineOptions,
+    ) -> Result<Self, Error> {
+        // SAFETY: promised by the caller.
+        let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
+        let info = engine.info().clone();
+        Self::trusted(engine, info, options)
+    }
+
+    fn trusted(
+        engine: VulkanEngine,
+        info: DeviceInfo,
+        options: &EngineOptions,
+    ) -> Result<Self, Error> {
+        let canaries = engine.canaries()?;
+        let failed = canaries.iter().find(|canary| canary.differing > 0);
+        if let (Some(canary), false) = (failed, options.allow_inexact) {
+            return Err(Error::Vulkan(VulkanError::Inexact {
+                device: info.name,
+                canary: canary.name,
+                differing: canary.differing,
+                total: canary.total,
+            }));
+        }
+        let backend = Backend::Vulkan { engine, canaries, info: Box::new(info) };
+        Ok(Self { backend: Arc::new(backend) })
+    }
+
+    /// The name of its device: the driver's, or `CPU`.
+    pub fn device_name(&self) -> &str {
+        self.device_info().map_or("CPU", |info| &info.name)
+    }
+
+    /// What is known of its Vulkan device; `None` on the CPU.
+    pub fn device_info(&self) -> Option<&DeviceInfo> {
+        match &*self.backend {
+            Backend::Cpu(_) => None,
+            Backend::Vulkan { info, .. } => Some(info),
+        }
+    }
+
+    /// How the device did on the canaries; empty on the CPU, which they are
+    /// compared with.
+    pub fn canaries(&self) -> &[CanaryReport] {
+        match &*self.backend {
+            Backend::Cpu(_) => &[],
+            Backend::Vulkan { canaries, .. } => canaries,
+        }
+    }
+
+    /// What the validation layer has said so far; see [`Device::list_with`].
+    pub fn validation_messages(&self) -> Vec<String> {
+        match &*self.backend {
+            Backend::Cpu(_) => Vec::new(),
+            Backend::Vulkan { engine, .. } => engine.validation_messages(),
+        }
+    }
+
+    /// Prepares a set for a method and brings it to the device, where it stays.
+    ///
+    /// # Errors
+    /// When a track cannot be interpolated as asked, or the device has not the
+    /// memory; [`Engine::evaluate`] works through such a set piece by piece.
+    pub fn upload(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+    ) -> Result<Clip, Error> {
+        let interpolation = interpolation.into();
+        let (data, buffers) = match &*self.backend {
+            Backend::Cpu(_) => (ClipData::new(set, interpolation, None)?, None),
+            Backend::Vulkan { engine, .. } => {
+                let data = ClipData::new(set, interpolation, Some(engine.group_bytes()))?;
+                let buffers = engine.upload(&data)?;
+                (data, Some(buffers))
+            }
+        };
+        Ok(Clip { engine: self.clone(), data, buffers })
+    }
+
+    /// Prepares and evaluates in one go, `[track][frame]`. On a Vulkan device a set
+    /// larger than its memory (or than [`EngineOptions::memory`]) goes through it
+    /// some tracks at a time.
+    ///
+    /// # Errors
+    /// As [`Engine::upload`] and [`Clip::evaluate`].
+    pub fn evaluate(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+    ) -> Result<Rotations, Error> {
+        self.evaluate_as(set, interpolation, frames, Layout::TrackMajor)
+    }
+
+    /// As [`Engine::evaluate`], in the given layout.
+    ///
+    /// # Errors
+    /// As [`Engine::upload`] and [`Clip::evaluate`].
+    pub fn evaluate_as(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Rotations, Error> {
+        let interpolation = interpolation.into();
+        let pieces = self.pieces(set, &interpolation);
+        if let [_] | [] = &*pieces {
+            return self.upload(set, interpolation)?.evaluate_as(frames, layout);
+        }
+        let (tracks, span) = (set.track_count(), set.time_span());
+        let timeline = frames.resolve(tracks, span)?;
+        let samples = timeline.len();
+        let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+        for piece in pieces {
+            let clip = self.upload(&set.select(piece.clone()), interpolation)?;
+            let timeline = timeline.of_tracks(piece.clone());
+            match layout {
+                Layout::TrackMajor => {
+                    let rows = &mut quats[piece.start * samples..piece.end * samples];
+                    clip.evaluate_timeline_into(&timeline, layout, rows)?;
+                }
+                Layout::FrameMajor => {
+                    let mut columns: Vec<Quat> = bytemuck::zeroed_vec(piece.len() * samples);
+                    clip.evaluate_timeline_into(&timeline, layout, &mut columns)?;
+                    let frames = quats.chunks_mut(tracks).zip(columns.chunks(piece.len()));
+                    for (frame, part) in frames {
+                        frame[piece.clone()].copy_from_slice(part);
+                    }
+                }
+            }
+        }
+        Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
+    }
+
+    /// Ranges of tracks whose segments fit the device's budget.
+    fn pieces(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+    ) -> Vec<std::ops::Range<usize>> {
+        let limit = match &*self.backend {
+            Backend::Vulkan { engine, .. } => engine.clip_bytes(),
+            Backend::Cpu(_) => None,
+        };
+        let Some(limit) = limit else { return vec![0..set.track_count()] };
+        let key_bytes = segment_size(interpolation.method.form) + size_of::<Quat>();
+        let mut pieces = Vec::new();
+        let (mut start, mut bytes) = (0, 0);
+        for (index, track) in set.tracks().enumerate() {
+            let own = track.keys.len() * key_bytes;
+            if bytes + own > limit && index > start {
+                pieces.push(start..index);
+                (start, bytes) = (index, 0);
+            }
+            bytes += own;
+        }
+        pieces.push(start..set.track_count());
+        pieces
+    }
+}
+
+impl std::fmt::Debug for Engine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Engine").field("device", &self.device_name()).finish_non_exhaustive()
+    }
+}
+
+/// A set prepared for one method, on its engine's device; evaluate it as often as
+/// needed, at any frames.
+pub struct Clip {
+    engine: Engine,
+    data: ClipData,
+    /// On a Vulkan device.
+    buffers: Option<ClipBuffers>,
+}
+
+impl Clip {
+    /// Number of tracks.
+    pub fn track_count(&self) -> usize {
+        self.data.track_count()
+    }
+
+    /// The samples that `frames` means for this clip.
+    ///
+    /// # Errors
+    /// When they do not fit it.
+    pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
+        frames.resolve(self.data.track_count(), self.data.time_span())
+    }
+
+    /// The rotation of every track at every sample, `[track][frame]`.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn evaluate(&self, frames: &Frames) -> Result<Rotations, Error> {
+        self.evaluate_as(frames, Layout::TrackMajor)
+    }
+
+    /// As [`Clip::evaluate`], in the given layout.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
+        let timeline = self.timeline(frames)?;
+        let (tracks, samples) = (self.data.track_count(), timeline.len());
+        let storage: Box<dyn crate::rotations::Storage> = match (&*self.engine.backend, &self.buffers)
+        {
+            (Backend::Vulkan { engine, .. }, Some(buffers)) => {
+                engine.evaluate(&self.data, buffers, &timeline, layout)?
+            }
+            _ => {
+                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+                self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
+                Box::new(quats)
+            }
+        };
+        Ok(Rotations::new(storage, tracks, samples, layout))
+    }
+
+    /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it
+    /// is used again: the first touch of fresh memory costs more than evaluating.
+    ///
+    /// # Errors
+    /// Also when `output` is not exactly as long as the result.
+    pub fn evaluate_into(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        self.evaluate_timeline_into(&self.timeline(frames)?, layout, output)
+    }
+
+    fn evaluate_timeline_into(
+        &self,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let needed = self.data.track_count() * timeline.len();
+        if output.len() != needed {
+            return Err(Error::OutputLength { given: output.len(), needed });
+        }
+        match (&*self.engine.backend, &self.buffers) {
+            (Backend::Cpu(engine), _) => {
+                Ok(engine.evaluate(&self.data, timeline, layout, output)?)
+            }
+            (Backend::Vulkan { engine, .. }, Some(buffers)) => {
+                Ok(engine.evaluate_into(&self.data, buffers, timeline, layout, output)?)
+            }
+            (Backend::Vulkan { .. }, None) => unreachable!("uploaded to this engine"),
+        }
+    }
+}
+
+impl std::fmt::Debug for Clip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Clip")
+            .field("engine", &self.engine)
+            .field("method", &self.data.interpolation.method)
+            .field("tracks", &self.track_count())
+            .finish_non_exhaustive()
+    }
+}

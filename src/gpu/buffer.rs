@@ -1,0 +1,146 @@
+//! One buffer with memory of its own.
+
+use std::ops::Range;
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::device::LogicalDevice;
+use super::error::{Named, VulkanError};
+
+/// Where a buffer lives and who touches it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Residence {
+    /// The host writes, the device reads.
+    Upload,
+    /// The device writes, the host reads.
+    Readback,
+    /// Only the device touches it; copies fill and empty it.
+    Device,
+}
+
+impl Residence {
+    fn properties(self) -> (vk::MemoryPropertyFlags, vk::MemoryPropertyFlags) {
+        use vk::MemoryPropertyFlags as Flags;
+        let mapped = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
+        match self {
+            Self::Upload => (mapped, Flags::empty()),
+            // Reading memory that the host does not cache is dozens of times slower.
+            Self::Readback => (mapped, Flags::HOST_CACHED),
+            Self::Device => (Flags::DEVICE_LOCAL, Flags::empty()),
+        }
+    }
+}
+
+/// A storage buffer, mapped for as long as it lives where the host touches it.
+pub(super) struct Buffer {
+    device: Arc<LogicalDevice>,
+    pub(super) raw: vk::Buffer,
+    memory: vk::DeviceMemory,
+    mapped: Option<NonNull<u8>>,
+    size: u64,
+}
+
+// SAFETY: the pointer is to memory that belongs to the buffer alone; access goes
+// through `&self` for reading and `&mut self` for writing.
+unsafe impl Send for Buffer {}
+// SAFETY: as above.
+unsafe impl Sync for Buffer {}
+
+impl Buffer {
+    /// At least `size` bytes; an empty buffer still has some, as Vulkan demands.
+    pub(super) fn new(
+        device: &Arc<LogicalDevice>,
+        name: &str,
+        size: u64,
+        residence: Residence,
+    ) -> Result<Self, VulkanError> {
+        let size = size.max(16).next_multiple_of(16);
+        let info = vk::BufferCreateInfo::default().size(size).usage(
+            vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        );
+        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // in `drop`, also when a later step fails.
+        let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
+        let mut buffer = Self {
+            device: Arc::clone(device),
+            raw,
+            memory: vk::DeviceMemory::null(),
+            mapped: None,
+            size,
+        };
+        // SAFETY: the buffer was just created.
+        let needs = unsafe { device.raw.get_buffer_memory_requirements(raw) };
+        let (required, preferred) = residence.properties();
+        let memory_type = device
+            .physical
+            .memory_type(needs.memory_type_bits, required, preferred)
+            .ok_or(VulkanError::NoMemoryType { wanted: required })?;
+        let allocate = vk::MemoryAllocateInfo::default()
+            .allocation_size(needs.size)
+            .memory_type_index(memory_type);
+        // SAFETY: a valid size and memory type.
+        buffer.memory =
+            unsafe { device.raw.allocate_memory(&allocate, None) }.named("vkAllocateMemory")?;
+        // SAFETY: fresh memory of a type that the buffer allows.
+        unsafe { device.raw.bind_buffer_memory(raw, buffer.memory, 0) }
+            .named("vkBindBufferMemory")?;
+        if residence != Residence::Device {
+            let flags = vk::MemoryMapFlags::empty();
+            // SAFETY: the memory is host-visible and not mapped yet.
+            let pointer =
+                unsafe { device.raw.map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags) }
+                    .named("vkMapMemory")?;
+            buffer.mapped = NonNull::new(pointer.cast());
+        }
+        device.name(raw, name);
+        device.name(buffer.memory, name);
+        Ok(buffer)
+    }
+
+    /// Size in bytes.
+    pub(super) fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Some of the mapped bytes; none where the host cannot touch them.
+    pub(super) fn bytes(&self, range: Range<usize>) -> &[u8] {
+        match self.mapped {
+            // SAFETY: mapped with at least this size for the life of the buffer.
+            // Callers read only after the fence of the work that writes the range.
+            Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
+                std::slice::from_raw_parts(pointer.as_ptr().add(range.start), range.len())
+            },
+            _ => &[],
+        }
+    }
+
+    /// Some of the mapped bytes, to write.
+    pub(super) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
+        match self.mapped {
+            // SAFETY: as in `bytes`, and `&mut self` makes this the host's only
+            // reference; the device works on other ranges.
+            Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
+                std::slice::from_raw_parts_mut(pointer.as_ptr().add(range.start), range.len())
+            },
+            _ => &mut [],
+        }
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        if self.device.may_destroy() {
+            // SAFETY: created from this device and no longer in use: whoever submits
+            // work keeps its buffers until the fence is signalled. Freeing memory
+            // unmaps it; null handles are allowed.
+            unsafe {
+                self.device.raw.destroy_buffer(self.raw, None);
+                self.device.raw.free_memory(self.memory, None);
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Canaries: before a device is trusted it computes a fixed set of inputs, and
+//! every bit is compared with the CPU.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Quat};
+use serde::Serialize;
+
+use super::buffer::{Buffer, Residence};
+use super::device::LogicalDevice;
+use super::engine::VulkanEngine;
+use super::error::VulkanError;
+use super::pipeline::{CANARY, CANARY_BINDINGS, Exactness, Pipeline};
+use super::submission::{Access, Binding, Submission};
+use crate::clip::ClipData;
+use crate::clock::Frames;
+use crate::cpu::canary::reply;
+use crate::cpu::{CpuEngine, VectorWidth};
+use crate::method::{BESSEL_OVERHAUSER, SLERP};
+use crate::numeric::{exp, unit_f32};
+use crate::rotations::Layout;
+use crate::segment::shader::WORKGROUP;
+use crate::segment::{Launch, Probe, Reply};
+use crate::tracks::TrackSet;
+
+/// How a device did on one canary.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct CanaryReport {
+    /// What it looks for.
+    pub name: &'static str,
+    /// Results compared.
+    pub total: usize,
+    /// Results with other bits than the CPU's.
+    pub differing: usize,
+}
+
+/// Runs every canary on a device.
+pub(super) fn run(
+    engine: &VulkanEngine,
+    exactness: Exactness,
+) -> Result<Vec<CanaryReport>, VulkanError> {
+    let mut reports = expressions(engine.device(), exactness)?;
+    for (name, method) in [("arc kernel", SLERP), ("cumulative kernel", BESSEL_OVERHAUSER)] {
+        let clip = ClipData::new(&hostile_set(), method.into(), Some(engine.group_bytes()))
+            .expect("the set suits every method");
+        let cpu = CpuEngine::new(VectorWidth::Baseline, None).expect("no threads of its own");
+        let buffers = engine.upload(&clip)?;
+        let mut report = CanaryReport { name, total: 0, differing: 0 };
+        for frames in [Frames::fps(24), Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001])] {
+            let timeline = frames
+                .resolve(clip.track_count(), clip.time_span())
+                .expect("a few frames");
+            let count = clip.track_count() * timeline.len();
+            let mut expected = vec![Quat::IDENTITY; count];
+            let mut found = expected.clone();
+            let layout = Layout::TrackMajor;
+            cpu.evaluate(&clip, &timeline, layout, &mut expected).expect("short gaps");
+            engine.evaluate_into(&clip, &buffers, &timeline, layout, &mut found).map_err(
+                |error| match error {
+                    super::EvaluateError::Vulkan(error) => error,
+                    super::EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),
+                },
+            )?;
+            report.total += count;
+            report.differing += differing(&expected, &found);
+        }
+        reports.push(report);
+    }
+    Ok(reports)
+}
+
+/// Rotations whose bits differ.
+fn differing(a: &[Quat], b: &[Quat]) -> usize {
+    let bits = |q: &Quat| q.to_array().map(f32::to_bits);
+    a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count()
+}
+
+/// Two seconds of uneven keys on several axes, from tiny to half-turn steps.
+fn hostile_set() -> TrackSet {
+    let mut set = TrackSet::new();
+    let times = [0.0, 0.04, 1.0, 1.25, 2.5, 4.0, 5.0];
+    for (track, size) in [1e-20, 1e-7, 0.02, 0.8, 1.5].into_iter().enumerate() {
+        let keys: Vec<Quat> = (0..times.len())
+            .map(|i| {
+                let turn = (i * i + track) as f64 * size;
+                let axis = DVec3::new(1.0, track as f64 - 1.5, (i % 3) as f64 * 0.3);
+                unit_f32(exp(axis * (turn / 2.0)))
+            })
+            .collect();
+        set.push("", &times, &keys).expect("unit keys");
+    }
+    set
+}
+
+/// The single expressions of `canary.wgsl`.
+pub(super) fn expressions(
+    device: &Arc<LogicalDevice>,
+    exactness: Exactness,
+) -> Result<Vec<CanaryReport>, VulkanError> {
+    let probes = probes();
+    let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
+    let reply_bytes = probes.len() * size_of::<Reply>();
+    let pipeline = Pipeline::new(device, &CANARY, CANARY_BINDINGS, exactness)?;
+    let mut input =
+        Buffer::new(device, "tumble probes", probe_bytes.len() as u64, Residence::Upload)?;
+    let output = Buffer::new(device, "tumble replies", reply_bytes as u64, Residence::Readback)?;
+    input.bytes_mut(0..probe_bytes.len()).copy_from_slice(probe_bytes);
+    let mut submission = Submission::new(device)?;
+    submission.begin(1)?;
+    let launch = Launch { first_item: 0, item_count: probes.len() as u32, stride: 1 };
+    submission.dispatch(
+        &pipeline,
+        &[Binding::whole(&input), Binding::whole(&output)],
+        bytemuck::bytes_of(&launch),
+        [(probes.len() as u32).div_ceil(WORKGROUP), 1],
+    )?;
+    submission.barrier(Access::Kernel, Access::Host);
+    submission.submit()?;
+    submission.wait()?;
+    let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
+
+    let canaries: [(&str, fn(&Reply) -> f32); 8] = [
+        ("contraction", |reply| reply.contraction),
+        ("re-association of a sum", |reply| reply.reassociation),
+        ("rounding to nearest even", |reply| reply.rounding),
+        ("re-association of a product", |reply| reply.association),
+        ("conversion of integers", |reply| reply.conversion),
+        ("cancellation", |reply| reply.cancellation),
+        ("sine", |reply| reply.sine),
+        ("cosine", |reply| reply.cosine),
+    ];
+    let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
+    let count = |value: fn(&Reply) -> f32| {
+        let pairs = expected.iter().zip(replies);
+        pairs.filter(|(a, b)| value(a).to_bits() != value(b).to_bits()).count()
+    };
+    Ok(canaries
+        .into_iter()
+        .map(|(name, value)| CanaryReport { name, total: probes.len(), differing: count(value) })
+        .collect())
+}
+
+/// Values of ordinary size in no order, and sums that lie half way between floats.
+fn probes() -> Vec<Probe> {
+    let mut state = 1u32;
+    let mut next = || {
+        // Numerical Recipes' linear congruential generator: any spread will do.
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0 // exact, in [-1, 1)
+    };
+    let mut probes: Vec<Probe> = (0..1000)
+        .map(|i| Probe {
+            a: next() * 4.0,
+            b: next(),
+            c: next() * std::f32::consts::FRAC_PI_2,
+            n: (next() * 2.0f32.powi(8 + i % 23)) as i32,
+        })
+        .collect();
+    let half_ulp = f32::EPSILON / 2.0;
+    for (a, c) in [(1.0, half_ulp), (1.0 + f32::EPSILON, half_ulp), (-1.0, -half_ulp)] {
+        probes.push(Probe { a, b: half_ulp, c, n: (1 << 24) + 1 });
+    }
+    probes
+}

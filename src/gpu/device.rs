@@ -1,0 +1,94 @@
+//! The logical device and its one compute queue.
+
+use std::ffi::CString;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{ext, khr, vk};
+
+use super::error::{Named, VulkanError};
+use super::physical::PhysicalDevice;
+
+/// An opened device, destroyed with its last user unless it was handed in.
+pub(super) struct LogicalDevice {
+    pub(super) raw: ash::Device,
+    pub(super) physical: PhysicalDevice,
+    queue: Mutex<vk::Queue>,
+    names: Option<ext::debug_utils::Device>,
+    owned: bool,
+    /// A wait ran out of time: work may still run, so nothing may be destroyed.
+    hung: AtomicBool,
+}
+
+impl LogicalDevice {
+    pub(super) fn new(physical: PhysicalDevice) -> Result<Arc<Self>, VulkanError> {
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(physical.queue_family)
+            .queue_priorities(&priorities)];
+        let controls = physical.float_controls_extension;
+        let extensions: Vec<_> =
+            controls.then_some(khr::shader_float_controls::NAME.as_ptr()).into_iter().collect();
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions);
+        let instance = &physical.instance.raw;
+        // SAFETY: the physical device belongs to the instance and has this family.
+        let raw = unsafe { instance.create_device(physical.raw, &info, None) }
+            .named("vkCreateDevice")?;
+        // SAFETY: one queue of this family was just created.
+        let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
+        Ok(Self::wrap(physical, raw, queue, true))
+    }
+
+    /// An application's device; it stays the application's to destroy.
+    pub(super) fn borrowed(
+        physical: PhysicalDevice,
+        raw: ash::Device,
+        queue: vk::Queue,
+    ) -> Arc<Self> {
+        Self::wrap(physical, raw, queue, false)
+    }
+
+    fn wrap(physical: PhysicalDevice, raw: ash::Device, queue: vk::Queue, owned: bool) -> Arc<Self> {
+        let instance = &physical.instance;
+        let names =
+            instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
+        let (queue, hung) = (Mutex::new(queue), AtomicBool::new(false));
+        Arc::new(Self { raw, physical, queue, names, owned, hung })
+    }
+
+    /// The queue; Vulkan wants one user at a time.
+    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives an object the name that validation and debuggers show.
+    pub(super) fn name(&self, object: impl vk::Handle, name: &str) {
+        let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else { return };
+        let info =
+            vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object belongs to this device. A name that cannot be set is
+        // no reason to stop.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+
+    /// From now on nothing of this device is destroyed: it may still be in use.
+    pub(super) fn mark_hung(&self) {
+        self.hung.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether objects may be destroyed.
+    pub(super) fn may_destroy(&self) -> bool {
+        !self.hung.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for LogicalDevice {
+    fn drop(&mut self) {
+        if self.owned && self.may_destroy() {
+            // SAFETY: every object created from it held an `Arc` to this and is gone.
+            unsafe { self.raw.destroy_device(None) };
+        }
+    }
+}

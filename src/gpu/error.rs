@@ -1,0 +1,89 @@
+//! What can go wrong with Vulkan.
+
+use ash::vk;
+
+/// Why a Vulkan device could not be used, or stopped working.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VulkanError {
+    /// There is no Vulkan loader library.
+    #[error("no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers)")]
+    NoLoader {
+        /// What the system said.
+        reason: String,
+    },
+    /// A loader, but no device that can compute.
+    #[error("Vulkan is installed but offers no device with a compute queue")]
+    NoDevice,
+    /// A Vulkan call failed.
+    #[error("{call} failed: {result:?}{}", hint(*result))]
+    Call {
+        /// The call's name.
+        call: &'static str,
+        /// What it returned.
+        result: vk::Result,
+    },
+    /// The validation layer was asked for and is not installed.
+    #[error(
+        "the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
+    )]
+    NoValidation,
+    /// No memory type has what a buffer needs.
+    #[error("the device offers no memory that is {wanted:?}")]
+    NoMemoryType {
+        /// The properties needed.
+        wanted: vk::MemoryPropertyFlags,
+    },
+    /// The device did not finish in time.
+    #[error("the device did not finish a dispatch within {seconds} s")]
+    Timeout {
+        /// How long was waited.
+        seconds: u64,
+    },
+    /// The device computes other bits than the CPU.
+    #[error(
+        "{device} is not exact: canary `{canary}` differs in {differing} of {total} results; it is used only when inexact devices are allowed"
+    )]
+    Inexact {
+        /// The device's name.
+        device: String,
+        /// The canary that failed.
+        canary: &'static str,
+        /// Results that differ.
+        differing: usize,
+        /// Results compared.
+        total: usize,
+    },
+    /// One track alone exceeds the device's limits.
+    #[error("{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set")]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// Bytes needed.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+}
+
+fn hint(result: vk::Result) -> &'static str {
+    match result {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            "; lower the memory budget"
+        }
+        vk::Result::ERROR_DEVICE_LOST => "; the driver gave up on the device",
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => "; no driver is installed",
+        _ => "",
+    }
+}
+
+/// Keeps the name of the call that failed.
+pub(super) trait Named<T> {
+    fn named(self, call: &'static str) -> Result<T, VulkanError>;
+}
+
+impl<T> Named<T> for ash::prelude::VkResult<T> {
+    fn named(self, call: &'static str) -> Result<T, VulkanError> {
+        self.map_err(|result| VulkanError::Call { call, result })
+    }
+}

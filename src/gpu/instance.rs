@@ -1,0 +1,149 @@
+//! The Vulkan instance: loader, validation, and the physical devices.
+
+use std::ffi::{CStr, c_void};
+use std::sync::Arc;
+use std::sync::Mutex;
+
+use ash::{ext, vk};
+
+use super::error::{Named, VulkanError};
+
+const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// An instance, destroyed with its last user unless it was handed in.
+pub(super) struct Instance {
+    pub(super) raw: ash::Instance,
+    pub(super) debug_utils: bool,
+    messenger: Option<Messenger>,
+    owned: bool,
+    /// Keeps the loader library open; last, so that it closes last.
+    _entry: ash::Entry,
+}
+
+struct Messenger {
+    functions: ext::debug_utils::Instance,
+    raw: vk::DebugUtilsMessengerEXT,
+    /// What the validation layer said; the address is the callback's.
+    messages: Box<Mutex<Vec<String>>>,
+}
+
+impl Instance {
+    /// Loads Vulkan and creates an instance of version 1.1 or newer.
+    pub(super) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
+        // SAFETY: loading a library runs its initialisers; that is what is asked for.
+        let entry = unsafe { ash::Entry::load() }
+            .map_err(|error| VulkanError::NoLoader { reason: error.to_string() })?;
+        // SAFETY: no requirements beyond a loaded entry.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }
+            .named("vkEnumerateInstanceLayerProperties")?;
+        let has_layer = |name| layers.iter().any(|l| l.layer_name_as_c_str() == Ok(name));
+        if validation && !has_layer(VALIDATION) {
+            return Err(VulkanError::NoValidation);
+        }
+        let layer_names: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
+        let has_extension = |layer: Option<&CStr>, wanted: &CStr| -> Result<bool, VulkanError> {
+            // SAFETY: the layer's name is a valid string.
+            let found = unsafe { entry.enumerate_instance_extension_properties(layer) }
+                .named("vkEnumerateInstanceExtensionProperties")?;
+            Ok(found.iter().any(|e| e.extension_name_as_c_str() == Ok(wanted)))
+        };
+        let debug_utils = has_extension(None, ext::debug_utils::NAME)?
+            || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
+        let extensions: Vec<_> =
+            debug_utils.then_some(ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"tumble")
+            .engine_name(c"tumble")
+            .api_version(vk::API_VERSION_1_3);
+        let messages: Box<Mutex<Vec<String>>> = Box::default();
+        let mut messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(
+                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
+                    | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+            )
+            .message_type(
+                vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
+                    | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+            )
+            .pfn_user_callback(Some(record_message))
+            .user_data((&raw const *messages).cast_mut().cast());
+        let synchronization = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default()
+            .enabled_validation_features(&synchronization);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&application)
+            .enabled_layer_names(&layer_names)
+            .enabled_extension_names(&extensions);
+        if validation {
+            info = info.push_next(&mut features).push_next(&mut messenger_info);
+        }
+        // SAFETY: every pointer in `info` outlives the call; the messenger's user
+        // data lives as long as the instance.
+        let raw = unsafe { entry.create_instance(&info, None) }.named("vkCreateInstance")?;
+        let mut instance =
+            Self { raw, debug_utils, messenger: None, owned: true, _entry: entry };
+        if validation {
+            let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
+            messenger_info.p_next = std::ptr::null();
+            // SAFETY: the extension is enabled; the user data is boxed and kept.
+            let raw = unsafe { functions.create_debug_utils_messenger(&messenger_info, None) }
+                .named("vkCreateDebugUtilsMessengerEXT")?;
+            instance.messenger = Some(Messenger { functions, raw, messages });
+        }
+        Ok(Arc::new(instance))
+    }
+
+    /// An application's instance; it stays the application's to destroy.
+    pub(super) fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
+        Arc::new(Self { raw, debug_utils: false, messenger: None, owned: false, _entry: entry })
+    }
+
+    /// Every physical device, in the loader's order.
+    pub(super) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>, VulkanError> {
+        // SAFETY: the instance is alive.
+        unsafe { self.raw.enumerate_physical_devices() }.named("vkEnumeratePhysicalDevices")
+    }
+
+    /// What the validation layer has said so far.
+    pub(super) fn validation_messages(&self) -> Vec<String> {
+        let messages = self.messenger.as_ref().map(|messenger| &messenger.messages);
+        messages.and_then(|m| m.lock().ok()).map(|m| m.clone()).unwrap_or_default()
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if let Some(messenger) = &self.messenger {
+            // SAFETY: created from this instance and destroyed once.
+            unsafe {
+                messenger.functions.destroy_debug_utils_messenger(messenger.raw, None);
+            }
+        }
+        if self.owned {
+            // SAFETY: every object created from it holds an `Arc` to this.
+            unsafe { self.raw.destroy_instance(None) };
+        }
+    }
+}
+
+/// # Safety
+/// Called by the loader with valid pointers; `user_data` is the message list.
+unsafe extern "system" fn record_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user_data: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the list lives as long as the messenger; the message is a string
+    // unless it is null.
+    let (messages, text) = unsafe {
+        let messages = &*user_data.cast::<Mutex<Vec<String>>>();
+        let text = (*data).message_as_c_str().unwrap_or(c"");
+        (messages, text.to_string_lossy().into_owned())
+    };
+    if let Ok(mut messages) = messages.lock() {
+        messages.push(text);
+    }
+    vk::FALSE
+}

@@ -1,0 +1,22 @@
+//! Vulkan, through `ash`: the only place, with the CPU's feature dispatch, that is
+//! not safe Rust. One type owns one Vulkan object and destroys it.
+#![allow(unsafe_code)]
+
+mod buffer;
+mod canary;
+mod device;
+mod engine;
+mod error;
+mod handles;
+mod instance;
+mod physical;
+mod pipeline;
+mod submission;
+mod window;
+
+pub use canary::CanaryReport;
+pub(crate) use engine::{ClipBuffers, EvaluateError, VulkanEngine};
+pub use error::VulkanError;
+pub use handles::VulkanHandles;
+pub(crate) use physical::{PhysicalDevice, list};
+pub use physical::{DeviceInfo, DeviceKind};

@@ -1,0 +1,202 @@
+//! What a Vulkan device is and what it can do.
+
+use std::sync::Arc;
+
+use ash::{khr, vk};
+use serde::Serialize;
+
+use super::error::{Named, VulkanError};
+use super::instance::Instance;
+use crate::spirv::FloatControls;
+
+/// A Vulkan device that can compute: its name, and the limits that matter here.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct DeviceInfo {
+    /// Name, as the driver gives it.
+    pub name: String,
+    /// The driver's name and version, where it tells.
+    pub driver: String,
+    /// Kind of device.
+    pub kind: DeviceKind,
+    /// Vulkan version that the device supports.
+    pub api_version: String,
+    /// PCI vendor.
+    pub vendor_id: u32,
+    /// The vendor's number for the device.
+    pub device_id: u32,
+    /// Bytes that a kernel can see of one buffer.
+    pub max_storage_buffer_range: u64,
+    /// Bytes of the largest allocation.
+    pub max_memory_allocation_size: u64,
+    /// Invocations in one workgroup.
+    pub max_compute_work_group_invocations: u32,
+    /// Workgroups of one dispatch, along each axis.
+    pub max_compute_work_group_count: [u32; 3],
+    /// Alignment of offsets into buffers, bytes.
+    pub min_storage_buffer_offset_alignment: u64,
+    /// Bytes of memory local to the device.
+    pub device_local_memory: u64,
+    /// Signed zeros, infinities and NaN can be demanded (f32).
+    pub preserves_signed_zero_inf_nan: bool,
+    /// Rounding to nearest even can be demanded (f32).
+    pub rounds_to_nearest_even: bool,
+}
+
+/// Kinds of Vulkan devices, fastest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceKind {
+    /// A card with memory of its own.
+    Discrete,
+    /// Shares the host's memory.
+    Integrated,
+    /// Part of a virtual machine.
+    Virtual,
+    /// A software rasteriser, such as lavapipe.
+    Cpu,
+    /// Anything else.
+    Other,
+}
+
+/// A physical device, not yet opened.
+#[derive(Clone)]
+pub(crate) struct PhysicalDevice {
+    pub(super) instance: Arc<Instance>,
+    pub(super) raw: vk::PhysicalDevice,
+    pub(super) queue_family: u32,
+    pub(super) float_controls: FloatControls,
+    /// The extension must be enabled: the device is older than Vulkan 1.2.
+    pub(super) float_controls_extension: bool,
+    pub(super) memory: vk::PhysicalDeviceMemoryProperties,
+    pub(crate) info: DeviceInfo,
+}
+
+/// Every device with a compute queue and Vulkan 1.1, fastest kind first; among
+/// equals the loader's order.
+pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError> {
+    let instance = Instance::new(validation)?;
+    let mut devices = Vec::new();
+    for raw in instance.physical_devices()? {
+        devices.extend(PhysicalDevice::new(&instance, raw)?);
+    }
+    devices.sort_by_key(|device| device.info.kind);
+    Ok(devices)
+}
+
+impl PhysicalDevice {
+    /// `None` for a device that cannot compute or has only Vulkan 1.0.
+    pub(super) fn new(
+        instance: &Arc<Instance>,
+        raw: vk::PhysicalDevice,
+    ) -> Result<Option<Self>, VulkanError> {
+        let vk_instance = &instance.raw;
+        // SAFETY: `raw` was enumerated from this instance, here and below.
+        let families = unsafe { vk_instance.get_physical_device_queue_family_properties(raw) };
+        let compute = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+        // SAFETY: as above.
+        let properties = unsafe { vk_instance.get_physical_device_properties(raw) };
+        let Some(queue_family) = compute else { return Ok(None) };
+        if properties.api_version < vk::API_VERSION_1_1 {
+            return Ok(None);
+        }
+        // SAFETY: as above.
+        let extensions = unsafe { vk_instance.enumerate_device_extension_properties(raw) }
+            .named("vkEnumerateDeviceExtensionProperties")?;
+        let has = |name| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let core_1_2 = properties.api_version >= vk::API_VERSION_1_2;
+        let reports_controls = core_1_2 || has(khr::shader_float_controls::NAME);
+
+        let mut controls = vk::PhysicalDeviceFloatControlsProperties::default();
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance);
+        if reports_controls {
+            all = all.push_next(&mut controls);
+        }
+        if core_1_2 || has(khr::driver_properties::NAME) {
+            all = all.push_next(&mut driver);
+        }
+        // SAFETY: Vulkan 1.1; only structures that the device knows are chained.
+        unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
+        // SAFETY: as above.
+        let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
+        let float_controls = FloatControls {
+            preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
+                == vk::TRUE,
+            round_to_nearest_even: controls.shader_rounding_mode_rte_float32 == vk::TRUE,
+        };
+        let limits = &properties.limits;
+        let text = |name: Result<&std::ffi::CStr, _>| {
+            name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+        };
+        let driver = format!(
+            "{} {}",
+            text(driver.driver_name_as_c_str()),
+            text(driver.driver_info_as_c_str())
+        );
+        let info = DeviceInfo {
+            name: text(properties.device_name_as_c_str()),
+            driver: driver.trim().to_owned(),
+            kind: kind(properties.device_type),
+            api_version: version(properties.api_version),
+            vendor_id: properties.vendor_id,
+            device_id: properties.device_id,
+            max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
+            max_memory_allocation_size: maintenance.max_memory_allocation_size,
+            max_compute_work_group_invocations: limits.max_compute_work_group_invocations,
+            max_compute_work_group_count: limits.max_compute_work_group_count,
+            min_storage_buffer_offset_alignment: limits.min_storage_buffer_offset_alignment,
+            device_local_memory: device_local_memory(&memory),
+            preserves_signed_zero_inf_nan: float_controls.preserve_signed_zero_inf_nan,
+            rounds_to_nearest_even: float_controls.round_to_nearest_even,
+        };
+        Ok(Some(Self {
+            instance: Arc::clone(instance),
+            raw,
+            queue_family: queue_family as u32,
+            float_controls,
+            float_controls_extension: reports_controls && !core_1_2,
+            memory,
+            info,
+        }))
+    }
+
+    /// The first memory type allowed by `allowed` with all of `required`; one that
+    /// also has `preferred`, where there is one.
+    pub(super) fn memory_type(
+        &self,
+        allowed: u32,
+        required: vk::MemoryPropertyFlags,
+        preferred: vk::MemoryPropertyFlags,
+    ) -> Option<u32> {
+        let types = self.memory.memory_types_as_slice();
+        let find = |wanted| {
+            (0..types.len() as u32).find(|&i| {
+                allowed & (1 << i) != 0 && types[i as usize].property_flags.contains(wanted)
+            })
+        };
+        find(required | preferred).or_else(|| find(required))
+    }
+}
+
+fn device_local_memory(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
+    let heaps = memory.memory_heaps_as_slice().iter();
+    heaps.filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum()
+}
+
+fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {
+    match device_type {
+        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+        _ => DeviceKind::Other,
+    }
+}
+
+fn version(version: u32) -> String {
+    let major = vk::api_version_major(version);
+    let minor = vk::api_version_minor(version);
+    format!("{major}.{minor}.{}", vk::api_version_patch(version))
+}

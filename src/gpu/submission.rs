@@ -1,0 +1,259 @@
+//! One submission at a time: a command buffer, its fence and its descriptor sets.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::Buffer;
+use super::device::LogicalDevice;
+use super::error::{Named, VulkanError};
+use super::pipeline::Pipeline;
+
+/// A dispatch takes milliseconds; a device that needs this long has hung.
+const TIMEOUT_SECONDS: u64 = 60;
+
+/// Command buffer, fence and descriptor pool, used again and again.
+pub(super) struct Submission {
+    device: Arc<LogicalDevice>,
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    fence: vk::Fence,
+    descriptors: vk::DescriptorPool,
+    /// Sets that the descriptor pool can hold.
+    capacity: u32,
+    pending: bool,
+}
+
+/// A stretch of a buffer that a kernel sees.
+#[derive(Clone, Copy)]
+pub(super) struct Binding<'a> {
+    pub(super) buffer: &'a Buffer,
+    pub(super) offset: u64,
+    pub(super) size: u64,
+}
+
+impl<'a> Binding<'a> {
+    /// All of a buffer.
+    pub(super) fn whole(buffer: &'a Buffer) -> Self {
+        Self { buffer, offset: 0, size: buffer.size() }
+    }
+}
+
+impl Submission {
+    pub(super) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        let mut submission = Self {
+            device: Arc::clone(device),
+            pool: vk::CommandPool::null(),
+            commands: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            descriptors: vk::DescriptorPool::null(),
+            capacity: 0,
+            pending: false,
+        };
+        let raw = &device.raw;
+        let info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.physical.queue_family);
+        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // in `drop`, also when a later step fails.
+        submission.pool =
+            unsafe { raw.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(submission.pool)
+            .command_buffer_count(1);
+        // SAFETY: as above.
+        submission.commands = unsafe { raw.allocate_command_buffers(&info) }
+            .named("vkAllocateCommandBuffers")?[0];
+        // SAFETY: as above.
+        submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
+            .named("vkCreateFence")?;
+        device.name(submission.commands, "tumble window");
+        Ok(submission)
+    }
+
+    /// Starts recording, with room for `sets` descriptor sets.
+    ///
+    /// Must not be called while work is pending.
+    pub(super) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
+        debug_assert!(!self.pending);
+        let raw = &self.device.raw;
+        if sets > self.capacity {
+            let sizes = [vk::DescriptorPoolSize::default()
+                .ty(vk::DescriptorType::STORAGE_BUFFER)
+                .descriptor_count(sets * super::pipeline::KERNEL_BINDINGS)];
+            let info =
+                vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
+            // SAFETY: nothing is pending, so the old pool is not in use.
+            unsafe { raw.destroy_descriptor_pool(self.descriptors, None) };
+            (self.descriptors, self.capacity) = (vk::DescriptorPool::null(), 0);
+            // SAFETY: the device is alive.
+            self.descriptors = unsafe { raw.create_descriptor_pool(&info, None) }
+                .named("vkCreateDescriptorPool")?;
+            self.capacity = sets;
+        } else if self.capacity > 0 {
+            let flags = vk::DescriptorPoolResetFlags::empty();
+            // SAFETY: nothing is pending, so no set is in use.
+            unsafe { raw.reset_descriptor_pool(self.descriptors, flags) }
+                .named("vkResetDescriptorPool")?;
+        }
+        // SAFETY: nothing is pending, so the command buffer is not in use.
+        unsafe { raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .named("vkResetCommandPool")?;
+        let info = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: as above.
+        unsafe { raw.begin_command_buffer(self.commands, &info) }.named("vkBeginCommandBuffer")
+    }
+
+    /// Records a dispatch with one buffer for each binding.
+    pub(super) fn dispatch(
+        &mut self,
+        pipeline: &Pipeline,
+        bindings: &[Binding<'_>],
+        constants: &[u8],
+        groups: [u32; 2],
+    ) -> Result<(), VulkanError> {
+        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
+        let raw = &self.device.raw;
+        let layouts = [pipeline.set_layout];
+        let info = vk::DescriptorSetAllocateInfo::default()
+            .descriptor_pool(self.descriptors)
+            .set_layouts(&layouts);
+        // SAFETY: `begin` made room for this set.
+        let set = unsafe { raw.allocate_descriptor_sets(&info) }
+            .named("vkAllocateDescriptorSets")?[0];
+        let infos: Vec<_> = bindings
+            .iter()
+            .map(|binding| {
+                [vk::DescriptorBufferInfo::default()
+                    .buffer(binding.buffer.raw)
+                    .offset(binding.offset)
+                    .range(binding.size)]
+            })
+            .collect();
+        let writes: Vec<_> = (0..)
+            .zip(&infos)
+            .map(|(binding, info)| {
+                vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(binding)
+                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .buffer_info(info)
+            })
+            .collect();
+        let commands = self.commands;
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        let stage = vk::ShaderStageFlags::COMPUTE;
+        // SAFETY: recording is on (`begin`); set, pipeline and buffers belong to this
+        // device, and the caller keeps them until `wait`.
+        unsafe {
+            raw.update_descriptor_sets(&writes, &[]);
+            raw.cmd_bind_pipeline(commands, compute, pipeline.raw);
+            raw.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
+            raw.cmd_push_constants(commands, pipeline.layout, stage, 0, constants);
+            raw.cmd_dispatch(commands, groups[0], groups[1], 1);
+        }
+        Ok(())
+    }
+
+    /// Records a copy of `size` bytes.
+    pub(super) fn copy(&mut self, from: &Buffer, to: &Buffer, to_offset: u64, size: u64) {
+        let region = [vk::BufferCopy::default().dst_offset(to_offset).size(size)];
+        // SAFETY: as in `dispatch`; both ranges lie within their buffers.
+        unsafe { self.device.raw.cmd_copy_buffer(self.commands, from.raw, to.raw, &region) };
+    }
+
+    /// Records that what was written before `from` is seen after `to`.
+    pub(super) fn barrier(&mut self, from: Access, to: Access) {
+        let (source_stage, source_access) = from.scope(true);
+        let (destination_stage, destination_access) = to.scope(false);
+        let memory = [vk::MemoryBarrier::default()
+            .src_access_mask(source_access)
+            .dst_access_mask(destination_access)];
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: recording is on.
+        unsafe {
+            self.device.raw.cmd_pipeline_barrier(
+                self.commands,
+                source_stage,
+                destination_stage,
+                none,
+                &memory,
+                &[],
+                &[],
+            );
+        }
+    }
+
+    /// Ends recording and hands the work to the queue.
+    pub(super) fn submit(&mut self) -> Result<(), VulkanError> {
+        let raw = &self.device.raw;
+        // SAFETY: recording is on.
+        unsafe { raw.end_command_buffer(self.commands) }.named("vkEndCommandBuffer")?;
+        let commands = [self.commands];
+        let info = [vk::SubmitInfo::default().command_buffers(&commands)];
+        let queue = self.device.queue();
+        // SAFETY: the fence is unsignalled and the queue is locked.
+        unsafe { raw.queue_submit(*queue, &info, self.fence) }.named("vkQueueSubmit")?;
+        self.pending = true;
+        Ok(())
+    }
+
+    /// Waits until submitted work has finished; at once when there is none.
+    pub(super) fn wait(&mut self) -> Result<(), VulkanError> {
+        if !self.pending {
+            return Ok(());
+        }
+        let raw = &self.device.raw;
+        let fences = [self.fence];
+        let timeout = TIMEOUT_SECONDS * 1_000_000_000;
+        // SAFETY: the fence belongs to this device.
+        match unsafe { raw.wait_for_fences(&fences, true, timeout) } {
+            Err(vk::Result::TIMEOUT) => {
+                self.device.mark_hung();
+                return Err(VulkanError::Timeout { seconds: TIMEOUT_SECONDS });
+            }
+            waited => waited.named("vkWaitForFences")?,
+        }
+        self.pending = false;
+        // SAFETY: the fence is signalled and not in use.
+        unsafe { raw.reset_fences(&fences) }.named("vkResetFences")
+    }
+}
+
+/// Who touches memory on one side of a barrier.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Access {
+    Kernel,
+    Copy,
+    Host,
+}
+
+impl Access {
+    fn scope(self, writes: bool) -> (vk::PipelineStageFlags, vk::AccessFlags) {
+        use vk::{AccessFlags as A, PipelineStageFlags as S};
+        match (self, writes) {
+            (Self::Kernel, true) => (S::COMPUTE_SHADER, A::SHADER_WRITE),
+            (Self::Kernel, false) => (S::COMPUTE_SHADER, A::SHADER_READ | A::SHADER_WRITE),
+            (Self::Copy, true) => (S::TRANSFER, A::TRANSFER_WRITE),
+            (Self::Copy, false) => (S::TRANSFER, A::TRANSFER_READ),
+            (Self::Host, true) => (S::HOST, A::HOST_WRITE),
+            (Self::Host, false) => (S::HOST, A::HOST_READ),
+        }
+    }
+}
+
+impl Drop for Submission {
+    fn drop(&mut self) {
+        // An error may have left work pending; nothing may go before it ends.
+        let finished = self.wait().is_ok();
+        if finished && self.device.may_destroy() {
+            let raw = &self.device.raw;
+            // SAFETY: created from this device, not in use; null is allowed.
+            unsafe {
+                raw.destroy_descriptor_pool(self.descriptors, None);
+                raw.destroy_fence(self.fence, None);
+                raw.destroy_command_pool(self.pool, None);
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What comes out: the rotation of every track at every sample.
+
+use std::fmt;
+
+use glam::Quat;
+
+/// The order of a result in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Layout {
+    /// `[track][frame]`: the samples of one track lie together.
+    #[default]
+    TrackMajor,
+    /// `[frame][track]`: the tracks of one frame lie together.
+    FrameMajor,
+}
+
+impl Layout {
+    /// Where a sample of a track lies among `tracks × samples` rotations.
+    pub fn index(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
+        match self {
+            Self::TrackMajor => track * samples + sample,
+            Self::FrameMajor => sample * tracks + track,
+        }
+    }
+}
+
+/// Memory that holds a result: the process's own, or a device's, mapped.
+pub(crate) trait Storage: Send + Sync {
+    fn quats(&self) -> &[Quat];
+}
+
+impl Storage for Vec<Quat> {
+    fn quats(&self) -> &[Quat] {
+        self
+    }
+}
+
+/// The result of an evaluation: unit quaternions, `x y z w` in memory, of shape
+/// `(tracks, samples)` or `(samples, tracks)`, as the [`Layout`] says.
+pub struct Rotations {
+    storage: Box<dyn Storage>,
+    tracks: usize,
+    samples: usize,
+    layout: Layout,
+}
+
+impl Rotations {
+    pub(crate) fn new(
+        storage: Box<dyn Storage>,
+        tracks: usize,
+        samples: usize,
+        layout: Layout,
+    ) -> Self {
+        debug_assert_eq!(storage.quats().len(), tracks * samples);
+        Self { storage, tracks, samples, layout }
+    }
+
+    /// Number of tracks.
+    pub fn tracks(&self) -> usize {
+        self.tracks
+    }
+
+    /// Samples of each track.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// The order in memory.
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// All rotations, without a copy: where a device maps its memory, these are the
+    /// values that the device wrote.
+    pub fn as_quats(&self) -> &[Quat] {
+        self.storage.quats()
+    }
+
+    /// The rotation of one track at one sample; `None` out of range.
+    pub fn get(&self, track: usize, sample: usize) -> Option<Quat> {
+        let inside = track < self.tracks && sample < self.samples;
+        inside
+            .then(|| self.as_quats()[self.layout.index(track, sample, self.tracks, self.samples)])
+    }
+}
+
+impl fmt::Debug for Rotations {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Rotations")
+            .field("tracks", &self.tracks)
+            .field("samples", &self.samples)
+            .field("layout", &self.layout)
+            .finish_non_exhaustive()
+    }
+}

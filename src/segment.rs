@@ -1,0 +1,178 @@
+//! The layouts that shaders and Rust share, each field checked against the shader.
+
+use std::mem::offset_of;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::method::Form;
+
+/// Constants and layouts read from the shaders at build time.
+#[allow(dead_code)]
+pub(crate) mod shader {
+    include!(concat!(env!("OUT_DIR"), "/shader_constants.rs"));
+}
+
+/// `Segment` of `evaluate_arc.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ArcSegment {
+    pub(crate) middle: [f32; 4],
+    pub(crate) partner: [f32; 4],
+}
+
+/// `Segment` of `evaluate_cumulative.wgsl`. The last component of the coefficient
+/// vectors is padding.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CumulativeSegment {
+    pub(crate) terms: [[f32; 4]; 8],
+    pub(crate) linear: [f32; 4],
+    pub(crate) quadratic: [f32; 4],
+    pub(crate) cubic: [f32; 4],
+}
+
+/// `Item` of `kernel.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Item {
+    pub(crate) source: u32,
+    pub(crate) output: u32,
+    pub(crate) count: u32,
+    pub(crate) first: i32,
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+
+/// `Launch` of `kernel.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Launch {
+    pub(crate) first_item: u32,
+    pub(crate) item_count: u32,
+    pub(crate) stride: u32,
+}
+
+/// `Probe` of `canary.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Probe {
+    pub(crate) a: f32,
+    pub(crate) b: f32,
+    pub(crate) c: f32,
+    pub(crate) n: i32,
+}
+
+/// `Reply` of `canary.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Reply {
+    pub(crate) contraction: f32,
+    pub(crate) reassociation: f32,
+    pub(crate) rounding: f32,
+    pub(crate) association: f32,
+    pub(crate) conversion: f32,
+    pub(crate) cancellation: f32,
+    pub(crate) sine: f32,
+    pub(crate) cosine: f32,
+}
+
+macro_rules! assert_layout {
+    ($type:ty, $size:ident, $($field:ident = $offset:ident),+) => {
+        const _: () = {
+            assert!(size_of::<$type>() == shader::$size);
+            $(assert!(offset_of!($type, $field) == shader::$offset);)+
+        };
+    };
+}
+
+assert_layout!(
+    ArcSegment,
+    ARC_SEGMENT_SIZE,
+    middle = ARC_SEGMENT_MIDDLE,
+    partner = ARC_SEGMENT_PARTNER
+);
+assert_layout!(
+    CumulativeSegment,
+    CUMULATIVE_SEGMENT_SIZE,
+    terms = CUMULATIVE_SEGMENT_TERMS,
+    linear = CUMULATIVE_SEGMENT_LINEAR,
+    quadratic = CUMULATIVE_SEGMENT_QUADRATIC,
+    cubic = CUMULATIVE_SEGMENT_CUBIC
+);
+assert_layout!(
+    Item,
+    ITEM_SIZE,
+    source = ITEM_SOURCE,
+    output = ITEM_OUTPUT,
+    count = ITEM_COUNT,
+    first = ITEM_FIRST,
+    scale = ITEM_SCALE,
+    offset = ITEM_OFFSET
+);
+assert_layout!(
+    Launch,
+    LAUNCH_SIZE,
+    first_item = LAUNCH_FIRST_ITEM,
+    item_count = LAUNCH_ITEM_COUNT,
+    stride = LAUNCH_STRIDE
+);
+assert_layout!(Probe, PROBE_SIZE, a = PROBE_A, b = PROBE_B, c = PROBE_C, n = PROBE_N);
+assert_layout!(
+    Reply,
+    REPLY_SIZE,
+    contraction = REPLY_CONTRACTION,
+    reassociation = REPLY_REASSOCIATION,
+    rounding = REPLY_ROUNDING,
+    association = REPLY_ASSOCIATION,
+    conversion = REPLY_CONVERSION,
+    cancellation = REPLY_CANCELLATION,
+    sine = REPLY_SINE,
+    cosine = REPLY_COSINE
+);
+
+/// The segments of one clip, all of one form.
+#[derive(Debug, Clone)]
+pub(crate) enum Segments {
+    Arc(Vec<ArcSegment>),
+    Cumulative(Vec<CumulativeSegment>),
+}
+
+impl Segments {
+    pub(crate) fn new(form: Form) -> Self {
+        match form {
+            Form::Arc => Self::Arc(Vec::new()),
+            Form::Cumulative => Self::Cumulative(Vec::new()),
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Arc(segments) => segments.len(),
+            Self::Cumulative(segments) => segments.len(),
+        }
+    }
+
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Arc(segments) => bytemuck::cast_slice(segments),
+            Self::Cumulative(segments) => bytemuck::cast_slice(segments),
+        }
+    }
+
+    /// Moves all of `other` behind its own.
+    pub(crate) fn append(&mut self, other: Self) {
+        match (self, other) {
+            (Self::Arc(own), Self::Arc(other)) => own.extend(other),
+            (Self::Cumulative(own), Self::Cumulative(other)) => own.extend(other),
+            _ => unreachable!("segments of one clip have one form"),
+        }
+    }
+}
+
+/// Bytes of one segment of a form.
+pub(crate) fn segment_size(form: Form) -> usize {
+    match form {
+        Form::Arc => size_of::<ArcSegment>(),
+        Form::Cumulative => size_of::<CumulativeSegment>(),
+    }
+}

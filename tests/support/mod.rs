@@ -1,0 +1,117 @@
+//! What several test files need: devices, hostile keys, a small generator.
+#![allow(dead_code)] // each test file uses some of it
+
+use glam::{DQuat, DVec3, Quat};
+use tumble::{Device, TrackSet};
+
+/// Every Vulkan device of this machine, with the validation layer when asked.
+/// There must be one in CI; elsewhere its absence is said aloud.
+pub fn vulkan_devices() -> Vec<Device> {
+    let devices = Device::list().unwrap_or_else(|error| {
+        eprintln!("{error}");
+        Vec::new()
+    });
+    assert!(
+        !devices.is_empty() || std::env::var_os("CI").is_none(),
+        "CI must have a Vulkan device (Debian: mesa-vulkan-drivers)"
+    );
+    if devices.is_empty() {
+        eprintln!("NO VULKAN DEVICE: this test compared nothing");
+    }
+    devices
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    pub fn pick<T: Copy>(&mut self, values: &[T]) -> T {
+        values[(self.next() % values.len() as u64) as usize]
+    }
+
+    pub fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = DVec3::from_array(std::array::from_fn(|_| self.between(-1.0, 1.0)));
+            if (0.01..1.0).contains(&v.length_squared()) {
+                return v.normalize();
+            }
+        }
+    }
+
+    pub fn rotation(&mut self) -> DQuat {
+        let angle = self.between(0.0, std::f64::consts::TAU);
+        DQuat::from_axis_angle(self.direction(), angle)
+    }
+}
+
+/// A set that asks for trouble: steps from 1e-7 rad to half a turn, components of
+/// 1e-30, gaps of one frame and of a thousand seconds, one and two keys, tracks
+/// that start and end at their own times.
+pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let keys = match track % 16 {
+            0 => 1,
+            1 => 2,
+            2 => 3,
+            _ => 4 + (random.next() % 28) as usize,
+        };
+        let mut time = random.between(-1.0, 1.0);
+        let mut rotation = random.rotation();
+        let (mut times, mut quats) = (Vec::new(), Vec::new());
+        for _ in 0..keys {
+            times.push(time);
+            quats.push(hostile_key(&mut random, rotation));
+            time += match random.next() % 64 {
+                0..4 => 1.0 / 25.0,
+                4..8 => 1e-5,
+                8 => 100.0,
+                _ => random.between(0.05, 2.0),
+            };
+            let angle = random.pick(&[0.0, 1e-7, 1e-4, 0.03, 0.5, 1.0, 2.0, 3.0]);
+            let angle = angle * random.between(0.7, 1.04);
+            rotation = (rotation * DQuat::from_axis_angle(random.direction(), angle)).normalize();
+        }
+        set.push("", &times, &quats).expect("unit keys at increasing times");
+    }
+    set
+}
+
+fn hostile_key(random: &mut Random, rotation: DQuat) -> Quat {
+    let mut components = rotation.to_array();
+    match random.next() % 32 {
+        0 => components[0] = 1e-30,
+        1 => components = [0.0, 0.0, 0.0, 1.0],
+        2 => components = [1.0, 0.0, 0.0, 0.0],
+        3 => components = [1e-30, 0.0, 0.6, 0.8],
+        _ => {}
+    }
+    let key = DQuat::from_array(components).normalize();
+    let sign = if random.next().is_multiple_of(4) { -1.0 } else { 1.0 };
+    Quat::from_array(key.to_array().map(|c| (sign * c) as f32))
+}
+
+/// The first rotation whose bits differ.
+pub fn first_difference(a: &[Quat], b: &[Quat]) -> Option<usize> {
+    assert_eq!(a.len(), b.len());
+    let bits = |q: &Quat| q.to_array().map(f32::to_bits);
+    a.iter().zip(b).position(|(a, b)| bits(a) != bits(b))
+}
