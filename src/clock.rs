@@ -52,7 +52,9 @@ impl FrameRate {
 
     /// How many frames fit into `seconds`, not rounded to a whole number.
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
-        seconds * self.frames as f64 / self.seconds as f64
+        let frames = seconds * self.frames as f64;
+        // Most rates are whole, and a division takes longer than all else here.
+        if self.seconds == 1 { frames } else { frames / self.seconds as f64 }
     }
 
     /// The time of frame `frame`, seconds after frame 0.

@@ -57,7 +57,7 @@ impl Prepared {
     ) -> Result<(), FramesError> {
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let clock = FrameClock { rate: *rate, start: *start };
+                let clock = FrameClock::new(*rate, *start, part.end);
                 self.frame_runs(part, clock, samples, emit)
             }
             Ticks::Times { times, stride } => {
@@ -95,42 +95,46 @@ impl Prepared {
         mut emit: impl FnMut(Run),
     ) -> Result<(), FramesError> {
         let spans = &self.spans[part.spans.clone()];
-        let begin = clock.frame(spans.first().map_or(part.end, |span| span.start));
-        let end = clock.frame(part.end);
-        let mut emit = |covered: Range<usize>, source| {
-            if !covered.is_empty() {
-                emit(Run { sample: covered.start, count: covered.len(), source });
+        let begin = clock.boundary(spans.first().map_or(part.end, |span| span.start));
+        let end = clock.boundary(part.end);
+        let mut emit = |from: usize, to: usize, source| {
+            let (sample, to) = (from.max(samples.start), to.min(samples.end));
+            if sample < to {
+                emit(Run { sample, count: to - sample, source });
             }
         };
         if part.before != NONE {
-            let source = RunSource::Constant(part.before);
-            emit(frames_within(f64::NEG_INFINITY, begin, &samples), source);
+            emit(0, begin.first, RunSource::Constant(part.before));
         }
-        let first = samples.start as f64;
-        let skipped = spans.partition_point(|span| clock.frame(span.start) <= first);
-        for i in skipped.saturating_sub(1)..spans.len() {
-            let span = &spans[i];
-            let from = clock.frame(span.start);
-            if from >= samples.end as f64 {
+        // The span that holds the first sample; a time's own rounding may put it one
+        // further.
+        let first_time = clock.time(samples.start);
+        let skipped = spans.partition_point(|span| span.start <= first_time).saturating_sub(2);
+        let mut to = spans.get(skipped).map_or(end, |span| clock.boundary(span.start));
+        for (i, span) in spans.iter().enumerate().skip(skipped) {
+            let from = to;
+            to = spans.get(i + 1).map_or(end, |next| clock.boundary(next.start));
+            if from.first >= samples.end {
                 break;
             }
-            let to = spans.get(i + 1).map_or(end, |next| clock.frame(next.start));
-            let mut covered = frames_within(from, to, &samples);
-            if covered.is_empty() {
+            let mut first = from.first;
+            if first == to.first {
                 continue;
             }
-            if span.key != NONE && covered.start as f64 == from {
-                emit(covered.start..covered.start + 1, RunSource::Constant(span.key));
-                covered.start += 1;
+            if span.key != NONE && first as f64 == from.frame {
+                emit(first, first + 1, RunSource::Constant(span.key));
+                first += 1;
             }
-            let source = frame_source(span, from, to, covered.start, covered.end).ok_or(
-                FramesError::GapTooLong { track: part.track, key: i, frames: to - from },
-            )?;
-            emit(covered, source);
+            let (first, last) = (first.max(samples.start), to.first.min(samples.end));
+            if first < last {
+                let frames = to.frame - from.frame;
+                let source = frame_source(span, from.frame, to.frame, first, last)
+                    .ok_or(FramesError::GapTooLong { track: part.track, key: i, frames })?;
+                emit(first, last, source);
+            }
         }
         if part.after != NONE {
-            let source = RunSource::Constant(part.after);
-            emit(frames_within(end, f64::INFINITY, &samples), source);
+            emit(end.first, usize::MAX, RunSource::Constant(part.after));
         }
         Ok(())
     }
@@ -180,25 +184,46 @@ impl Prepared {
 struct FrameClock {
     rate: FrameRate,
     start: f64,
+    /// Frames by which the rounding of a key's time may move it.
+    rounding: f64,
+}
+
+/// Where one span ends and the next starts.
+#[derive(Clone, Copy)]
+struct Boundary {
+    /// Its frame coordinate.
+    frame: f64,
+    /// The first whole frame not before it, and not before 0.
+    first: usize,
 }
 
 impl FrameClock {
-    /// The frame coordinate of a time. A time within its own rounding of a whole
-    /// frame is that frame, so a sample on a key returns the key at hour 24 too.
-    fn frame(self, time: f64) -> f64 {
-        let frame = self.rate.frames_in(time - self.start);
-        let rounding = 4.0 * f64::EPSILON * self.rate.frames_in(time.abs().max(self.start.abs()));
-        let whole = libm::round(frame);
-        if (frame - whole).abs() <= rounding { whole } else { frame }
+    /// `latest`: the largest time that will be asked for.
+    fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
+        let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
+        Self { rate, start, rounding }
+    }
+
+    /// A time within its own rounding of a whole frame is that frame, so a sample on
+    /// a key returns the key at hour 24 too.
+    fn boundary(self, time: f64) -> Boundary {
+        let exact = self.rate.frames_in(time - self.start);
+        let whole = nearest_whole(exact);
+        let frame = if (exact - whole).abs() <= self.rounding { whole } else { exact };
+        let first = if whole < frame { whole + 1.0 } else { whole };
+        Boundary { frame, first: first as usize } // the cast saturates at 0
+    }
+
+    fn time(self, frame: usize) -> f64 {
+        self.start + self.rate.time_of(frame as u64)
     }
 }
 
-/// The samples that are frames in `from <= frame < to`.
-fn frames_within(from: f64, to: f64, samples: &Range<usize>) -> Range<usize> {
-    // Casts saturate, so infinities are the ends of the range.
-    let start = (libm::ceil(from) as usize).max(samples.start);
-    let end = (libm::ceil(to) as usize).min(samples.end);
-    start..end.max(start)
+/// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
+/// rounded away in the sum. A call to `round` costs more than all else here.
+fn nearest_whole(x: f64) -> f64 {
+    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+    (x + SHIFT) - SHIFT
 }
 
 /// The source of the frames `first` to `last` (not included) of a span that covers
@@ -213,7 +238,7 @@ fn frame_source(span: &Span, from: f64, to: f64, first: usize, last: usize) -> O
         }
         Source::Segment(index) => {
             let middle = (from + to) * 0.5;
-            let whole = libm::round(middle);
+            let whole = nearest_whole(middle);
             let scale = span.extent / (to - from);
             let count = |frame: usize| -> Option<i32> {
                 i32::try_from(frame as i64 - whole as i64).ok()

@@ -3,7 +3,7 @@
 //! subtraction and multiplication are used, never a fused one.
 #![allow(unsafe_code)]
 
-use super::evaluate::{Affine, Evaluate, distances, frames};
+use super::evaluate::{Affine, Evaluate, Scratch, distances, frames};
 use crate::segment::{ArcSegment, CumulativeSegment};
 
 /// Vector instructions that the twins can be compiled for.
@@ -44,8 +44,8 @@ impl VectorWidth {
     }
 }
 
-type FramesFn<S> = unsafe fn(&S, Affine, i32, usize, &mut [[f32; 4]]);
-type DistancesFn<S> = unsafe fn(&S, Affine, &[f32], &mut [[f32; 4]]);
+type FramesFn<S> = unsafe fn(&S, Affine, i32, usize, &mut Scratch, &mut [[f32; 4]]);
+type DistancesFn<S> = unsafe fn(&S, Affine, &[f32], &mut Scratch, &mut [[f32; 4]]);
 
 /// The evaluation of one form, compiled for one width.
 #[derive(Clone, Copy)]
@@ -62,11 +62,12 @@ impl<S> Kernel<S> {
         affine: Affine,
         first: i32,
         count: usize,
+        scratch: &mut Scratch,
         output: &mut [[f32; 4]],
     ) {
         // SAFETY: a kernel exists only for a width that the processor has
         // (`Kernels::new`); otherwise these are safe functions.
-        unsafe { (self.frames)(segment, affine, first, count, output) }
+        unsafe { (self.frames)(segment, affine, first, count, scratch, output) }
     }
 
     /// See [`distances`].
@@ -75,10 +76,11 @@ impl<S> Kernel<S> {
         segment: &S,
         affine: Affine,
         from_middle: &[f32],
+        scratch: &mut Scratch,
         output: &mut [[f32; 4]],
     ) {
         // SAFETY: as above.
-        unsafe { (self.distances)(segment, affine, from_middle, output) }
+        unsafe { (self.distances)(segment, affine, from_middle, scratch, output) }
     }
 }
 
@@ -113,7 +115,7 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 macro_rules! compiled_for {
     ($width:ident, $features:literal) => {
         mod $width {
-            use super::{Affine, Evaluate, Kernel};
+            use super::{Affine, Evaluate, Kernel, Scratch};
 
             #[target_feature(enable = $features)]
             fn frames<S: Evaluate>(
@@ -121,9 +123,10 @@ macro_rules! compiled_for {
                 affine: Affine,
                 first: i32,
                 count: usize,
+                scratch: &mut Scratch,
                 output: &mut [[f32; 4]],
             ) {
-                super::frames(segment, affine, first, count, output);
+                super::frames(segment, affine, first, count, scratch, output);
             }
 
             #[target_feature(enable = $features)]
@@ -131,9 +134,10 @@ macro_rules! compiled_for {
                 segment: &S,
                 affine: Affine,
                 from_middle: &[f32],
+                scratch: &mut Scratch,
                 output: &mut [[f32; 4]],
             ) {
-                super::distances(segment, affine, from_middle, output);
+                super::distances(segment, affine, from_middle, scratch, output);
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {

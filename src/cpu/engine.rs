@@ -4,7 +4,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernel, Kernels, VectorWidth};
-use super::evaluate::{Affine, Evaluate};
+use super::evaluate::{Affine, Evaluate, Scratch};
 use crate::clip::{ClipData, PartRef};
 use crate::clock::{FramesError, Timeline};
 use crate::numeric::round_f32;
@@ -108,6 +108,7 @@ impl CpuEngine {
         first: usize,
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
+        let mut scratch = Scratch::new();
         for PartRef { prepared, part } in clip.parts_of(track) {
             prepared.runs(part, timeline, first..first + row.len(), |run| {
                 let output = &mut row[run.sample - first..];
@@ -127,10 +128,10 @@ impl CpuEngine {
                         let place = Place { timeline, track, run: &run, distance };
                         match &prepared.segments {
                             Segments::Arc(all) => {
-                                place.evaluate(&self.kernels.arc, &all[i], affine, output);
+                                place.evaluate(&self.kernels.arc, &all[i], affine, &mut scratch, output);
                             }
                             Segments::Cumulative(all) => {
-                                place.evaluate(&self.kernels.cumulative, &all[i], affine, output);
+                                place.evaluate(&self.kernels.cumulative, &all[i], affine, &mut scratch, output);
                             }
                         }
                     }
@@ -155,17 +156,18 @@ impl Place<'_> {
         kernel: &Kernel<S>,
         segment: &S,
         affine: Affine,
+        scratch: &mut Scratch,
         output: &mut [[f32; 4]],
     ) {
         match self.distance {
             Distance::Frames { first } => {
-                kernel.frames(segment, affine, first, self.run.count, output);
+                kernel.frames(segment, affine, first, self.run.count, scratch, output);
             }
             Distance::Seconds { middle } => {
                 let distances: Vec<f32> = (self.run.sample..self.run.sample + self.run.count)
                     .map(|sample| round_f32(self.timeline.time(self.track, sample) - middle))
                     .collect();
-                kernel.distances(segment, affine, &distances, output);
+                kernel.distances(segment, affine, &distances, scratch, output);
             }
         }
     }
