@@ -159,7 +159,7 @@ impl VulkanEngine {
 
     /// Runs every canary.
     pub(crate) fn canaries(&self) -> Result<Vec<super::CanaryReport>, VulkanError> {
-        super::canary::run(self, Exactness::Demanded)
+        super::canary::run(self)
     }
 
     /// What the validation layer has said so far.

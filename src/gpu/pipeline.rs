@@ -132,6 +132,7 @@ pub(super) enum Exactness {
     /// Decorations and float controls: what every evaluation uses.
     Demanded,
     /// Neither: what the negative control uses, to prove that they matter.
+    #[cfg_attr(not(test), expect(dead_code))]
     LeftToTheDriver,
 }
 

@@ -1,5 +1,5 @@
 //! What several test files need: devices, hostile keys, a small generator.
-#![allow(dead_code)] // each test file uses some of it
+#![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Device, TrackSet};

@@ -1,0 +1,220 @@
+//! The exactness pass, on its own and under the SPIR-V validator.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+use naga::back::spv;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use proptest::prelude::*;
+use tumble::spirv::{
+    FloatControls, SpirvError, float_controls, no_contraction, without_decorations,
+};
+
+macro_rules! shader {
+    ($name:literal) => {
+        ($name, include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) as &[u8])
+    };
+}
+
+const SHADERS: [(&str, &[u8]); 5] = [
+    shader!("arc_frames"),
+    shader!("arc_times"),
+    shader!("cumulative_frames"),
+    shader!("cumulative_times"),
+    shader!("canary"),
+];
+
+const ALL_CONTROLS: FloatControls =
+    FloatControls { preserve_signed_zero_inf_nan: true, round_to_nearest_even: true };
+
+fn words(bytes: &[u8]) -> Vec<u32> {
+    bytes.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect()
+}
+
+/// (opcode, operands) of every instruction, read without the pass's own reader.
+fn instructions(module: &[u32]) -> Vec<(u16, Vec<u32>)> {
+    let mut rest = &module[5..];
+    let mut found = Vec::new();
+    while let Some(&first) = rest.first() {
+        let (head, tail) = rest.split_at((first >> 16) as usize);
+        found.push((first as u16, head[1..].to_vec()));
+        rest = tail;
+    }
+    found
+}
+
+fn compile(wgsl: &str) -> Vec<u32> {
+    let module = naga::front::wgsl::parse_str(wgsl).expect(wgsl);
+    let info =
+        Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module).unwrap();
+    let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
+    spv::write_vec(&module, &info, &options, None).unwrap()
+}
+
+fn kernel_of(expression: &str) -> Vec<u32> {
+    compile(&format!(
+        "@group(0) @binding(0) var<storage, read_write> values: array<f32>;
+         @compute @workgroup_size(1) fn main() {{
+             let a = values[0]; let b = values[1];
+             values[2] = {expression};
+         }}"
+    ))
+}
+
+#[test]
+fn every_float_operation_of_every_shader_is_decorated_once() {
+    const FLOAT_ARITHMETIC: [u16; 5] = [127, 129, 131, 133, 142];
+    for (name, code) in SHADERS {
+        let mut decorations = BTreeMap::<u32, u32>::new();
+        let mut results = 0;
+        let code = instructions(&words(code));
+        for (opcode, operands) in &code {
+            if *opcode == 71 && operands[1..] == [42] {
+                *decorations.entry(operands[0]).or_default() += 1;
+            }
+        }
+        for (opcode, operands) in &code {
+            if FLOAT_ARITHMETIC.contains(opcode) {
+                assert_eq!(decorations.get(&operands[1]), Some(&1), "{name}: %{}", operands[1]);
+                results += 1;
+            }
+        }
+        assert!(results > 10, "{name} has only {results} float operations");
+        assert_eq!(results, decorations.len(), "{name}: something else is decorated");
+    }
+}
+
+#[test]
+fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
+    for (name, code) in SHADERS {
+        let passed = words(code);
+        assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
+        let bare = without_decorations(&passed).unwrap();
+        assert!(bare.len() < passed.len());
+        assert_eq!(no_contraction(&bare).unwrap(), passed, "{name}");
+    }
+}
+
+#[test]
+fn inexact_operations_are_refused() {
+    let sum = kernel_of("a * b + a");
+    assert!(no_contraction(&sum).is_ok());
+    for expression in [
+        "a / b",
+        "a % b",
+        "sin(a)",
+        "sqrt(a)",
+        "fma(a, b, a)",
+        "min(a, b)",
+        "mix(a, b, 0.5)",
+        "dot(vec2f(a, b), vec2f(b, a))",
+        "length(vec2f(a, b))",
+        "f32(i32(a))",
+    ] {
+        let error = no_contraction(&kernel_of(expression)).unwrap_err();
+        assert!(matches!(error, SpirvError::Inexact { .. }), "{expression}: {error}");
+    }
+}
+
+/// With every combination of controls that a device may report.
+#[test]
+fn the_validator_accepts_every_shader() {
+    let environments = ["vulkan1.1", "vulkan1.2"];
+    for (name, code) in SHADERS {
+        for controls in 0..4 {
+            let offered = FloatControls {
+                preserve_signed_zero_inf_nan: controls & 1 != 0,
+                round_to_nearest_even: controls & 2 != 0,
+            };
+            let module = float_controls(&words(code), offered).unwrap();
+            for environment in environments {
+                validate(name, environment, &module);
+            }
+        }
+    }
+}
+
+fn validate(name: &str, environment: &str, module: &[u32]) {
+    let spawned = Command::new("spirv-val")
+        .args(["--target-env", environment, "-"])
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut validator = match spawned {
+        Ok(validator) => validator,
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "spirv-val (Debian: spirv-tools): {error}");
+            eprintln!("spirv-val is not installed: nothing was validated");
+            return;
+        }
+    };
+    let bytes: Vec<u8> = module.iter().flat_map(|word| word.to_le_bytes()).collect();
+    validator.stdin.take().unwrap().write_all(&bytes).unwrap();
+    let output = validator.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name} for {environment}: {message}");
+}
+
+#[test]
+fn controls_reach_every_entry_point() {
+    for (name, code) in SHADERS {
+        let module = float_controls(&words(code), ALL_CONTROLS).unwrap();
+        let modes: Vec<_> = instructions(&module)
+            .into_iter()
+            .filter(|(opcode, operands)| *opcode == 16 && operands.len() == 3)
+            .map(|(_, operands)| operands[1..].to_vec())
+            .collect();
+        assert!(modes.contains(&vec![4461, 32]) && modes.contains(&vec![4462, 32]), "{name}");
+        let none = FloatControls::default();
+        assert_eq!(float_controls(&words(code), none).unwrap(), words(code));
+    }
+}
+
+#[test]
+fn what_is_no_module_is_refused() {
+    assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv));
+    assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv));
+    let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
+    assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete));
+    assert_eq!(float_controls(&header, ALL_CONTROLS), Err(SpirvError::Incomplete));
+    let cut = [&header[..], &[9 << 16 | 17]].concat();
+    assert_eq!(no_contraction(&cut), Err(SpirvError::Truncated { word: 5 }));
+    let double = [&header[..], &[3 << 16 | 22, 1, 64]].concat();
+    assert_eq!(no_contraction(&double), Err(SpirvError::FloatWidth { bits: 64 }));
+}
+
+proptest! {
+    /// A driver's crash or ours must not follow from a damaged file.
+    #[test]
+    fn arbitrary_words_never_panic(
+        mut module in prop::collection::vec(any::<u32>(), 0..64),
+        short in any::<bool>(),
+        headed in any::<bool>(),
+    ) {
+        if short {
+            // Opcodes that the pass knows, with small lengths.
+            for word in &mut module {
+                *word = (*word >> 29) << 16 | (*word & 0x1ff);
+            }
+        }
+        if headed && module.len() > 5 {
+            module[0] = 0x0723_0203;
+        }
+        let _ = no_contraction(&module);
+        let _ = float_controls(&module, ALL_CONTROLS);
+        let _ = without_decorations(&module);
+    }
+
+    /// A damaged shader is refused or stays a list of whole instructions.
+    #[test]
+    fn damaged_shaders_never_panic(place in 0usize..2000, value in any::<u32>()) {
+        for (_, code) in SHADERS {
+            let mut module = words(code);
+            let place = place % module.len();
+            module[place] = value;
+            let _ = no_contraction(&module);
+            let _ = float_controls(&module, ALL_CONTROLS);
+        }
+    }
+}
