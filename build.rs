@@ -17,10 +17,42 @@ mod spirv;
 
 /// Every pipeline: its name, and the files that are joined into it.
 const PIPELINES: [(&str, &[&str]); 5] = [
-    ("arc_frames", &["kernel", "distance_in_frames", "sine_cosine", "evaluate_arc"]),
-    ("arc_times", &["kernel", "distance_in_seconds", "sine_cosine", "evaluate_arc"]),
-    ("cumulative_frames", &["kernel", "distance_in_frames", "sine_cosine", "evaluate_cumulative"]),
-    ("cumulative_times", &["kernel", "distance_in_seconds", "sine_cosine", "evaluate_cumulative"]),
+    (
+        "arc_frames",
+        &[
+            "kernel",
+            "distance_in_frames",
+            "sine_cosine",
+            "evaluate_arc",
+        ],
+    ),
+    (
+        "arc_times",
+        &[
+            "kernel",
+            "distance_in_seconds",
+            "sine_cosine",
+            "evaluate_arc",
+        ],
+    ),
+    (
+        "cumulative_frames",
+        &[
+            "kernel",
+            "distance_in_frames",
+            "sine_cosine",
+            "evaluate_cumulative",
+        ],
+    ),
+    (
+        "cumulative_times",
+        &[
+            "kernel",
+            "distance_in_seconds",
+            "sine_cosine",
+            "evaluate_cumulative",
+        ],
+    ),
     ("canary", &["sine_cosine", "canary"]),
 ];
 
@@ -95,7 +127,11 @@ fn collect_layouts(pipeline: &str, module: &naga::Module, layouts: &mut BTreeMap
         let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) else {
             continue;
         };
-        let form = pipeline.split('_').next().unwrap_or_default().to_uppercase();
+        let form = pipeline
+            .split('_')
+            .next()
+            .unwrap_or_default()
+            .to_uppercase();
         let name = match name.as_str() {
             "Segment" => format!("{form}_SEGMENT"),
             other => other.to_uppercase(),

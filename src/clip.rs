@@ -45,7 +45,13 @@ impl ClipData {
             }
         }
         tracks.push(parts.len());
-        Ok(Self { interpolation, groups, parts, tracks, span: set.time_span() })
+        Ok(Self {
+            interpolation,
+            groups,
+            parts,
+            tracks,
+            span: set.time_span(),
+        })
     }
 
     pub(crate) fn track_count(&self) -> usize {
@@ -58,16 +64,25 @@ impl ClipData {
 
     /// The parts of one track in order of time.
     pub(crate) fn parts_of(&self, track: usize) -> impl Iterator<Item = PartRef<'_>> {
-        self.parts[self.tracks[track]..self.tracks[track + 1]].iter().map(|&(group, part)| {
-            let prepared = &self.groups[group as usize];
-            PartRef { prepared, part: &prepared.parts[part as usize] }
-        })
+        self.parts[self.tracks[track]..self.tracks[track + 1]]
+            .iter()
+            .map(|&(group, part)| {
+                let prepared = &self.groups[group as usize];
+                PartRef {
+                    prepared,
+                    part: &prepared.parts[part as usize],
+                }
+            })
     }
 }
 
 fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
     let bytes = |group: &Prepared| {
-        group.segments.as_bytes().len().max(size_of_val(group.constants.as_slice()))
+        group
+            .segments
+            .as_bytes()
+            .len()
+            .max(size_of_val(group.constants.as_slice()))
     };
     let mut merged: Vec<Prepared> = Vec::new();
     for group in groups {

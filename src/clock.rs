@@ -38,9 +38,14 @@ impl FrameRate {
     pub fn new(frames: u64, seconds: u64) -> Result<Self, FramesError> {
         let exact = 1..=1u64 << f64::MANTISSA_DIGITS;
         let divisor = gcd(frames, seconds).max(1);
-        let rate = Self { frames: frames / divisor, seconds: seconds / divisor };
+        let rate = Self {
+            frames: frames / divisor,
+            seconds: seconds / divisor,
+        };
         if !exact.contains(&rate.frames) || !exact.contains(&rate.seconds) {
-            return Err(FramesError::Rate { given: format!("{frames}/{seconds}") });
+            return Err(FramesError::Rate {
+                given: format!("{frames}/{seconds}"),
+            });
         }
         Ok(rate)
     }
@@ -54,7 +59,11 @@ impl FrameRate {
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
         let frames = seconds * self.frames as f64;
         // Most rates are whole, and a division takes longer than all else here.
-        if self.seconds == 1 { frames } else { frames / self.seconds as f64 }
+        if self.seconds == 1 {
+            frames
+        } else {
+            frames / self.seconds as f64
+        }
     }
 
     /// The time of frame `frame`, seconds after frame 0.
@@ -83,11 +92,14 @@ impl FromStr for FrameRate {
 
     /// `25`, `12.5`, `1e-3` or `30000/1001`; decimals are taken exactly.
     fn from_str(text: &str) -> Result<Self, FramesError> {
-        let refuse = || FramesError::Rate { given: text.to_owned() };
+        let refuse = || FramesError::Rate {
+            given: text.to_owned(),
+        };
         let (frames, seconds) = match text.split_once('/') {
-            Some((frames, seconds)) => {
-                (frames.parse().map_err(|_| refuse())?, seconds.parse().map_err(|_| refuse())?)
-            }
+            Some((frames, seconds)) => (
+                frames.parse().map_err(|_| refuse())?,
+                seconds.parse().map_err(|_| refuse())?,
+            ),
             None => decimal_ratio(text).ok_or_else(refuse)?,
         };
         Self::new(frames, seconds).map_err(|_| refuse())
@@ -108,7 +120,11 @@ fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
     let places = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
     let power = 10u64.checked_pow(places.unsigned_abs())?;
     let digits: u64 = digits.parse().ok()?;
-    if places < 0 { Some((digits, power)) } else { Some((digits.checked_mul(power)?, 1)) }
+    if places < 0 {
+        Some((digits, power))
+    } else {
+        Some((digits.checked_mul(power)?, 1))
+    }
 }
 
 /// Which samples of every track to evaluate: frames at a rate, or explicit times.
@@ -128,7 +144,11 @@ pub struct Frames {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Request {
-    Rate { rate: FrameRate, start: Option<f64>, end: Option<f64> },
+    Rate {
+        rate: FrameRate,
+        start: Option<f64>,
+        end: Option<f64>,
+    },
     Shared(Vec<f64>),
     PerTrack(Vec<f64>),
 }
@@ -138,7 +158,9 @@ enum Request {
 #[non_exhaustive]
 pub enum FramesError {
     /// No frame rate.
-    #[error("`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001")]
+    #[error(
+        "`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
+    )]
     Rate {
         /// What was given.
         given: String,
@@ -204,7 +226,13 @@ impl Frames {
     /// Frames at an exact rate, from the set's first key to its last: frame `k` at
     /// `start + k / rate`, for every `k` with a time not past the end.
     pub fn rate(rate: FrameRate) -> Self {
-        Self { request: Request::Rate { rate, start: None, end: None } }
+        Self {
+            request: Request::Rate {
+                rate,
+                start: None,
+                end: None,
+            },
+        }
     }
 
     /// The same rate from `start` to `end`, seconds; no effect on explicit times.
@@ -218,12 +246,16 @@ impl Frames {
 
     /// Explicit times, seconds, the same for every track, in any order.
     pub fn at(times: Vec<f64>) -> Self {
-        Self { request: Request::Shared(times) }
+        Self {
+            request: Request::Shared(times),
+        }
     }
 
     /// Explicit times of each track's own, one track after another.
     pub fn at_each(times: Vec<f64>) -> Self {
-        Self { request: Request::PerTrack(times) }
+        Self {
+            request: Request::PerTrack(times),
+        }
     }
 
     /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
@@ -236,7 +268,10 @@ impl Frames {
         span: Option<(f64, f64)>,
     ) -> Result<Timeline, FramesError> {
         let finite = |times: &[f64]| match times.iter().position(|time| !time.is_finite()) {
-            Some(index) => Err(FramesError::TimeNotFinite { index, time: times[index] }),
+            Some(index) => Err(FramesError::TimeNotFinite {
+                index,
+                time: times[index],
+            }),
             None => Ok(()),
         };
         let (first, last) = span.unwrap_or((0.0, 0.0));
@@ -254,15 +289,30 @@ impl Frames {
             Request::Shared(times) => {
                 finite(times)?;
                 check_size(tracks, times.len() as f64)?;
-                (Ticks::Times { times: times.clone(), stride: 0 }, times.len())
+                (
+                    Ticks::Times {
+                        times: times.clone(),
+                        stride: 0,
+                    },
+                    times.len(),
+                )
             }
             Request::PerTrack(times) => {
                 finite(times)?;
                 if tracks == 0 || !times.len().is_multiple_of(tracks) {
-                    return Err(FramesError::Uneven { times: times.len(), tracks });
+                    return Err(FramesError::Uneven {
+                        times: times.len(),
+                        tracks,
+                    });
                 }
                 let stride = times.len() / tracks;
-                (Ticks::Times { times: times.clone(), stride }, stride)
+                (
+                    Ticks::Times {
+                        times: times.clone(),
+                        stride,
+                    },
+                    stride,
+                )
             }
         };
         Ok(Timeline { ticks, count })
@@ -272,7 +322,11 @@ impl Frames {
 fn check_size(tracks: usize, frames: f64) -> Result<(), FramesError> {
     let bytes = tracks as f64 * frames * size_of::<glam::Quat>() as f64;
     if frames > MAX_FRAMES as f64 || bytes > isize::MAX as f64 {
-        return Err(FramesError::TooMany { tracks, frames, bytes });
+        return Err(FramesError::TooMany {
+            tracks,
+            frames,
+            bytes,
+        });
     }
     Ok(())
 }
@@ -344,7 +398,9 @@ mod tests {
         ] {
             assert_eq!(text.parse(), FrameRate::new(frames, seconds), "{text}");
         }
-        for text in ["0", "-1", "nan", "inf", "30fps", "", "1/0", "0/5", "1e99", ".", "1 0", "+-5"] {
+        for text in [
+            "0", "-1", "nan", "inf", "30fps", "", "1/0", "0/5", "1e99", ".", "1 0", "+-5",
+        ] {
             assert!(text.parse::<FrameRate>().is_err(), "{text}");
         }
     }
@@ -363,12 +419,32 @@ mod tests {
     fn impossible_requests_are_refused_before_any_work() {
         let span = Some((0.0, 1e9));
         let error = Frames::fps(1_000_000).resolve(4, span).unwrap_err();
-        assert!(matches!(error, FramesError::TooMany { tracks: 4, .. }), "{error}");
-        let reversed = Frames::fps(1).between(2.0, 1.0).resolve(1, span).unwrap_err();
-        assert_eq!(reversed, FramesError::ReversedRange { start: 2.0, end: 1.0 });
-        let nan = Frames::at(vec![0.0, f64::NAN]).resolve(1, span).unwrap_err();
+        assert!(
+            matches!(error, FramesError::TooMany { tracks: 4, .. }),
+            "{error}"
+        );
+        let reversed = Frames::fps(1)
+            .between(2.0, 1.0)
+            .resolve(1, span)
+            .unwrap_err();
+        assert_eq!(
+            reversed,
+            FramesError::ReversedRange {
+                start: 2.0,
+                end: 1.0
+            }
+        );
+        let nan = Frames::at(vec![0.0, f64::NAN])
+            .resolve(1, span)
+            .unwrap_err();
         assert!(matches!(nan, FramesError::TimeNotFinite { index: 1, .. }));
         let uneven = Frames::at_each(vec![0.0; 3]).resolve(2, span).unwrap_err();
-        assert_eq!(uneven, FramesError::Uneven { times: 3, tracks: 2 });
+        assert_eq!(
+            uneven,
+            FramesError::Uneven {
+                times: 3,
+                tracks: 2
+            }
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! The engine: sets go in, clips stay on its device, rotations come out.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Quat;
@@ -28,7 +29,7 @@ pub enum Device {
 /// A Vulkan device, not yet opened.
 #[derive(Clone)]
 pub struct VulkanDevice {
-    physical: PhysicalDevice,
+    physical: Box<PhysicalDevice>,
 }
 
 impl VulkanDevice {
@@ -55,12 +56,22 @@ impl Device {
     /// Also when the layer is not installed.
     pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
         let devices = gpu::list(validation)?;
-        Ok(devices.into_iter().map(|physical| Self::Vulkan(VulkanDevice { physical })).collect())
+        Ok(devices
+            .into_iter()
+            .map(|physical| {
+                Self::Vulkan(VulkanDevice {
+                    physical: Box::new(physical),
+                })
+            })
+            .collect())
     }
 
     /// The first Vulkan device, else the CPU.
     pub fn auto() -> Self {
-        Self::list().ok().and_then(|devices| devices.into_iter().next()).unwrap_or(Self::Cpu)
+        Self::list()
+            .ok()
+            .and_then(|devices| devices.into_iter().next())
+            .unwrap_or(Self::Cpu)
     }
 
     /// Its name: the driver's, or `CPU`.
@@ -169,9 +180,16 @@ pub struct Engine {
     backend: Arc<Backend>,
 }
 
+/// An open Vulkan device, and what is known of it.
+struct Opened {
+    engine: VulkanEngine,
+    canaries: Vec<CanaryReport>,
+    info: DeviceInfo,
+}
+
 enum Backend {
     Cpu(CpuEngine),
-    Vulkan { engine: VulkanEngine, canaries: Vec<CanaryReport>, info: Box<DeviceInfo> },
+    Vulkan(Box<Opened>),
 }
 
 impl Engine {
@@ -192,13 +210,17 @@ impl Engine {
         match device {
             Device::Cpu => {
                 let width = options.vector_width.unwrap_or(VectorWidth::Avx512);
-                let engine = CpuEngine::new(width, options.threads)
-                    .map_err(|error| Error::Threads { reason: error.to_string() })?;
-                Ok(Self { backend: Arc::new(Backend::Cpu(engine)) })
+                let engine =
+                    CpuEngine::new(width, options.threads).map_err(|error| Error::Threads {
+                        reason: error.to_string(),
+                    })?;
+                Ok(Self {
+                    backend: Arc::new(Backend::Cpu(engine)),
+                })
             }
             Device::Vulkan(VulkanDevice { physical }) => {
                 let info = physical.info.clone();
-                Self::trusted(VulkanEngine::new(physical, options)?, info, options)
+                Self::trusted(VulkanEngine::new(*physical, options)?, info, options)
             }
         }
     }
@@ -238,8 +260,14 @@ impl Engine {
                 total: canary.total,
             }));
         }
-        let backend = Backend::Vulkan { engine, canaries, info: Box::new(info) };
-        Ok(Self { backend: Arc::new(backend) })
+        let backend = Backend::Vulkan(Box::new(Opened {
+            engine,
+            canaries,
+            info,
+        }));
+        Ok(Self {
+            backend: Arc::new(backend),
+        })
     }
 
     /// The name of its device: the driver's, or `CPU`.
@@ -251,7 +279,7 @@ impl Engine {
     pub fn device_info(&self) -> Option<&DeviceInfo> {
         match &*self.backend {
             Backend::Cpu(_) => None,
-            Backend::Vulkan { info, .. } => Some(info),
+            Backend::Vulkan(opened) => Some(&opened.info),
         }
     }
 
@@ -260,7 +288,7 @@ impl Engine {
     pub fn canaries(&self) -> &[CanaryReport] {
         match &*self.backend {
             Backend::Cpu(_) => &[],
-            Backend::Vulkan { canaries, .. } => canaries,
+            Backend::Vulkan(opened) => &opened.canaries,
         }
     }
 
@@ -268,7 +296,7 @@ impl Engine {
     pub fn validation_messages(&self) -> Vec<String> {
         match &*self.backend {
             Backend::Cpu(_) => Vec::new(),
-            Backend::Vulkan { engine, .. } => engine.validation_messages(),
+            Backend::Vulkan(opened) => opened.engine.validation_messages(),
         }
     }
 
@@ -285,13 +313,18 @@ impl Engine {
         let interpolation = interpolation.into();
         let (data, buffers) = match &*self.backend {
             Backend::Cpu(_) => (ClipData::new(set, interpolation, None)?, None),
-            Backend::Vulkan { engine, .. } => {
-                let data = ClipData::new(set, interpolation, Some(engine.group_bytes()))?;
-                let buffers = engine.upload(&data)?;
+            Backend::Vulkan(opened) => {
+                let group_bytes = opened.engine.group_bytes();
+                let data = ClipData::new(set, interpolation, Some(group_bytes))?;
+                let buffers = opened.engine.upload(&data)?;
                 (data, Some(buffers))
             }
         };
-        Ok(Clip { engine: self.clone(), data, buffers })
+        Ok(Clip {
+            engine: self.clone(),
+            data,
+            buffers,
+        })
     }
 
     /// Prepares and evaluates in one go, `[track][frame]`. On a Vulkan device a set
@@ -351,22 +384,18 @@ impl Engine {
     }
 
     /// Ranges of tracks whose segments fit the device's budget.
-    fn pieces(
-        &self,
-        set: &TrackSet,
-        interpolation: &Interpolation,
-    ) -> Vec<std::ops::Range<usize>> {
-        let limit = match &*self.backend {
-            Backend::Vulkan { engine, .. } => engine.clip_bytes(),
+    fn pieces(&self, set: &TrackSet, interpolation: &Interpolation) -> Vec<Range<usize>> {
+        let budget = match &*self.backend {
+            Backend::Vulkan(opened) => opened.engine.clip_bytes(),
             Backend::Cpu(_) => None,
         };
-        let Some(limit) = limit else { return vec![0..set.track_count()] };
+        let limit = budget.unwrap_or(usize::MAX);
         let key_bytes = segment_size(interpolation.method.form) + size_of::<Quat>();
         let mut pieces = Vec::new();
-        let (mut start, mut bytes) = (0, 0);
+        let (mut start, mut bytes) = (0, 0usize);
         for (index, track) in set.tracks().enumerate() {
             let own = track.keys.len() * key_bytes;
-            if bytes + own > limit && index > start {
+            if bytes.saturating_add(own) > limit && index > start {
                 pieces.push(start..index);
                 (start, bytes) = (index, 0);
             }
@@ -379,7 +408,9 @@ impl Engine {
 
 impl std::fmt::Debug for Engine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Engine").field("device", &self.device_name()).finish_non_exhaustive()
+        f.debug_struct("Engine")
+            .field("device", &self.device_name())
+            .finish_non_exhaustive()
     }
 }
 
@@ -421,17 +452,17 @@ impl Clip {
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
         let timeline = self.timeline(frames)?;
         let (tracks, samples) = (self.data.track_count(), timeline.len());
-        let storage: Box<dyn crate::rotations::Storage> = match (&*self.engine.backend, &self.buffers)
-        {
-            (Backend::Vulkan { engine, .. }, Some(buffers)) => {
-                engine.evaluate(&self.data, buffers, &timeline, layout)?
-            }
-            _ => {
-                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
-                self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
-                Box::new(quats)
-            }
-        };
+        let storage: Box<dyn crate::rotations::Storage> =
+            match (&*self.engine.backend, &self.buffers) {
+                (Backend::Vulkan(opened), Some(buffers)) => opened
+                    .engine
+                    .evaluate(&self.data, buffers, &timeline, layout)?,
+                _ => {
+                    let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+                    self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
+                    Box::new(quats)
+                }
+            };
         Ok(Rotations::new(storage, tracks, samples, layout))
     }
 
@@ -457,16 +488,17 @@ impl Clip {
     ) -> Result<(), Error> {
         let needed = self.data.track_count() * timeline.len();
         if output.len() != needed {
-            return Err(Error::OutputLength { given: output.len(), needed });
+            return Err(Error::OutputLength {
+                given: output.len(),
+                needed,
+            });
         }
         match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => {
-                Ok(engine.evaluate(&self.data, timeline, layout, output)?)
-            }
-            (Backend::Vulkan { engine, .. }, Some(buffers)) => {
-                Ok(engine.evaluate_into(&self.data, buffers, timeline, layout, output)?)
-            }
-            (Backend::Vulkan { .. }, None) => unreachable!("uploaded to this engine"),
+            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, layout, output)?),
+            (Backend::Vulkan(opened), Some(buffers)) => Ok(opened
+                .engine
+                .evaluate_into(&self.data, buffers, timeline, layout, output)?),
+            (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
         }
     }
 }

@@ -1,5 +1,48 @@
-//! Bulk interpolation of rotations with the same bits on every Vulkan driver and
+//! Bulk interpolation of rotations, with the same bits on every Vulkan driver and
 //! the CPU.
+//!
+//! Keyframe tracks go in, the rotation of every track at every frame comes out:
+//!
+//! ```
+//! use tumble::{Device, Engine, Frames, TrackSet, method};
+//! use glam::Quat;
+//!
+//! // 1. What was loaded: tracks of unit quaternions with key times in seconds.
+//! let mut set = TrackSet::new();
+//! let keys = [0.0, 0.7, 2.0, 1.1].map(Quat::from_rotation_z);
+//! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;
+//!
+//! // 2. Where to evaluate: the fastest Vulkan device, else the CPU.
+//! let engine = Engine::new(Device::auto())?;
+//!
+//! // 3. A clip stays on the device; evaluate it as often as needed.
+//! let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
+//! let rotations = clip.evaluate(&Frames::fps(60))?;
+//! assert_eq!(rotations.get(0, 30), Some(keys[1]));
+//!
+//! // 4. Another device gives the same bits.
+//! let on_cpu = Engine::new(Device::Cpu)?.evaluate(&set, method::BESSEL_OVERHAUSER, &Frames::fps(60))?;
+//! assert_eq!(on_cpu.as_quats(), rotations.as_quats());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # The path of the data
+//!
+//! A [`TrackSet`] holds what was loaded. [`Frames`] says which samples to evaluate,
+//! at an exact [`FrameRate`] or at any times. A [`Method`] says how the rotation
+//! between keys follows from the keys. An [`Engine`] is one device; it prepares a
+//! set into a [`Clip`] and evaluates it into [`Rotations`]. [`reference`] is the
+//! textbook in f64, which shares nothing with the engine.
+//!
+//! # What is promised
+//!
+//! * **Identical bits** from the CPU, at any vector width and number of threads, and
+//!   from every Vulkan device that passes its canaries, at any memory budget.
+//! * **Accuracy that does not decay**: at hour 24 as in the first second; slerp
+//!   within 6e-7 rad of the f64 reference, cubic methods within 2e-6 rad.
+//! * **Keys are met exactly**: a sample on a key returns the key's own bits (for
+//!   methods that pass through their keys).
+
 mod clip;
 mod clock;
 mod cpu;

@@ -159,9 +159,16 @@ impl Prepared {
         // A curve that does not pass through its keys has end values of its own.
         let interpolates = interpolation.method.interpolates;
         if interpolates || all.is_empty() {
-            self.constants.extend((intervals.start..=intervals.end).map(stored));
+            self.constants
+                .extend((intervals.start..=intervals.end).map(stored));
         }
-        let key = |i: usize| if interpolates { first_key + (i - intervals.start) as u32 } else { NONE };
+        let key = |i: usize| {
+            if interpolates {
+                first_key + (i - intervals.start) as u32
+            } else {
+                NONE
+            }
+        };
 
         let (mut first, mut last) = (None, None);
         let mut i = intervals.start;
@@ -177,7 +184,11 @@ impl Prepared {
                 Curve::Arc { from, to } => self.push_arc(times.start, from, to, key(i)),
                 Curve::Cumulative(cubic) => self.push_cubic(times, &cubic, key(i)),
                 Curve::Hold => {
-                    let constant = if interpolates { key(i) } else { self.constant(stored(i)) };
+                    let constant = if interpolates {
+                        key(i)
+                    } else {
+                        self.constant(stored(i))
+                    };
                     self.push_span(times.start, 0.0, Source::Constant(constant), NONE);
                 }
             }
@@ -188,11 +199,21 @@ impl Prepared {
         }
 
         let (before, after) = match (interpolates || all.is_empty(), first, last) {
-            (true, ..) => (first_key, first_key + (intervals.end - intervals.start) as u32),
+            (true, ..) => (
+                first_key,
+                first_key + (intervals.end - intervals.start) as u32,
+            ),
             (false, Some(first), Some(last)) => {
                 let frozen = matches!(keys.ends, crate::Ends::Frozen);
-                let last = if frozen { keys.rotations[intervals.end] } else { last };
-                (self.constant(round_quat(first)), self.constant(round_quat(last)))
+                let last = if frozen {
+                    keys.rotations[intervals.end]
+                } else {
+                    last
+                };
+                (
+                    self.constant(round_quat(first)),
+                    self.constant(round_quat(last)),
+                )
             }
             _ => (NONE, NONE),
         };
@@ -200,8 +221,16 @@ impl Prepared {
             track: index,
             spans: first_span..self.spans.len(),
             end: track.times[intervals.end],
-            before: if intervals.start == all.start { before } else { NONE },
-            after: if intervals.end == all.end { after } else { NONE },
+            before: if intervals.start == all.start {
+                before
+            } else {
+                NONE
+            },
+            after: if intervals.end == all.end {
+                after
+            } else {
+                NONE
+            },
         });
     }
 
@@ -211,7 +240,13 @@ impl Prepared {
         let segments = self.segments.len() as u32;
         let exact = self.exact.len() as u32;
         let spans = self.spans.len();
-        let shift = |constant: u32| if constant == NONE { NONE } else { constant + constants };
+        let shift = |constant: u32| {
+            if constant == NONE {
+                NONE
+            } else {
+                constant + constants
+            }
+        };
         self.spans.extend(other.spans.iter().map(|span| Span {
             source: match span.source {
                 Source::Segment(i) => Source::Segment(i + segments),
@@ -238,7 +273,12 @@ impl Prepared {
     }
 
     fn push_span(&mut self, start: f64, extent: f64, source: Source, key: u32) {
-        self.spans.push(Span { start, extent, source, key });
+        self.spans.push(Span {
+            start,
+            extent,
+            source,
+            key,
+        });
     }
 
     fn push_arc(&mut self, start: f64, from: DQuat, to: DQuat, key: u32) {
@@ -247,16 +287,25 @@ impl Prepared {
         // atan2, not acos: 9 % wrong at 0.001 rad in f32, and worse below.
         let angle = 2.0 * libm::atan2(chord, dot(sum, sum).sqrt());
         // Equal keys have no plane; with an angle of 0 any partner will do.
-        let partner = if chord == 0.0 { [0.0; 4] } else { round_quat(difference * (1.0 / chord)) };
-        let Segments::Arc(segments) = &mut self.segments else { unreachable!("the method's form") };
-        segments.push(ArcSegment { middle: round_quat(unit(sum)), partner });
+        let partner = if chord == 0.0 {
+            [0.0; 4]
+        } else {
+            round_quat(difference * (1.0 / chord))
+        };
+        let Segments::Arc(segments) = &mut self.segments else {
+            unreachable!("the method's form")
+        };
+        segments.push(ArcSegment {
+            middle: round_quat(unit(sum)),
+            partner,
+        });
         let source = Source::Segment(segments.len() as u32 - 1);
         self.push_span(start, angle, source, key);
     }
 
     fn push_cubic(&mut self, times: Range<f64>, cubic: &Cumulative, key: u32) {
         let mut pieces = 1;
-        while (0..pieces).any(|piece| !(cubic.reach(piece, pieces) <= REACH)) {
+        while (0..pieces).any(|piece| cubic.reach(piece, pieces) > REACH) {
             pieces *= 2;
             if pieces > MAX_PIECES {
                 self.exact.push(*cubic);
@@ -278,7 +327,13 @@ impl Prepared {
 
 fn end_value(curve: &Curve, held: DQuat, t: f64) -> DQuat {
     match curve {
-        Curve::Arc { from, to } => if t < 0.5 { *from } else { *to },
+        Curve::Arc { from, to } => {
+            if t < 0.5 {
+                *from
+            } else {
+                *to
+            }
+        }
         Curve::Cumulative(cubic) => unit(cubic.rotation(t)),
         Curve::Hold => held,
     }
@@ -291,10 +346,13 @@ fn cumulative_segment(cubic: &Cumulative, piece: usize, pieces: usize) -> Cumula
     let middle = (piece as f64 + 0.5) * width;
     let mut terms = vec![unit(cubic.base)];
     let mut powers = [[0.0; 4]; 3];
-    for j in 0..3 {
-        let vector = cubic.vectors[j];
+    for (j, &vector) in cubic.vectors.iter().enumerate() {
         let angle = norm3(vector);
-        let axis = if angle == 0.0 { DVec3::ZERO } else { vector / angle };
+        let axis = if angle == 0.0 {
+            DVec3::ZERO
+        } else {
+            vector / angle
+        };
         let axis = DQuat::from_xyzw(axis.x, axis.y, axis.z, 0.0);
         let reached = exp(vector * cubic.weight(j, middle));
         terms = terms
@@ -314,5 +372,10 @@ fn cumulative_segment(cubic: &Cumulative, piece: usize, pieces: usize) -> Cumula
     for (term, &exact) in rounded.iter_mut().zip(&terms) {
         *term = round_quat(exact);
     }
-    CumulativeSegment { terms: rounded, linear, quadratic, cubic }
+    CumulativeSegment {
+        terms: rounded,
+        linear,
+        quadratic,
+        cubic,
+    }
 }

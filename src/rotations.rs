@@ -52,7 +52,12 @@ impl Rotations {
         layout: Layout,
     ) -> Self {
         debug_assert_eq!(storage.quats().len(), tracks * samples);
-        Self { storage, tracks, samples, layout }
+        Self {
+            storage,
+            tracks,
+            samples,
+            layout,
+        }
     }
 
     /// Number of tracks.
@@ -79,8 +84,7 @@ impl Rotations {
     /// The rotation of one track at one sample; `None` out of range.
     pub fn get(&self, track: usize, sample: usize) -> Option<Quat> {
         let inside = track < self.tracks && sample < self.samples;
-        inside
-            .then(|| self.as_quats()[self.layout.index(track, sample, self.tracks, self.samples)])
+        inside.then(|| self.as_quats()[self.layout.index(track, sample, self.tracks, self.samples)])
     }
 }
 

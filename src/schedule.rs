@@ -24,7 +24,12 @@ pub(crate) enum RunSource {
     /// Store a constant.
     Constant(u32),
     /// Evaluate a segment at `distance × scale + offset`.
-    Segment { index: u32, distance: Distance, scale: f32, offset: f32 },
+    Segment {
+        index: u32,
+        distance: Distance,
+        scale: f32,
+        offset: f32,
+    },
     /// Evaluate a cubic in f64 on the host.
     Exact { index: u32, parameter: Parameter },
 }
@@ -100,7 +105,11 @@ impl Prepared {
         let mut emit = |from: usize, to: usize, source| {
             let (sample, to) = (from.max(samples.start), to.min(samples.end));
             if sample < to {
-                emit(Run { sample, count: to - sample, source });
+                emit(Run {
+                    sample,
+                    count: to - sample,
+                    source,
+                });
             }
         };
         if part.before != NONE {
@@ -109,11 +118,17 @@ impl Prepared {
         // The span that holds the first sample; a time's own rounding may put it one
         // further.
         let first_time = clock.time(samples.start);
-        let skipped = spans.partition_point(|span| span.start <= first_time).saturating_sub(2);
-        let mut to = spans.get(skipped).map_or(end, |span| clock.boundary(span.start));
+        let skipped = spans
+            .partition_point(|span| span.start <= first_time)
+            .saturating_sub(2);
+        let mut to = spans
+            .get(skipped)
+            .map_or(end, |span| clock.boundary(span.start));
         for (i, span) in spans.iter().enumerate().skip(skipped) {
             let from = to;
-            to = spans.get(i + 1).map_or(end, |next| clock.boundary(next.start));
+            to = spans
+                .get(i + 1)
+                .map_or(end, |next| clock.boundary(next.start));
             if from.first >= samples.end {
                 break;
             }
@@ -128,8 +143,13 @@ impl Prepared {
             let (first, last) = (first.max(samples.start), to.first.min(samples.end));
             if first < last {
                 let frames = to.frame - from.frame;
-                let source = frame_source(span, from.frame, to.frame, first, last)
-                    .ok_or(FramesError::GapTooLong { track: part.track, key: i, frames })?;
+                let source = frame_source(span, from.frame, to.frame, first, last).ok_or(
+                    FramesError::GapTooLong {
+                        track: part.track,
+                        key: i,
+                        frames,
+                    },
+                )?;
                 emit(first, last, source);
             }
         }
@@ -139,7 +159,13 @@ impl Prepared {
         Ok(())
     }
 
-    fn time_runs(&self, part: &Part, times: &[f64], samples: Range<usize>, mut emit: impl FnMut(Run)) {
+    fn time_runs(
+        &self,
+        part: &Part,
+        times: &[f64],
+        samples: Range<usize>,
+        mut emit: impl FnMut(Run),
+    ) {
         let spans = &self.spans[part.spans.clone()];
         let mut sample = samples.start;
         let mut i = 0;
@@ -152,15 +178,26 @@ impl Prepared {
             };
             if !holds(i) {
                 let found = spans.partition_point(|span| span.start <= time);
-                i = if holds(i + 1) { i + 1 } else { found.saturating_sub(1) };
+                i = if holds(i + 1) {
+                    i + 1
+                } else {
+                    found.saturating_sub(1)
+                };
             }
             let (covered, source) = if holds(i) {
                 let span = &spans[i];
                 let end = spans.get(i + 1).map_or(part.end, |next| next.start);
                 if time == span.start && span.key != NONE {
-                    (span.start..time.next_up(), Some(RunSource::Constant(span.key)))
+                    (
+                        span.start..time.next_up(),
+                        Some(RunSource::Constant(span.key)),
+                    )
                 } else {
-                    let open = if span.key == NONE { span.start } else { span.start.next_up() };
+                    let open = if span.key == NONE {
+                        span.start
+                    } else {
+                        span.start.next_up()
+                    };
                     (open..end, Some(time_source(span, end)))
                 }
             } else if time >= part.end {
@@ -172,7 +209,11 @@ impl Prepared {
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
             if let Some(source) = source {
-                emit(Run { sample, count, source });
+                emit(Run {
+                    sample,
+                    count,
+                    source,
+                });
             }
             sample += count;
         }
@@ -201,7 +242,11 @@ impl FrameClock {
     /// `latest`: the largest time that will be asked for.
     fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
         let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
-        Self { rate, start, rounding }
+        Self {
+            rate,
+            start,
+            rounding,
+        }
     }
 
     /// A time within its own rounding of a whole frame is that frame, so a sample on
@@ -209,9 +254,16 @@ impl FrameClock {
     fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.start);
         let whole = nearest_whole(exact);
-        let frame = if (exact - whole).abs() <= self.rounding { whole } else { exact };
+        let frame = if (exact - whole).abs() <= self.rounding {
+            whole
+        } else {
+            exact
+        };
         let first = if whole < frame { whole + 1.0 } else { whole };
-        Boundary { frame, first: first as usize } // the cast saturates at 0
+        Boundary {
+            frame,
+            first: first as usize,
+        } // the cast saturates at 0
     }
 
     fn time(self, frame: usize) -> f64 {
@@ -233,20 +285,24 @@ fn frame_source(span: &Span, from: f64, to: f64, first: usize, last: usize) -> O
     match span.source {
         Source::Constant(constant) => Some(RunSource::Constant(constant)),
         Source::Exact(index) => {
-            let parameter = Parameter::Frames { start: from, frames: to - from };
+            let parameter = Parameter::Frames {
+                start: from,
+                frames: to - from,
+            };
             Some(RunSource::Exact { index, parameter })
         }
         Source::Segment(index) => {
             let middle = (from + to) * 0.5;
             let whole = nearest_whole(middle);
             let scale = span.extent / (to - from);
-            let count = |frame: usize| -> Option<i32> {
-                i32::try_from(frame as i64 - whole as i64).ok()
-            };
+            let count =
+                |frame: usize| -> Option<i32> { i32::try_from(frame as i64 - whole as i64).ok() };
             count(last)?;
             Some(RunSource::Segment {
                 index,
-                distance: Distance::Frames { first: count(first)? },
+                distance: Distance::Frames {
+                    first: count(first)?,
+                },
                 // Finite: a segment far shorter than a frame holds at most the
                 // frame at distance 0.
                 scale: round_f32(scale.min(f64::from(f32::MAX))),
@@ -260,12 +316,18 @@ fn time_source(span: &Span, end: f64) -> RunSource {
     let seconds = end - span.start;
     match span.source {
         Source::Constant(constant) => RunSource::Constant(constant),
-        Source::Exact(index) => {
-            RunSource::Exact { index, parameter: Parameter::Seconds { start: span.start, seconds } }
-        }
+        Source::Exact(index) => RunSource::Exact {
+            index,
+            parameter: Parameter::Seconds {
+                start: span.start,
+                seconds,
+            },
+        },
         Source::Segment(index) => RunSource::Segment {
             index,
-            distance: Distance::Seconds { middle: span.start + seconds * 0.5 },
+            distance: Distance::Seconds {
+                middle: span.start + seconds * 0.5,
+            },
             scale: round_f32((span.extent / seconds).min(f64::from(f32::MAX))),
             offset: 0.0,
         },

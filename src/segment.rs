@@ -116,7 +116,14 @@ assert_layout!(
     item_count = LAUNCH_ITEM_COUNT,
     stride = LAUNCH_STRIDE
 );
-assert_layout!(Probe, PROBE_SIZE, a = PROBE_A, b = PROBE_B, c = PROBE_C, n = PROBE_N);
+assert_layout!(
+    Probe,
+    PROBE_SIZE,
+    a = PROBE_A,
+    b = PROBE_B,
+    c = PROBE_C,
+    n = PROBE_N
+);
 assert_layout!(
     Reply,
     REPLY_SIZE,

@@ -75,7 +75,10 @@ impl std::fmt::Display for SpirvError {
                 "opcode {opcode} at word {word} does not round exactly; use only + - * and integers"
             ),
             Self::FloatWidth { bits } => {
-                write!(f, "a float type of {bits} bits; only 32 are exact everywhere")
+                write!(
+                    f,
+                    "a float type of {bits} bits; only 32 are exact everywhere"
+                )
             }
             Self::Incomplete => write!(f, "the module has no memory model, entry point or types"),
         }
@@ -103,7 +106,11 @@ fn instructions(module: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
             return Err(SpirvError::Truncated { word: start });
         }
         let words = &module[start..start + length];
-        found.push(Instruction { start, opcode: module[start] as u16, words });
+        found.push(Instruction {
+            start,
+            opcode: module[start] as u16,
+            words,
+        });
         start += length;
     }
     Ok(found)
@@ -120,16 +127,28 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
-        let Instruction { start, opcode, words } = *instruction;
+        let Instruction {
+            start,
+            opcode,
+            words,
+        } = *instruction;
         match opcode {
             op::TYPE_FLOAT if words.len() > 2 && words[2] != 32 => {
                 return Err(SpirvError::FloatWidth { bits: words[2] });
             }
             // Every built-in function of GLSL.std.450 that naga would emit for our
             // shaders is one of those that round freely.
-            op::EXT_INST => return Err(SpirvError::Inexact { word: start, opcode }),
+            op::EXT_INST => {
+                return Err(SpirvError::Inexact {
+                    word: start,
+                    opcode,
+                });
+            }
             _ if op::INEXACT.contains(&opcode) => {
-                return Err(SpirvError::Inexact { word: start, opcode });
+                return Err(SpirvError::Inexact {
+                    word: start,
+                    opcode,
+                });
             }
             _ if op::EXACT.contains(&opcode) => {
                 results.insert(*words.get(2).ok_or(SpirvError::Truncated { word: start })?);
@@ -142,7 +161,13 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     }
     let additions: Vec<u32> = results
         .difference(&decorated)
-        .flat_map(|&id| [instruction_word(op::DECORATE, 3), id, DECORATION_NO_CONTRACTION])
+        .flat_map(|&id| {
+            [
+                instruction_word(op::DECORATE, 3),
+                id,
+                DECORATION_NO_CONTRACTION,
+            ]
+        })
         .collect();
     // Annotations come after the debug instructions and before the types.
     let place = code
@@ -196,7 +221,10 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
     if modes.is_empty() {
         return Ok(module.to_vec());
     }
-    let entry_points: Vec<_> = code.iter().filter(|i| i.opcode == op::ENTRY_POINT).collect();
+    let entry_points: Vec<_> = code
+        .iter()
+        .filter(|i| i.opcode == op::ENTRY_POINT)
+        .collect();
     let after_capabilities = code.iter().rfind(|i| i.opcode == op::CAPABILITY);
     let (Some(last_entry), Some(last_capability)) = (entry_points.last(), after_capabilities)
     else {
@@ -217,7 +245,10 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
     head.extend(name);
     let mut execution_modes = Vec::new();
     for entry in &entry_points {
-        let id = *entry.words.get(2).ok_or(SpirvError::Truncated { word: entry.start })?;
+        let id = *entry
+            .words
+            .get(2)
+            .ok_or(SpirvError::Truncated { word: entry.start })?;
         for &(_, mode) in &modes {
             execution_modes.extend([instruction_word(op::EXECUTION_MODE, 4), id, mode, 32]);
         }
@@ -235,7 +266,10 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
 fn string_words(text: &str) -> Vec<u32> {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize(bytes.len() / 4 * 4 + 4, 0); // always at least one NUL
-    bytes.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect()
+    bytes
+        .chunks_exact(4)
+        .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]))
+        .collect()
 }
 
 /// The module without its `NoContraction` decorations: what a driver gets to see
@@ -244,11 +278,18 @@ fn string_words(text: &str) -> Vec<u32> {
 /// # Errors
 /// A [`SpirvError`] for words that are no module.
 pub fn without_decorations(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
-    let mut words = module.get(..HEADER_WORDS).ok_or(SpirvError::NotSpirv)?.to_vec();
-    for Instruction { opcode, words: code, .. } in instructions(module)? {
-        let decoration = opcode == op::DECORATE
-            && code.len() == 3
-            && code[2] == DECORATION_NO_CONTRACTION;
+    let mut words = module
+        .get(..HEADER_WORDS)
+        .ok_or(SpirvError::NotSpirv)?
+        .to_vec();
+    for Instruction {
+        opcode,
+        words: code,
+        ..
+    } in instructions(module)?
+    {
+        let decoration =
+            opcode == op::DECORATE && code.len() == 3 && code[2] == DECORATION_NO_CONTRACTION;
         if !decoration {
             words.extend_from_slice(code);
         }

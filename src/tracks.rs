@@ -146,7 +146,11 @@ impl TrackSet {
             }
         }
         let first_time = self.share_or_append(times);
-        self.tracks.push(TrackRange { first_key, first_time, len: keys.len() });
+        self.tracks.push(TrackRange {
+            first_key,
+            first_time,
+            len: keys.len(),
+        });
         let name = name.into();
         if !name.is_empty() {
             self.names.resize(track, String::new());
@@ -163,7 +167,11 @@ impl TrackSet {
     pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
         let mut set = Self::new();
         if times.is_empty() || !keys.len().is_multiple_of(times.len()) {
-            return Err(TrackError::LengthMismatch { track: 0, keys: keys.len(), times: times.len() });
+            return Err(TrackError::LengthMismatch {
+                track: 0,
+                keys: keys.len(),
+                times: times.len(),
+            });
         }
         for track in keys.chunks(times.len()) {
             set.push("", times, track)?;
@@ -203,9 +211,17 @@ impl TrackSet {
     /// # Panics
     /// Never for `index < track_count()`; use [`TrackSet::tracks`] to walk them.
     pub fn track(&self, index: usize) -> Track<'_> {
-        let TrackRange { first_key, first_time, len } = self.tracks[index];
+        let TrackRange {
+            first_key,
+            first_time,
+            len,
+        } = self.tracks[index];
         Track {
-            name: self.names.get(index).map(String::as_str).filter(|name| !name.is_empty()),
+            name: self
+                .names
+                .get(index)
+                .map(String::as_str)
+                .filter(|name| !name.is_empty()),
             times: &self.times[first_time..first_time + len],
             keys: &self.keys[first_key..first_key + len],
         }
@@ -218,7 +234,9 @@ impl TrackSet {
 
     /// The track's name, or `box1`, `box2` … by its place when it has none.
     pub fn track_name(&self, index: usize) -> String {
-        self.track(index).name.map_or_else(|| format!("box{}", index + 1), str::to_owned)
+        self.track(index)
+            .name
+            .map_or_else(|| format!("box{}", index + 1), str::to_owned)
     }
 
     /// First and last key time over all tracks, seconds; `None` when empty.
@@ -233,7 +251,10 @@ impl TrackSet {
     /// # Panics
     /// When the range passes [`TrackSet::track_count`].
     pub fn select(&self, range: Range<usize>) -> Self {
-        let mut set = Self { box_length: self.box_length, ..Self::default() };
+        let mut set = Self {
+            box_length: self.box_length,
+            ..Self::default()
+        };
         for index in range {
             let track = self.track(index);
             let first_time = set.share_or_append(track.times);
@@ -243,7 +264,11 @@ impl TrackSet {
                 set.names.resize(set.tracks.len(), String::new());
                 set.names.push(name.to_owned());
             }
-            set.tracks.push(TrackRange { first_key, first_time, len: track.keys.len() });
+            set.tracks.push(TrackRange {
+                first_key,
+                first_time,
+                len: track.keys.len(),
+            });
         }
         set
     }
@@ -263,13 +288,21 @@ impl TrackSet {
 
 fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
     if times.len() != keys {
-        return Err(TrackError::LengthMismatch { track, keys, times: times.len() });
+        return Err(TrackError::LengthMismatch {
+            track,
+            keys,
+            times: times.len(),
+        });
     }
     if times.is_empty() {
         return Err(TrackError::Empty { track });
     }
     if let Some(key) = times.iter().position(|time| !time.is_finite()) {
-        return Err(TrackError::TimeNotFinite { track, key, time: times[key] });
+        return Err(TrackError::TimeNotFinite {
+            track,
+            key,
+            time: times[key],
+        });
     }
     match times.windows(2).position(|pair| pair[1] <= pair[0]) {
         Some(i) => Err(TrackError::TimeNotIncreasing {
@@ -289,7 +322,7 @@ const ROUNDING: f64 = 4.0e-7;
 fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = to_f64(quat);
     let norm = exact.length();
-    if !((norm - 1.0).abs() <= NORM_TOLERANCE) {
+    if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
         return Err(TrackError::NotUnit { track, key, norm });
     }
     if (norm - 1.0).abs() <= ROUNDING {
@@ -309,21 +342,48 @@ mod tests {
         let before = set.clone();
         let keys = [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)];
         let error = set.push("b", &[0.0, 1.0], &keys).unwrap_err();
-        assert_eq!(error, TrackError::NotUnit { track: 1, key: 1, norm: 2.0 });
+        assert_eq!(
+            error,
+            TrackError::NotUnit {
+                track: 1,
+                key: 1,
+                norm: 2.0
+            }
+        );
         assert_eq!(set, before);
         let bad_times = [
-            (vec![], TrackError::LengthMismatch { track: 1, keys: 1, times: 0 }),
+            (
+                vec![],
+                TrackError::LengthMismatch {
+                    track: 1,
+                    keys: 1,
+                    times: 0,
+                },
+            ),
             (
                 vec![f64::INFINITY],
-                TrackError::TimeNotFinite { track: 1, key: 0, time: f64::INFINITY },
+                TrackError::TimeNotFinite {
+                    track: 1,
+                    key: 0,
+                    time: f64::INFINITY,
+                },
             ),
         ];
         for (times, expected) in bad_times {
-            assert_eq!(set.push("", &times, &[Quat::IDENTITY]).unwrap_err(), expected);
+            assert_eq!(
+                set.push("", &times, &[Quat::IDENTITY]).unwrap_err(),
+                expected
+            );
         }
-        assert_eq!(set.push("", &[], &[]).unwrap_err(), TrackError::Empty { track: 1 });
+        assert_eq!(
+            set.push("", &[], &[]).unwrap_err(),
+            TrackError::Empty { track: 1 }
+        );
         let decreasing = set.push("", &[1.0, 1.0], &[Quat::IDENTITY; 2]).unwrap_err();
-        assert!(matches!(decreasing, TrackError::TimeNotIncreasing { key: 1, .. }));
+        assert!(matches!(
+            decreasing,
+            TrackError::TimeNotIncreasing { key: 1, .. }
+        ));
     }
 
     #[test]

@@ -13,7 +13,10 @@ use tumble::{
 const ENDS: [Ends; 4] = [
     Ends::Parabolic,
     Ends::Natural,
-    Ends::Clamped { start: DVec3::new(1.0, -2.0, 0.5), end: DVec3::ZERO },
+    Ends::Clamped {
+        start: DVec3::new(1.0, -2.0, 0.5),
+        end: DVec3::ZERO,
+    },
     Ends::Frozen,
 ];
 
@@ -29,7 +32,10 @@ fn engine(device: &Device, change: impl FnOnce(&mut EngineOptions)) -> Engine {
 
 fn assert_same_bits(expected: &[Quat], found: &[Quat], what: &str) {
     if let Some(place) = first_difference(expected, found) {
-        panic!("{what}: rotation {place} is {} on the CPU, {}", expected[place], found[place]);
+        panic!(
+            "{what}: rotation {place} is {} on the CPU, {}",
+            expected[place], found[place]
+        );
     }
 }
 
@@ -45,8 +51,10 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
             let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
             let frames = Frames::rate(rate.parse().unwrap()).between(-1.5, 35.0);
             for method in METHODS {
-                let interpolation =
-                    Interpolation { ends: random.pick(&ENDS), ..Interpolation::from(method) };
+                let interpolation = Interpolation {
+                    ends: random.pick(&ENDS),
+                    ..Interpolation::from(method)
+                };
                 let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
                 let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
                 let name = vulkan.device_name();
@@ -117,7 +125,9 @@ fn layouts_are_transposes_of_each_other() {
     let frames = Frames::fps(25).between(-1.0, 20.0);
     for method in METHODS {
         let rows = cpu().evaluate(&set, method, &frames).unwrap();
-        let columns = cpu().evaluate_as(&set, method, &frames, Layout::FrameMajor).unwrap();
+        let columns = cpu()
+            .evaluate_as(&set, method, &frames, Layout::FrameMajor)
+            .unwrap();
         assert_transposed(&rows, &columns);
     }
 }
@@ -147,9 +157,10 @@ fn arbitrary_times_have_the_same_bits() {
     let each: Vec<f64> = (0..200 * 50).map(|_| random.between(-3.0, 40.0)).collect();
     let requests = [Frames::at(times), Frames::at(sorted), Frames::at_each(each)];
     for device in vulkan_devices() {
-        for (memory, transfer) in
-            [(None, Transfer::Automatic), (Some(100_000), Transfer::Staged)]
-        {
+        for (memory, transfer) in [
+            (None, Transfer::Automatic),
+            (Some(100_000), Transfer::Staged),
+        ] {
             let vulkan = engine(&device, |options| {
                 options.memory = memory;
                 options.transfer = transfer;
@@ -173,7 +184,9 @@ fn the_path_as_authored_has_the_same_bits() {
     let mut set = TrackSet::new();
     for _ in 0..200 {
         let keys: Vec<Quat> = (0..20).map(|_| random.rotation().as_quat()).collect();
-        let times: Vec<f64> = (0..20).map(|i| f64::from(i) + random.between(0.0, 0.9)).collect();
+        let times: Vec<f64> = (0..20)
+            .map(|i| f64::from(i) + random.between(0.0, 0.9))
+            .collect();
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(60);
@@ -181,7 +194,10 @@ fn the_path_as_authored_has_the_same_bits() {
         let vulkan = Engine::new(device).unwrap();
         for method in METHODS {
             let path = Path::AsAuthored;
-            let interpolation = Interpolation { path, ..Interpolation::from(method) };
+            let interpolation = Interpolation {
+                path,
+                ..Interpolation::from(method)
+            };
             let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
@@ -196,14 +212,19 @@ fn closed_loops_have_the_same_bits() {
     for _ in 0..50 {
         let mut keys: Vec<Quat> = (0..9).map(|_| random.rotation().as_quat()).collect();
         keys.push(-keys[0]); // the same rotation
-        let times: Vec<f64> = (0..10).map(|i| f64::from(i) + random.between(0.0, 0.9)).collect();
+        let times: Vec<f64> = (0..10)
+            .map(|i| f64::from(i) + random.between(0.0, 0.9))
+            .collect();
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(120);
     for device in vulkan_devices() {
         let vulkan = Engine::new(device).unwrap();
         for method in METHODS {
-            let interpolation = Interpolation { ends: Ends::Loop, ..Interpolation::from(method) };
+            let interpolation = Interpolation {
+                ends: Ends::Loop,
+                ..Interpolation::from(method)
+            };
             let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
@@ -224,9 +245,14 @@ fn reused_buffers_hold_nothing_of_older_results() {
             let frames = Frames::fps(30).between(0.0, end);
             let expected = reference.evaluate(&frames).unwrap();
             let found = clip.evaluate(&frames).unwrap();
-            assert_same_bits(expected.as_quats(), found.as_quats(), &format!("to {end} s"));
+            assert_same_bits(
+                expected.as_quats(),
+                found.as_quats(),
+                &format!("to {end} s"),
+            );
             let mut own = vec![Quat::NAN; expected.as_quats().len()];
-            clip.evaluate_into(&frames, Layout::TrackMajor, &mut own).unwrap();
+            clip.evaluate_into(&frames, Layout::TrackMajor, &mut own)
+                .unwrap();
             assert_same_bits(expected.as_quats(), &own, &format!("to {end} s"));
         }
     }
@@ -263,7 +289,9 @@ fn nothing_to_evaluate_is_no_error() {
             let empty = engine.evaluate(&TrackSet::new(), method, &frames).unwrap();
             assert_eq!((empty.tracks(), empty.as_quats().len()), (0, 0));
             let set = hostile_set(1, 3);
-            let none = engine.evaluate(&set, method, &Frames::at(Vec::new())).unwrap();
+            let none = engine
+                .evaluate(&set, method, &Frames::at(Vec::new()))
+                .unwrap();
             assert_eq!((none.tracks(), none.samples()), (3, 0));
         }
     }

@@ -13,7 +13,10 @@ use tumble::spirv::{
 
 macro_rules! shader {
     ($name:literal) => {
-        ($name, include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) as &[u8])
+        (
+            $name,
+            include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) as &[u8],
+        )
     };
 }
 
@@ -25,11 +28,16 @@ const SHADERS: [(&str, &[u8]); 5] = [
     shader!("canary"),
 ];
 
-const ALL_CONTROLS: FloatControls =
-    FloatControls { preserve_signed_zero_inf_nan: true, round_to_nearest_even: true };
+const ALL_CONTROLS: FloatControls = FloatControls {
+    preserve_signed_zero_inf_nan: true,
+    round_to_nearest_even: true,
+};
 
 fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect()
+    bytes
+        .chunks_exact(4)
+        .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]))
+        .collect()
 }
 
 /// (opcode, operands) of every instruction, read without the pass's own reader.
@@ -46,9 +54,13 @@ fn instructions(module: &[u32]) -> Vec<(u16, Vec<u32>)> {
 
 fn compile(wgsl: &str) -> Vec<u32> {
     let module = naga::front::wgsl::parse_str(wgsl).expect(wgsl);
-    let info =
-        Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module).unwrap();
-    let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
+    let info = Validator::new(ValidationFlags::all(), Capabilities::all())
+        .validate(&module)
+        .unwrap();
+    let options = spv::Options {
+        lang_version: (1, 3),
+        ..spv::Options::default()
+    };
     spv::write_vec(&module, &info, &options, None).unwrap()
 }
 
@@ -76,12 +88,21 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
         }
         for (opcode, operands) in &code {
             if FLOAT_ARITHMETIC.contains(opcode) {
-                assert_eq!(decorations.get(&operands[1]), Some(&1), "{name}: %{}", operands[1]);
+                assert_eq!(
+                    decorations.get(&operands[1]),
+                    Some(&1),
+                    "{name}: %{}",
+                    operands[1]
+                );
                 results += 1;
             }
         }
         assert!(results > 10, "{name} has only {results} float operations");
-        assert_eq!(results, decorations.len(), "{name}: something else is decorated");
+        assert_eq!(
+            results,
+            decorations.len(),
+            "{name}: something else is decorated"
+        );
     }
 }
 
@@ -113,7 +134,10 @@ fn inexact_operations_are_refused() {
         "f32(i32(a))",
     ] {
         let error = no_contraction(&kernel_of(expression)).unwrap_err();
-        assert!(matches!(error, SpirvError::Inexact { .. }), "{expression}: {error}");
+        assert!(
+            matches!(error, SpirvError::Inexact { .. }),
+            "{expression}: {error}"
+        );
     }
 }
 
@@ -144,7 +168,10 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
     let mut validator = match spawned {
         Ok(validator) => validator,
         Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "spirv-val (Debian: spirv-tools): {error}");
+            assert!(
+                std::env::var_os("CI").is_none(),
+                "spirv-val (Debian: spirv-tools): {error}"
+            );
             eprintln!("spirv-val is not installed: nothing was validated");
             return;
         }
@@ -153,7 +180,10 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
     validator.stdin.take().unwrap().write_all(&bytes).unwrap();
     let output = validator.wait_with_output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{name} for {environment}: {message}");
+    assert!(
+        output.status.success(),
+        "{name} for {environment}: {message}"
+    );
 }
 
 #[test]
@@ -165,7 +195,10 @@ fn controls_reach_every_entry_point() {
             .filter(|(opcode, operands)| *opcode == 16 && operands.len() == 3)
             .map(|(_, operands)| operands[1..].to_vec())
             .collect();
-        assert!(modes.contains(&vec![4461, 32]) && modes.contains(&vec![4462, 32]), "{name}");
+        assert!(
+            modes.contains(&vec![4461, 32]) && modes.contains(&vec![4462, 32]),
+            "{name}"
+        );
         let none = FloatControls::default();
         assert_eq!(float_controls(&words(code), none).unwrap(), words(code));
     }
@@ -177,11 +210,17 @@ fn what_is_no_module_is_refused() {
     assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv));
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
     assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete));
-    assert_eq!(float_controls(&header, ALL_CONTROLS), Err(SpirvError::Incomplete));
+    assert_eq!(
+        float_controls(&header, ALL_CONTROLS),
+        Err(SpirvError::Incomplete)
+    );
     let cut = [&header[..], &[9 << 16 | 17]].concat();
     assert_eq!(no_contraction(&cut), Err(SpirvError::Truncated { word: 5 }));
     let double = [&header[..], &[3 << 16 | 22, 1, 64]].concat();
-    assert_eq!(no_contraction(&double), Err(SpirvError::FloatWidth { bits: 64 }));
+    assert_eq!(
+        no_contraction(&double),
+        Err(SpirvError::FloatWidth { bits: 64 })
+    );
 }
 
 proptest! {

@@ -15,7 +15,10 @@ fn every_device_passes_every_canary() {
             assert_eq!(canary.differing, 0, "{}: {canary:?}", engine.device_name());
         }
         let info = engine.device_info().unwrap();
-        assert!(info.max_storage_buffer_range >= 1 << 27, "Vulkan guarantees 128 MiB: {info:?}");
+        assert!(
+            info.max_storage_buffer_range >= 1 << 27,
+            "Vulkan guarantees 128 MiB: {info:?}"
+        );
     }
 }
 
@@ -26,13 +29,19 @@ fn the_validation_layer_has_nothing_to_say() {
         Ok(devices) => devices,
         Err(error) => {
             assert!(std::env::var_os("CI").is_none(), "{error}");
-            assert!(matches!(error, VulkanError::NoValidation | VulkanError::NoLoader { .. }));
+            assert!(matches!(
+                error,
+                VulkanError::NoValidation | VulkanError::NoLoader { .. }
+            ));
             eprintln!("{error}: nothing was validated");
             return;
         }
     };
     let set = hostile_set(2, 64);
-    let requests = [Frames::fps(60).between(0.0, 20.0), Frames::at(vec![0.5, 0.25, 7.0])];
+    let requests = [
+        Frames::fps(60).between(0.0, 20.0),
+        Frames::at(vec![0.5, 0.25, 7.0]),
+    ];
     for device in devices {
         for transfer in [Transfer::InPlace, Transfer::Staged] {
             let mut options = EngineOptions::default();
@@ -47,7 +56,11 @@ fn the_validation_layer_has_nothing_to_say() {
                     }
                 }
             }
-            assert_eq!(engine.validation_messages(), Vec::<String>::new(), "{device:?}");
+            assert_eq!(
+                engine.validation_messages(),
+                Vec::<String>::new(),
+                "{device:?}"
+            );
         }
     }
 }
@@ -73,10 +86,13 @@ fn an_applications_own_device_gives_the_same_bits() {
     // SAFETY: as above.
     let (physical_device, device, queue) = unsafe {
         let physical_device = instance.enumerate_physical_devices().unwrap()[0];
-        let queues =
-            [vk::DeviceQueueCreateInfo::default().queue_family_index(0).queue_priorities(&[1.0])];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(0)
+            .queue_priorities(&[1.0])];
         let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
-        let device = instance.create_device(physical_device, &info, None).unwrap();
+        let device = instance
+            .create_device(physical_device, &info, None)
+            .unwrap();
         let queue = device.get_device_queue(0, 0);
         (physical_device, device, queue)
     };
@@ -96,7 +112,11 @@ fn an_applications_own_device_gives_the_same_bits() {
         let found = engine.evaluate(&set, method, &frames).unwrap();
         let cpu = Engine::new(Device::Cpu).unwrap();
         let expected = cpu.evaluate(&set, method, &frames).unwrap();
-        assert_eq!(first_difference(expected.as_quats(), found.as_quats()), None, "{method}");
+        assert_eq!(
+            first_difference(expected.as_quats(), found.as_quats()),
+            None,
+            "{method}"
+        );
     }
     drop(engine);
     // SAFETY: the engine and its clips are gone.

@@ -94,21 +94,33 @@ pub(crate) struct Kernels {
 impl Kernels {
     /// The kernels of a width; narrower ones where the processor does not have it.
     pub(crate) fn new(width: VectorWidth) -> Self {
-        let narrower = VectorWidth::available().into_iter().filter(|&have| have <= width);
+        let narrower = VectorWidth::available()
+            .into_iter()
+            .filter(|&have| have <= width);
         match narrower.max() {
             #[cfg(target_arch = "x86_64")]
-            Some(VectorWidth::Avx512) => {
-                Self { arc: avx512::kernel(), cumulative: avx512::kernel() }
-            }
+            Some(VectorWidth::Avx512) => Self {
+                arc: avx512::kernel(),
+                cumulative: avx512::kernel(),
+            },
             #[cfg(target_arch = "x86_64")]
-            Some(VectorWidth::Avx2) => Self { arc: avx2::kernel(), cumulative: avx2::kernel() },
-            _ => Self { arc: baseline(), cumulative: baseline() },
+            Some(VectorWidth::Avx2) => Self {
+                arc: avx2::kernel(),
+                cumulative: avx2::kernel(),
+            },
+            _ => Self {
+                arc: baseline(),
+                cumulative: baseline(),
+            },
         }
     }
 }
 
 fn baseline<S: Evaluate>() -> Kernel<S> {
-    Kernel { frames: frames::<S>, distances: distances::<S> }
+    Kernel {
+        frames: frames::<S>,
+        distances: distances::<S>,
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -141,7 +153,10 @@ macro_rules! compiled_for {
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {
-                Kernel { frames: frames::<S>, distances: distances::<S> }
+                Kernel {
+                    frames: frames::<S>,
+                    distances: distances::<S>,
+                }
             }
         }
     };

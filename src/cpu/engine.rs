@@ -31,7 +31,10 @@ impl CpuEngine {
         let pool = threads
             .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
             .transpose()?;
-        Ok(Self { kernels: Kernels::new(width), pool })
+        Ok(Self {
+            kernels: Kernels::new(width),
+            pool,
+        })
     }
 
     /// Fills `output` with every track of the clip at every sample.
@@ -64,19 +67,25 @@ impl CpuEngine {
     ) -> Result<(), FramesError> {
         let samples = timeline.len();
         if samples > TASK {
-            return output.par_chunks_mut(samples).enumerate().try_for_each(|(track, row)| {
-                let pieces = row.par_chunks_mut(TASK).enumerate();
-                pieces.into_par_iter().try_for_each(|(i, piece)| {
-                    self.row(clip, track, timeline, i * TASK, piece)
-                })
-            });
+            return output
+                .par_chunks_mut(samples)
+                .enumerate()
+                .try_for_each(|(track, row)| {
+                    let pieces = row.par_chunks_mut(TASK).enumerate();
+                    pieces
+                        .into_par_iter()
+                        .try_for_each(|(i, piece)| self.row(clip, track, timeline, i * TASK, piece))
+                });
         }
         let tracks_each = TASK / samples;
-        output.par_chunks_mut(samples * tracks_each).enumerate().try_for_each(|(task, rows)| {
-            rows.chunks_mut(samples)
-                .zip(task * tracks_each..)
-                .try_for_each(|(row, track)| self.row(clip, track, timeline, 0, row))
-        })
+        output
+            .par_chunks_mut(samples * tracks_each)
+            .enumerate()
+            .try_for_each(|(task, rows)| {
+                rows.chunks_mut(samples)
+                    .zip(task * tracks_each..)
+                    .try_for_each(|(row, track)| self.row(clip, track, timeline, 0, row))
+            })
     }
 
     fn frame_major(
@@ -87,16 +96,19 @@ impl CpuEngine {
     ) -> Result<(), FramesError> {
         let tracks = clip.track_count();
         let frames_each = (TASK / tracks).max(1);
-        output.par_chunks_mut(tracks * frames_each).enumerate().try_for_each(|(task, frames)| {
-            let mut row = vec![[0.0; 4]; frames.len() / tracks];
-            for track in 0..tracks {
-                self.row(clip, track, timeline, task * frames_each, &mut row)?;
-                for (frame, &rotation) in frames.chunks_mut(tracks).zip(&row) {
-                    frame[track] = rotation;
+        output
+            .par_chunks_mut(tracks * frames_each)
+            .enumerate()
+            .try_for_each(|(task, frames)| {
+                let mut row = vec![[0.0; 4]; frames.len() / tracks];
+                for track in 0..tracks {
+                    self.row(clip, track, timeline, task * frames_each, &mut row)?;
+                    for (frame, &rotation) in frames.chunks_mut(tracks).zip(&row) {
+                        frame[track] = rotation;
+                    }
                 }
-            }
-            Ok(())
-        })
+                Ok(())
+            })
     }
 
     /// The samples of one track from `first` on.
@@ -118,20 +130,41 @@ impl CpuEngine {
                     }
                     RunSource::Exact { index, parameter } => {
                         for (sample, rotation) in (run.sample..).zip(&mut output[..run.count]) {
-                            *rotation =
-                                prepared.exact(index, parameter, timeline, track, sample);
+                            *rotation = prepared.exact(index, parameter, timeline, track, sample);
                         }
                     }
-                    RunSource::Segment { index, distance, scale, offset } => {
+                    RunSource::Segment {
+                        index,
+                        distance,
+                        scale,
+                        offset,
+                    } => {
                         let affine = Affine { scale, offset };
                         let i = index as usize;
-                        let place = Place { timeline, track, run: &run, distance };
+                        let place = Place {
+                            timeline,
+                            track,
+                            run: &run,
+                            distance,
+                        };
                         match &prepared.segments {
                             Segments::Arc(all) => {
-                                place.evaluate(&self.kernels.arc, &all[i], affine, &mut scratch, output);
+                                place.evaluate(
+                                    &self.kernels.arc,
+                                    &all[i],
+                                    affine,
+                                    &mut scratch,
+                                    output,
+                                );
                             }
                             Segments::Cumulative(all) => {
-                                place.evaluate(&self.kernels.cumulative, &all[i], affine, &mut scratch, output);
+                                place.evaluate(
+                                    &self.kernels.cumulative,
+                                    &all[i],
+                                    affine,
+                                    &mut scratch,
+                                    output,
+                                );
                             }
                         }
                     }

@@ -15,7 +15,9 @@ pub(crate) struct Scratch {
 
 impl Scratch {
     pub(crate) fn new() -> Self {
-        Self { components: [[0.0; CHUNK]; 4] }
+        Self {
+            components: [[0.0; CHUNK]; 4],
+        }
     }
 }
 
@@ -79,7 +81,10 @@ fn run<S: Evaluate>(
         let wanted = (count - start).min(CHUNK);
         let whole = wanted.next_multiple_of(BLOCK);
         // Slices of one length: no bounds check is left to keep the loop scalar.
-        let [x, y, z, w] = scratch.components.each_mut().map(|component| &mut component[..whole]);
+        let [x, y, z, w] = scratch
+            .components
+            .each_mut()
+            .map(|component| &mut component[..whole]);
         for j in 0..whole {
             let parameter = distance(start as u32 + j as u32) * affine.scale + affine.offset;
             let q = segment.evaluate(parameter);

@@ -8,7 +8,8 @@ impl Evaluate for CumulativeSegment {
     #[inline(always)]
     fn evaluate(&self, s: f32) -> [f32; 4] {
         let segment = self;
-        let angle = |j: usize| ((segment.cubic[j] * s + segment.quadratic[j]) * s + segment.linear[j]) * s;
+        let angle =
+            |j: usize| ((segment.cubic[j] * s + segment.quadratic[j]) * s + segment.linear[j]) * s;
         let first = sine_cosine(angle(0));
         let second = sine_cosine(angle(1));
         let third = sine_cosine(angle(2));

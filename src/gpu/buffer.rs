@@ -91,9 +91,12 @@ impl Buffer {
         if residence != Residence::Device {
             let flags = vk::MemoryMapFlags::empty();
             // SAFETY: the memory is host-visible and not mapped yet.
-            let pointer =
-                unsafe { device.raw.map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags) }
-                    .named("vkMapMemory")?;
+            let pointer = unsafe {
+                device
+                    .raw
+                    .map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags)
+            }
+            .named("vkMapMemory")?;
             buffer.mapped = NonNull::new(pointer.cast());
         }
         device.name(raw, name);

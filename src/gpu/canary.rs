@@ -37,13 +37,23 @@ pub struct CanaryReport {
 /// Runs every canary on a device.
 pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanError> {
     let mut reports = expressions(engine.device(), Exactness::Demanded)?;
-    for (name, method) in [("arc kernel", SLERP), ("cumulative kernel", BESSEL_OVERHAUSER)] {
+    for (name, method) in [
+        ("arc kernel", SLERP),
+        ("cumulative kernel", BESSEL_OVERHAUSER),
+    ] {
         let clip = ClipData::new(&hostile_set(), method.into(), Some(engine.group_bytes()))
             .expect("the set suits every method");
         let cpu = CpuEngine::new(VectorWidth::Baseline, None).expect("no threads of its own");
         let buffers = engine.upload(&clip)?;
-        let mut report = CanaryReport { name, total: 0, differing: 0 };
-        for frames in [Frames::fps(24), Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001])] {
+        let mut report = CanaryReport {
+            name,
+            total: 0,
+            differing: 0,
+        };
+        for frames in [
+            Frames::fps(24),
+            Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001]),
+        ] {
             let timeline = frames
                 .resolve(clip.track_count(), clip.time_span())
                 .expect("a few frames");
@@ -51,13 +61,14 @@ pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
             let mut expected = vec![Quat::IDENTITY; count];
             let mut found = expected.clone();
             let layout = Layout::TrackMajor;
-            cpu.evaluate(&clip, &timeline, layout, &mut expected).expect("short gaps");
-            engine.evaluate_into(&clip, &buffers, &timeline, layout, &mut found).map_err(
-                |error| match error {
+            cpu.evaluate(&clip, &timeline, layout, &mut expected)
+                .expect("short gaps");
+            engine
+                .evaluate_into(&clip, &buffers, &timeline, layout, &mut found)
+                .map_err(|error| match error {
                     super::EvaluateError::Vulkan(error) => error,
                     super::EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),
-                },
-            )?;
+                })?;
             report.total += count;
             report.differing += differing(&expected, &found);
         }
@@ -89,6 +100,9 @@ fn hostile_set() -> TrackSet {
     set
 }
 
+/// One of a reply's results.
+type Value = fn(&Reply) -> f32;
+
 /// The single expressions of `canary.wgsl`.
 fn expressions(
     device: &Arc<LogicalDevice>,
@@ -98,13 +112,28 @@ fn expressions(
     let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
     let reply_bytes = probes.len() * size_of::<Reply>();
     let pipeline = Pipeline::new(device, &CANARY, CANARY_BINDINGS, exactness)?;
-    let mut input =
-        Buffer::new(device, "tumble probes", probe_bytes.len() as u64, Residence::Upload)?;
-    let output = Buffer::new(device, "tumble replies", reply_bytes as u64, Residence::Readback)?;
-    input.bytes_mut(0..probe_bytes.len()).copy_from_slice(probe_bytes);
+    let mut input = Buffer::new(
+        device,
+        "tumble probes",
+        probe_bytes.len() as u64,
+        Residence::Upload,
+    )?;
+    let output = Buffer::new(
+        device,
+        "tumble replies",
+        reply_bytes as u64,
+        Residence::Readback,
+    )?;
+    input
+        .bytes_mut(0..probe_bytes.len())
+        .copy_from_slice(probe_bytes);
     let mut submission = Submission::new(device)?;
     submission.begin(1)?;
-    let launch = Launch { first_item: 0, item_count: probes.len() as u32, stride: 1 };
+    let launch = Launch {
+        first_item: 0,
+        item_count: probes.len() as u32,
+        stride: 1,
+    };
     submission.dispatch(
         &pipeline,
         &[Binding::whole(&input), Binding::whole(&output)],
@@ -116,7 +145,7 @@ fn expressions(
     submission.wait()?;
     let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
 
-    let canaries: [(&str, fn(&Reply) -> f32); 8] = [
+    let canaries: [(&str, Value); 8] = [
         ("contraction", |reply| reply.contraction),
         ("re-association of a sum", |reply| reply.reassociation),
         ("rounding to nearest even", |reply| reply.rounding),
@@ -127,13 +156,19 @@ fn expressions(
         ("cosine", |reply| reply.cosine),
     ];
     let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
-    let count = |value: fn(&Reply) -> f32| {
+    let count = |value: Value| {
         let pairs = expected.iter().zip(replies);
-        pairs.filter(|(a, b)| value(a).to_bits() != value(b).to_bits()).count()
+        pairs
+            .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
+            .count()
     };
     Ok(canaries
         .into_iter()
-        .map(|(name, value)| CanaryReport { name, total: probes.len(), differing: count(value) })
+        .map(|(name, value)| CanaryReport {
+            name,
+            total: probes.len(),
+            differing: count(value),
+        })
         .collect())
 }
 
@@ -154,8 +189,17 @@ fn probes() -> Vec<Probe> {
         })
         .collect();
     let half_ulp = f32::EPSILON / 2.0;
-    for (a, c) in [(1.0, half_ulp), (1.0 + f32::EPSILON, half_ulp), (-1.0, -half_ulp)] {
-        probes.push(Probe { a, b: half_ulp, c, n: (1 << 24) + 1 });
+    for (a, c) in [
+        (1.0, half_ulp),
+        (1.0 + f32::EPSILON, half_ulp),
+        (-1.0, -half_ulp),
+    ] {
+        probes.push(Probe {
+            a,
+            b: half_ulp,
+            c,
+            n: (1 << 24) + 1,
+        });
     }
     probes
 }
@@ -181,7 +225,10 @@ mod tests {
         let device = LogicalDevice::new(lavapipe).unwrap();
         let differing = |exactness| {
             let reports = expressions(&device, exactness).unwrap();
-            reports.iter().map(|report| (report.name, report.differing)).collect::<Vec<_>>()
+            reports
+                .iter()
+                .map(|report| (report.name, report.differing))
+                .collect::<Vec<_>>()
         };
         assert!(differing(Exactness::Demanded).iter().all(|(_, n)| *n == 0));
         let free = differing(Exactness::LeftToTheDriver);

@@ -27,15 +27,17 @@ impl LogicalDevice {
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
         let controls = physical.float_controls_extension;
-        let extensions: Vec<_> =
-            controls.then_some(khr::shader_float_controls::NAME.as_ptr()).into_iter().collect();
+        let extensions: Vec<_> = controls
+            .then_some(khr::shader_float_controls::NAME.as_ptr())
+            .into_iter()
+            .collect();
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
         let instance = &physical.instance.raw;
         // SAFETY: the physical device belongs to the instance and has this family.
-        let raw = unsafe { instance.create_device(physical.raw, &info, None) }
-            .named("vkCreateDevice")?;
+        let raw =
+            unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
         // SAFETY: one queue of this family was just created.
         let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
         Ok(Self::wrap(physical, raw, queue, true))
@@ -50,12 +52,25 @@ impl LogicalDevice {
         Self::wrap(physical, raw, queue, false)
     }
 
-    fn wrap(physical: PhysicalDevice, raw: ash::Device, queue: vk::Queue, owned: bool) -> Arc<Self> {
+    fn wrap(
+        physical: PhysicalDevice,
+        raw: ash::Device,
+        queue: vk::Queue,
+        owned: bool,
+    ) -> Arc<Self> {
         let instance = &physical.instance;
-        let names =
-            instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
+        let names = instance
+            .debug_utils
+            .then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
         let (queue, hung) = (Mutex::new(queue), AtomicBool::new(false));
-        Arc::new(Self { raw, physical, queue, names, owned, hung })
+        Arc::new(Self {
+            raw,
+            physical,
+            queue,
+            names,
+            owned,
+            hung,
+        })
     }
 
     /// The queue; Vulkan wants one user at a time.
@@ -65,9 +80,12 @@ impl LogicalDevice {
 
     /// Gives an object the name that validation and debuggers show.
     pub(super) fn name(&self, object: impl vk::Handle, name: &str) {
-        let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else { return };
-        let info =
-            vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else {
+            return;
+        };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default()
+            .object_handle(object)
+            .object_name(&name);
         // SAFETY: the object belongs to this device. A name that cannot be set is
         // no reason to stop.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };

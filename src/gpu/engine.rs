@@ -116,7 +116,9 @@ impl VulkanEngine {
             Transfer::InPlace => true,
             Transfer::Staged => false,
         };
-        let largest = info.max_storage_buffer_range.min(info.max_memory_allocation_size);
+        let largest = info
+            .max_storage_buffer_range
+            .min(info.max_memory_allocation_size);
         // A window may need as many items as it has rotations.
         let mut window = WINDOW.min(largest / size_of::<Item>() as u64 / 2);
         let mut group_bytes = largest;
@@ -128,7 +130,12 @@ impl VulkanEngine {
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         let pipeline = |form, clock| {
-            Pipeline::new(&device, kernel(form, clock), KERNEL_BINDINGS, Exactness::Demanded)
+            Pipeline::new(
+                &device,
+                kernel(form, clock),
+                KERNEL_BINDINGS,
+                Exactness::Demanded,
+            )
         };
         let pipelines = [
             pipeline(Form::Arc, Clock::Frames)?,
@@ -174,7 +181,8 @@ impl VulkanEngine {
 
     /// Bytes of segments that one clip may hold on the device.
     pub(crate) fn clip_bytes(&self) -> Option<usize> {
-        self.clip_bytes.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
+        self.clip_bytes
+            .map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
     }
 
     /// Brings a clip's segments to the device.
@@ -238,7 +246,11 @@ impl VulkanEngine {
         let mut buffer = self.output_buffer(bytes)?;
         self.run(clip, buffers, timeline, layout, Target::Buffer(&mut buffer))?;
         let free = Arc::clone(&self.free);
-        Ok(Box::new(MappedQuats { buffer: Some(buffer), count, free }))
+        Ok(Box::new(MappedQuats {
+            buffer: Some(buffer),
+            count,
+            free,
+        }))
     }
 
     /// Evaluates into the caller's memory.
@@ -310,7 +322,12 @@ impl VulkanEngine {
         window: Window,
         target: &Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let alignment = self.device.physical.info.min_storage_buffer_offset_alignment.max(1);
+        let alignment = self
+            .device
+            .physical
+            .info
+            .min_storage_buffer_offset_alignment
+            .max(1);
         let start = match target {
             Target::Buffer(_) => window.start as u64 * ROTATION,
             Target::Slice(_) => 0,
@@ -323,12 +340,26 @@ impl VulkanEngine {
 
         let staged_items = !self.in_place;
         if staged_items {
-            Slot::grow(&self.device, &mut slot.device_items, slot.items.size(), Residence::Device)?;
+            Slot::grow(
+                &self.device,
+                &mut slot.device_items,
+                slot.items.size(),
+                Residence::Device,
+            )?;
             let size = slot.distances.size();
-            Slot::grow(&self.device, &mut slot.device_distances, size, Residence::Device)?;
+            Slot::grow(
+                &self.device,
+                &mut slot.device_distances,
+                size,
+                Residence::Device,
+            )?;
         }
         if matches!(target, Target::Slice(_)) {
-            let residence = if self.in_place { Residence::Readback } else { Residence::Device };
+            let residence = if self.in_place {
+                Residence::Readback
+            } else {
+                Residence::Device
+            };
             Slot::grow(&self.device, &mut slot.rotations, size, residence)?;
             if !self.in_place {
                 Slot::grow(&self.device, &mut slot.readback, size, Residence::Readback)?;
@@ -339,13 +370,22 @@ impl VulkanEngine {
         if let (Some(own_items), Some(own_distances)) = (&slot.device_items, &slot.device_distances)
         {
             slot.submission.copy(items, own_items, 0, items.size());
-            slot.submission.copy(distances, own_distances, 0, distances.size());
+            slot.submission
+                .copy(distances, own_distances, 0, distances.size());
             slot.submission.barrier(Access::Copy, Access::Kernel);
             (items, distances) = (own_items, own_distances);
         }
         let rotations = match (target, &slot.rotations) {
-            (Target::Buffer(buffer), _) => Binding { buffer, offset: aligned, size },
-            (Target::Slice(_), Some(buffer)) => Binding { buffer, offset: 0, size },
+            (Target::Buffer(buffer), _) => Binding {
+                buffer,
+                offset: aligned,
+                size,
+            },
+            (Target::Slice(_), Some(buffer)) => Binding {
+                buffer,
+                offset: 0,
+                size,
+            },
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let pipeline = self.pipeline(clip.interpolation.method.form, timeline);
@@ -363,9 +403,14 @@ impl VulkanEngine {
                 Binding::whole(distances),
                 rotations,
             ];
-            let launch = Launch { first_item, item_count, stride: window.stride() as u32 };
+            let launch = Launch {
+                first_item,
+                item_count,
+                stride: window.stride() as u32,
+            };
             let groups = self.workgroups(item_count);
-            slot.submission.dispatch(pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
+            slot.submission
+                .dispatch(pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
             first_item += item_count;
         }
         if let (Some(rotations), Some(readback)) = (&slot.rotations, &slot.readback)
@@ -379,7 +424,9 @@ impl VulkanEngine {
         }
         slot.submission.submit()?;
         let chunks = lists.iter_mut().flat_map(|list| &mut list.chunks);
-        let patches = chunks.flat_map(|chunk| std::mem::take(&mut chunk.patches)).collect();
+        let patches = chunks
+            .flat_map(|chunk| std::mem::take(&mut chunk.patches))
+            .collect();
         slot.done = Some(Finish { window, patches });
         Ok(())
     }
@@ -430,7 +477,11 @@ impl Slot {
     }
 
     /// Writes the work lists of all groups, one behind the other.
-    fn write(&mut self, device: &Arc<LogicalDevice>, lists: &[GroupWork]) -> Result<(), VulkanError> {
+    fn write(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        lists: &[GroupWork],
+    ) -> Result<(), VulkanError> {
         let item_bytes = lists.iter().map(GroupWork::item_count).sum::<usize>() * size_of::<Item>();
         let distance_count = lists.iter().map(GroupWork::distance_count).sum::<usize>();
         if self.items.size() < item_bytes as u64 {
@@ -438,12 +489,16 @@ impl Slot {
         }
         let distance_bytes = (distance_count * size_of::<f32>()) as u64;
         if self.distances.size() < distance_bytes {
-            self.distances =
-                Buffer::new(device, "tumble distances", distance_bytes, Residence::Upload)?;
+            self.distances = Buffer::new(
+                device,
+                "tumble distances",
+                distance_bytes,
+                Residence::Upload,
+            )?;
         }
-        let items: &mut [Item] =
-            bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
-        let distances: &mut [f32] = bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes as usize));
+        let items: &mut [Item] = bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
+        let distances: &mut [f32] =
+            bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes as usize));
         let (mut next_item, mut next_distance) = (0, 0);
         for chunk in lists.iter().flat_map(|list| &list.chunks) {
             let place = &mut items[next_item..next_item + chunk.items.len()];
@@ -464,7 +519,9 @@ impl Slot {
     /// Waits for the window in flight, if any, and brings its results home.
     fn finish(&mut self, target: &mut Target<'_>) -> Result<(), VulkanError> {
         self.submission.wait()?;
-        let Some(Finish { window, patches }) = self.done.take() else { return Ok(()) };
+        let Some(Finish { window, patches }) = self.done.take() else {
+            return Ok(());
+        };
         let all = window.start..window.start + window.len();
         let output: &mut [[f32; 4]] = match target {
             Target::Buffer(buffer) => bytemuck::cast_slice_mut(
@@ -496,7 +553,11 @@ struct MappedQuats {
 impl Storage for MappedQuats {
     fn quats(&self) -> &[Quat] {
         let all = 0..self.count * size_of::<Quat>();
-        bytemuck::cast_slice(self.buffer.as_ref().map_or(&[][..], |buffer| buffer.bytes(all)))
+        bytemuck::cast_slice(
+            self.buffer
+                .as_ref()
+                .map_or(&[][..], |buffer| buffer.bytes(all)),
+        )
     }
 }
 

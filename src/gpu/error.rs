@@ -55,7 +55,9 @@ pub enum VulkanError {
         total: usize,
     },
     /// One track alone exceeds the device's limits.
-    #[error("{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set")]
+    #[error(
+        "{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"
+    )]
     TooLarge {
         /// What is too large.
         what: &'static str,

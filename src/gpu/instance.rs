@@ -31,8 +31,9 @@ impl Instance {
     /// Loads Vulkan and creates an instance of version 1.1 or newer.
     pub(super) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
         // SAFETY: loading a library runs its initialisers; that is what is asked for.
-        let entry = unsafe { ash::Entry::load() }
-            .map_err(|error| VulkanError::NoLoader { reason: error.to_string() })?;
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| VulkanError::NoLoader {
+            reason: error.to_string(),
+        })?;
         // SAFETY: no requirements beyond a loaded entry.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
             .named("vkEnumerateInstanceLayerProperties")?;
@@ -40,17 +41,24 @@ impl Instance {
         if validation && !has_layer(VALIDATION) {
             return Err(VulkanError::NoValidation);
         }
-        let layer_names: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
+        let layer_names: Vec<_> = validation
+            .then_some(VALIDATION.as_ptr())
+            .into_iter()
+            .collect();
         let has_extension = |layer: Option<&CStr>, wanted: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
             let found = unsafe { entry.enumerate_instance_extension_properties(layer) }
                 .named("vkEnumerateInstanceExtensionProperties")?;
-            Ok(found.iter().any(|e| e.extension_name_as_c_str() == Ok(wanted)))
+            Ok(found
+                .iter()
+                .any(|e| e.extension_name_as_c_str() == Ok(wanted)))
         };
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
-        let extensions: Vec<_> =
-            debug_utils.then_some(ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+        let extensions: Vec<_> = debug_utils
+            .then_some(ext::debug_utils::NAME.as_ptr())
+            .into_iter()
+            .collect();
 
         let application = vk::ApplicationInfo::default()
             .application_name(c"tumble")
@@ -69,8 +77,8 @@ impl Instance {
             .pfn_user_callback(Some(record_message))
             .user_data((&raw const *messages).cast_mut().cast());
         let synchronization = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features = vk::ValidationFeaturesEXT::default()
-            .enabled_validation_features(&synchronization);
+        let mut features =
+            vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronization);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layer_names)
@@ -81,22 +89,37 @@ impl Instance {
         // SAFETY: every pointer in `info` outlives the call; the messenger's user
         // data lives as long as the instance.
         let raw = unsafe { entry.create_instance(&info, None) }.named("vkCreateInstance")?;
-        let mut instance =
-            Self { raw, debug_utils, messenger: None, owned: true, _entry: entry };
+        let mut instance = Self {
+            raw,
+            debug_utils,
+            messenger: None,
+            owned: true,
+            _entry: entry,
+        };
         if validation {
             let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             messenger_info.p_next = std::ptr::null();
             // SAFETY: the extension is enabled; the user data is boxed and kept.
             let raw = unsafe { functions.create_debug_utils_messenger(&messenger_info, None) }
                 .named("vkCreateDebugUtilsMessengerEXT")?;
-            instance.messenger = Some(Messenger { functions, raw, messages });
+            instance.messenger = Some(Messenger {
+                functions,
+                raw,
+                messages,
+            });
         }
         Ok(Arc::new(instance))
     }
 
     /// An application's instance; it stays the application's to destroy.
     pub(super) fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
-        Arc::new(Self { raw, debug_utils: false, messenger: None, owned: false, _entry: entry })
+        Arc::new(Self {
+            raw,
+            debug_utils: false,
+            messenger: None,
+            owned: false,
+            _entry: entry,
+        })
     }
 
     /// Every physical device, in the loader's order.
@@ -108,7 +131,10 @@ impl Instance {
     /// What the validation layer has said so far.
     pub(super) fn validation_messages(&self) -> Vec<String> {
         let messages = self.messenger.as_ref().map(|messenger| &messenger.messages);
-        messages.and_then(|m| m.lock().ok()).map(|m| m.clone()).unwrap_or_default()
+        messages
+            .and_then(|m| m.lock().ok())
+            .map(|m| m.clone())
+            .unwrap_or_default()
     }
 }
 
@@ -117,7 +143,9 @@ impl Drop for Instance {
         if let Some(messenger) = &self.messenger {
             // SAFETY: created from this instance and destroyed once.
             unsafe {
-                messenger.functions.destroy_debug_utils_messenger(messenger.raw, None);
+                messenger
+                    .functions
+                    .destroy_debug_utils_messenger(messenger.raw, None);
             }
         }
         if self.owned {

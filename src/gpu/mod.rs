@@ -18,5 +18,5 @@ pub use canary::CanaryReport;
 pub(crate) use engine::{ClipBuffers, EvaluateError, VulkanEngine};
 pub use error::VulkanError;
 pub use handles::VulkanHandles;
-pub(crate) use physical::{PhysicalDevice, list};
 pub use physical::{DeviceInfo, DeviceKind};
+pub(crate) use physical::{PhysicalDevice, list};

@@ -93,17 +93,25 @@ impl PhysicalDevice {
         let vk_instance = &instance.raw;
         // SAFETY: `raw` was enumerated from this instance, here and below.
         let families = unsafe { vk_instance.get_physical_device_queue_family_properties(raw) };
-        let compute = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+        let compute = families
+            .iter()
+            .position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
         // SAFETY: as above.
         let properties = unsafe { vk_instance.get_physical_device_properties(raw) };
-        let Some(queue_family) = compute else { return Ok(None) };
+        let Some(queue_family) = compute else {
+            return Ok(None);
+        };
         if properties.api_version < vk::API_VERSION_1_1 {
             return Ok(None);
         }
         // SAFETY: as above.
         let extensions = unsafe { vk_instance.enumerate_device_extension_properties(raw) }
             .named("vkEnumerateDeviceExtensionProperties")?;
-        let has = |name| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let has = |name| {
+            extensions
+                .iter()
+                .any(|e| e.extension_name_as_c_str() == Ok(name))
+        };
         let core_1_2 = properties.api_version >= vk::API_VERSION_1_2;
         let reports_controls = core_1_2 || has(khr::shader_float_controls::NAME);
 
@@ -128,7 +136,8 @@ impl PhysicalDevice {
         };
         let limits = &properties.limits;
         let text = |name: Result<&std::ffi::CStr, _>| {
-            name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+            name.map(|name| name.to_string_lossy().into_owned())
+                .unwrap_or_default()
         };
         let driver = format!(
             "{} {}",
@@ -182,7 +191,10 @@ impl PhysicalDevice {
 
 fn device_local_memory(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
     let heaps = memory.memory_heaps_as_slice().iter();
-    heaps.filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum()
+    heaps
+        .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+        .map(|h| h.size)
+        .sum()
 }
 
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {

@@ -113,14 +113,17 @@ impl Pipeline {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module)
             .name(c"main");
-        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
+        let info = [vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(pipeline.layout)];
         let cache = vk::PipelineCache::null();
         // SAFETY: the module has an entry point `main` that fits the layout.
         let created = unsafe { device.raw.create_compute_pipelines(cache, &info, None) };
         // SAFETY: a module is not needed once its pipeline exists.
         unsafe { device.raw.destroy_shader_module(module, None) };
-        pipeline.raw =
-            created.map_err(|(_, result)| result).named("vkCreateComputePipelines")?[0];
+        pipeline.raw = created
+            .map_err(|(_, result)| result)
+            .named("vkCreateComputePipelines")?[0];
         device.name(pipeline.raw, shader.name);
         Ok(pipeline)
     }
@@ -152,7 +155,9 @@ impl Drop for Pipeline {
             unsafe {
                 self.device.raw.destroy_pipeline(self.raw, None);
                 self.device.raw.destroy_pipeline_layout(self.layout, None);
-                self.device.raw.destroy_descriptor_set_layout(self.set_layout, None);
+                self.device
+                    .raw
+                    .destroy_descriptor_set_layout(self.set_layout, None);
             }
         }
     }

@@ -35,7 +35,11 @@ pub(super) struct Binding<'a> {
 impl<'a> Binding<'a> {
     /// All of a buffer.
     pub(super) fn whole(buffer: &'a Buffer) -> Self {
-        Self { buffer, offset: 0, size: buffer.size() }
+        Self {
+            buffer,
+            offset: 0,
+            size: buffer.size(),
+        }
     }
 }
 
@@ -51,8 +55,8 @@ impl Submission {
             pending: false,
         };
         let raw = &device.raw;
-        let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.physical.queue_family);
+        let info =
+            vk::CommandPoolCreateInfo::default().queue_family_index(device.physical.queue_family);
         // SAFETY: the device is alive, here and below; what is created is destroyed
         // in `drop`, also when a later step fails.
         submission.pool =
@@ -61,8 +65,8 @@ impl Submission {
             .command_pool(submission.pool)
             .command_buffer_count(1);
         // SAFETY: as above.
-        submission.commands = unsafe { raw.allocate_command_buffers(&info) }
-            .named("vkAllocateCommandBuffers")?[0];
+        submission.commands =
+            unsafe { raw.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?[0];
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
@@ -80,8 +84,9 @@ impl Submission {
             let sizes = [vk::DescriptorPoolSize::default()
                 .ty(vk::DescriptorType::STORAGE_BUFFER)
                 .descriptor_count(sets * super::pipeline::KERNEL_BINDINGS)];
-            let info =
-                vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
+            let info = vk::DescriptorPoolCreateInfo::default()
+                .max_sets(sets)
+                .pool_sizes(&sizes);
             // SAFETY: nothing is pending, so the old pool is not in use.
             unsafe { raw.destroy_descriptor_pool(self.descriptors, None) };
             (self.descriptors, self.capacity) = (vk::DescriptorPool::null(), 0);
@@ -119,8 +124,8 @@ impl Submission {
             .descriptor_pool(self.descriptors)
             .set_layouts(&layouts);
         // SAFETY: `begin` made room for this set.
-        let set = unsafe { raw.allocate_descriptor_sets(&info) }
-            .named("vkAllocateDescriptorSets")?[0];
+        let set =
+            unsafe { raw.allocate_descriptor_sets(&info) }.named("vkAllocateDescriptorSets")?[0];
         let infos: Vec<_> = bindings
             .iter()
             .map(|binding| {
@@ -159,7 +164,11 @@ impl Submission {
     pub(super) fn copy(&mut self, from: &Buffer, to: &Buffer, to_offset: u64, size: u64) {
         let region = [vk::BufferCopy::default().dst_offset(to_offset).size(size)];
         // SAFETY: as in `dispatch`; both ranges lie within their buffers.
-        unsafe { self.device.raw.cmd_copy_buffer(self.commands, from.raw, to.raw, &region) };
+        unsafe {
+            self.device
+                .raw
+                .cmd_copy_buffer(self.commands, from.raw, to.raw, &region)
+        };
     }
 
     /// Records that what was written before `from` is seen after `to`.
@@ -210,7 +219,9 @@ impl Submission {
         match unsafe { raw.wait_for_fences(&fences, true, timeout) } {
             Err(vk::Result::TIMEOUT) => {
                 self.device.mark_hung();
-                return Err(VulkanError::Timeout { seconds: TIMEOUT_SECONDS });
+                return Err(VulkanError::Timeout {
+                    seconds: TIMEOUT_SECONDS,
+                });
             }
             waited => waited.named("vkWaitForFences")?,
         }

@@ -40,7 +40,8 @@ impl Window {
     /// Where a rotation lies in the window.
     fn place(&self, track: usize, sample: usize) -> usize {
         let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
-        self.layout.index(track, sample, self.tracks.len(), self.samples.len())
+        self.layout
+            .index(track, sample, self.tracks.len(), self.samples.len())
     }
 }
 
@@ -66,7 +67,12 @@ pub(super) fn windows(tracks: usize, samples: usize, layout: Layout, limit: usiz
                 Layout::TrackMajor => (row.clone(), column),
                 Layout::FrameMajor => (column, row.clone()),
             };
-            windows.push(Window { start, tracks, samples, layout });
+            windows.push(Window {
+                start,
+                tracks,
+                samples,
+                layout,
+            });
         }
     }
     windows
@@ -111,8 +117,12 @@ pub(super) fn work(
 ) -> Result<Vec<GroupWork>, FramesError> {
     let mut all = Vec::new();
     for (group, prepared) in clip.groups.iter().enumerate() {
-        let first = prepared.parts.partition_point(|part| part.track < window.tracks.start);
-        let last = prepared.parts.partition_point(|part| part.track < window.tracks.end);
+        let first = prepared
+            .parts
+            .partition_point(|part| part.track < window.tracks.start);
+        let last = prepared
+            .parts
+            .partition_point(|part| part.track < window.tracks.end);
         let chunks: Vec<WorkChunk> = prepared.parts[first..last]
             .par_chunks(PARTS_PER_CHUNK)
             .map(|parts| {
@@ -146,7 +156,12 @@ impl WorkChunk {
         let samples = run.sample..run.sample + run.count;
         let (source, hold, scale, offset) = match run.source {
             RunSource::Constant(source) => (source, HOLD, 0.0, 0.0),
-            RunSource::Segment { index, scale, offset, .. } => (index, 0, scale, offset),
+            RunSource::Segment {
+                index,
+                scale,
+                offset,
+                ..
+            } => (index, 0, scale, offset),
             RunSource::Exact { index, parameter } => {
                 self.patches.extend(samples.map(|sample| {
                     let value = prepared.exact(index, parameter, timeline, track, sample);

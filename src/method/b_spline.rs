@@ -32,9 +32,17 @@ fn curves(keys: &Keys, intervals: Range<usize>, emit: &mut dyn FnMut(Curve)) {
             continue;
         }
         let before = step_vector(keys, i as isize - 1);
-        let vectors = [before, step_vector(keys, i as isize), step_vector(keys, i as isize + 1)];
+        let vectors = [
+            before,
+            step_vector(keys, i as isize),
+            step_vector(keys, i as isize + 1),
+        ];
         let base = product(keys.rotations[i], exp(-before));
-        emit(Curve::Cumulative(Cumulative { base, vectors, basis: &curve::B_SPLINE }));
+        emit(Curve::Cumulative(Cumulative {
+            base,
+            vectors,
+            basis: &curve::B_SPLINE,
+        }));
     }
 }
 

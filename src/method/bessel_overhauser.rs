@@ -31,5 +31,8 @@ fn handles(keys: &Keys, key: isize) -> Handles {
     // The product's logarithm wraps: on its principal branch a long tangent would
     // point backwards.
     let tangent = log_near(product(exp(left), exp(right)), left + right) / (before + after);
-    Handles { incoming: tangent * (before / 3.0), outgoing: tangent * (after / 3.0) }
+    Handles {
+        incoming: tangent * (before / 3.0),
+        outgoing: tangent * (after / 3.0),
+    }
 }

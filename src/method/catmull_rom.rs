@@ -26,5 +26,8 @@ fn handles(keys: &Keys, key: isize) -> Handles {
     let two_step = product(keys.step(key - 1), keys.step(key));
     let toward = keys.log_step(key - 1) + keys.log_step(key);
     let handle = log_toward(two_step, toward) / 6.0;
-    Handles { incoming: handle, outgoing: handle }
+    Handles {
+        incoming: handle,
+        outgoing: handle,
+    }
 }

@@ -28,8 +28,11 @@ pub(crate) struct Cumulative {
 pub(crate) type Basis = [[f64; 4]; 3];
 
 /// Cumulative Bernstein: `1-(1-t)³`, `t²(3-2t)`, `t³`.
-pub(crate) static BERNSTEIN: Basis =
-    [[0.0, 3.0, -3.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, 0.0, 1.0]];
+pub(crate) static BERNSTEIN: Basis = [
+    [0.0, 3.0, -3.0, 1.0],
+    [0.0, 0.0, 3.0, -2.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
 
 /// Cumulative uniform cubic B-spline: `(5+3t-3t²+t³)/6`, `(1+3t+3t²-2t³)/6`, `t³/6`.
 pub(crate) static B_SPLINE: Basis = [
@@ -47,7 +50,9 @@ impl Cumulative {
 
     /// The rotation at `t`.
     pub(crate) fn rotation(&self, t: f64) -> DQuat {
-        (0..3).fold(self.base, |q, j| product(q, exp(self.vectors[j] * self.weight(j, t))))
+        (0..3).fold(self.base, |q, j| {
+            product(q, exp(self.vectors[j] * self.weight(j, t)))
+        })
     }
 
     /// The largest half-angle by which any of the three rotations differs from its

@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::Ends;
 use super::curve::{BERNSTEIN, Cumulative, Curve};
 use super::keys::Keys;
-use super::Ends;
 use crate::numeric::{exp, log, product, step};
 
 /// The handles of a key: towards the interval before it and the one after it.
@@ -71,15 +71,17 @@ fn between(keys: &Keys, i: usize, outgoing: DVec3, incoming: DVec3) -> Curve {
 }
 
 fn cumulative(keys: &Keys, i: usize, vectors: [DVec3; 3]) -> Curve {
-    Curve::Cumulative(Cumulative { base: keys.rotations[i], vectors, basis: &BERNSTEIN })
+    Curve::Cumulative(Cumulative {
+        base: keys.rotations[i],
+        vectors,
+        basis: &BERNSTEIN,
+    })
 }
 
 fn first(keys: &Keys, incoming: DVec3) -> Curve {
     match keys.ends {
         Ends::Frozen => Curve::Hold,
-        Ends::Clamped { start, .. } => {
-            between(keys, 0, start * (keys.duration(0) / 6.0), incoming)
-        }
+        Ends::Clamped { start, .. } => between(keys, 0, start * (keys.duration(0) / 6.0), incoming),
         Ends::Natural => {
             // No acceleration: a lies half way between the key and b.
             let end = product(keys.rotations[1], exp(-incoming));
@@ -95,9 +97,12 @@ fn first(keys: &Keys, incoming: DVec3) -> Curve {
 fn last_interval(keys: &Keys, last: usize, outgoing: DVec3) -> Curve {
     match keys.ends {
         Ends::Frozen => Curve::Hold,
-        Ends::Clamped { end, .. } => {
-            between(keys, last, outgoing, end * (keys.duration(last as isize) / 6.0))
-        }
+        Ends::Clamped { end, .. } => between(
+            keys,
+            last,
+            outgoing,
+            end * (keys.duration(last as isize) / 6.0),
+        ),
         Ends::Natural => {
             let start = product(keys.rotations[last], exp(outgoing));
             let half = log(step(start, keys.rotations[last + 1])) / 2.0;

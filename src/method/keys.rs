@@ -34,18 +34,25 @@ impl<'a> Keys<'a> {
         let mut rotations: Vec<DQuat> = track.keys.iter().map(|&key| unit(to_f64(key))).collect();
         let mut sign = 1.0;
         for i in 1..rotations.len() {
-            let (before, after) = (rotations[i - 1] * sign, rotations[i]);
-            let dot = dot(before, after) * sign; // of the keys as stored
+            let (before, after) = (rotations[i - 1], rotations[i]);
+            let stored_dot = dot(before, after) * sign;
             match interpolation.path {
-                Path::Shortest if dot < -DOT_NOISE => sign = -sign,
-                Path::AsAuthored if dot < -1.0 + f64::from(f32::EPSILON) => {
-                    return Err(InterpolationError::Antipodal { track: index, key: i - 1 });
+                Path::Shortest if stored_dot < -DOT_NOISE => sign = -sign,
+                Path::AsAuthored if stored_dot < -1.0 + f64::from(f32::EPSILON) => {
+                    return Err(InterpolationError::Antipodal {
+                        track: index,
+                        key: i - 1,
+                    });
                 }
                 _ => {}
             }
             rotations[i] = after * sign;
         }
-        let keys = Self { rotations, times: track.times, ends: interpolation.ends };
+        let keys = Self {
+            rotations,
+            times: track.times,
+            ends: interpolation.ends,
+        };
         if matches!(keys.ends, Ends::Loop) {
             keys.check_loop(index)?;
         }

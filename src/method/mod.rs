@@ -4,16 +4,16 @@
 //! keys into curves, one for each key interval; the few forms those curves have
 //! are what the kernels evaluate ([`Form`]). [`METHODS`] lists them all.
 
-mod bessel_overhauser;
 mod b_spline;
+mod bessel_overhauser;
 mod catmull_rom;
 pub(crate) mod curve;
 mod ends;
 mod keys;
 mod slerp;
 
-pub use bessel_overhauser::BESSEL_OVERHAUSER;
 pub use b_spline::B_SPLINE;
+pub use bessel_overhauser::BESSEL_OVERHAUSER;
 pub use catmull_rom::CATMULL_ROM;
 pub(crate) use curve::Curve;
 pub(crate) use keys::Keys;
@@ -111,7 +111,9 @@ impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::named(name).ok_or_else(|| UnknownMethod { name: name.to_owned() })
+        Self::named(name).ok_or_else(|| UnknownMethod {
+            name: name.to_owned(),
+        })
     }
 }
 
@@ -129,7 +131,11 @@ pub struct Interpolation {
 
 impl From<Method> for Interpolation {
     fn from(method: Method) -> Self {
-        Self { method, path: Path::default(), ends: Ends::default() }
+        Self {
+            method,
+            path: Path::default(),
+            ends: Ends::default(),
+        }
     }
 }
 

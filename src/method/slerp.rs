@@ -15,7 +15,10 @@ pub const SLERP: Method = Method {
     reference: reference::Kind::Slerp,
     curves: |keys, intervals, emit| {
         for i in intervals {
-            emit(Curve::Arc { from: keys.rotations[i], to: keys.rotations[i + 1] });
+            emit(Curve::Arc {
+                from: keys.rotations[i],
+                to: keys.rotations[i + 1],
+            });
         }
     },
 };

@@ -90,7 +90,8 @@ pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
             let angle = angle * random.between(0.7, 1.04);
             rotation = (rotation * DQuat::from_axis_angle(random.direction(), angle)).normalize();
         }
-        set.push("", &times, &quats).expect("unit keys at increasing times");
+        set.push("", &times, &quats)
+            .expect("unit keys at increasing times");
     }
     set
 }
@@ -105,7 +106,11 @@ fn hostile_key(random: &mut Random, rotation: DQuat) -> Quat {
         _ => {}
     }
     let key = DQuat::from_array(components).normalize();
-    let sign = if random.next().is_multiple_of(4) { -1.0 } else { 1.0 };
+    let sign = if random.next().is_multiple_of(4) {
+        -1.0
+    } else {
+        1.0
+    };
     Quat::from_array(key.to_array().map(|c| (sign * c) as f32))
 }
 

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Every test, on this machine as on CI. Installs what the tests need where it is
+# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+has_driver() { compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null; }
+has_layer() { compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null; }
+has_loader() { ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'; }
+
+if ! has_driver || ! has_layer || ! has_loader || ! command -v spirv-val >/dev/null; then
+    if command -v apt-get >/dev/null; then
+        sudo=""
+        [ "$(id -u)" -eq 0 ] || sudo="sudo"
+        echo "installing lavapipe, the validation layer and spirv-tools" >&2
+        $sudo apt-get update -qq
+        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
+            libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools >/dev/null
+    else
+        echo "the tests want a Vulkan loader, lavapipe, VK_LAYER_KHRONOS_validation and spirv-val;" >&2
+        echo "install your system's packages for them (Debian: libvulkan1 mesa-vulkan-drivers" >&2
+        echo "vulkan-validationlayers spirv-tools). Tests without them say so and compare nothing." >&2
+    fi
+fi
+
+# SwiftShader, a second and independent driver, comes inside Debian's chromium; where
+# it is there, every test that walks the devices walks it too.
+swiftshader=/usr/lib/chromium/vk_swiftshader_icd.json
+if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" ]; then
+    export VK_ADD_DRIVER_FILES="$swiftshader"
+fi
+
+if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
+if cargo clippy --version >/dev/null 2>&1; then
+    cargo clippy --all-targets --quiet -- -D warnings
+fi
+RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --quiet
+cargo test

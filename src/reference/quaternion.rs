@@ -1,0 +1,110 @@
+//! Quaternion algebra as in the books: `q = [w; v]`, Hamilton's product.
+
+use glam::{DQuat, DVec3};
+
+/// The vector part.
+pub(super) fn vector(q: DQuat) -> DVec3 {
+    DVec3::new(q.x, q.y, q.z)
+}
+
+pub(super) fn from_parts(w: f64, v: DVec3) -> DQuat {
+    DQuat::from_xyzw(v.x, v.y, v.z, w)
+}
+
+/// `a b = [a_w b_w - a_v·b_v; a_w b_v + b_w a_v + a_v × b_v]`.
+pub(super) fn multiply(a: DQuat, b: DQuat) -> DQuat {
+    let (u, v) = (vector(a), vector(b));
+    from_parts(a.w * b.w - u.dot(v), a.w * v + b.w * u + u.cross(v))
+}
+
+/// The inverse of a unit quaternion.
+pub(super) fn invert(q: DQuat) -> DQuat {
+    from_parts(q.w, -vector(q))
+}
+
+pub(super) fn inner(a: DQuat, b: DQuat) -> f64 {
+    a.w * b.w + vector(a).dot(vector(b))
+}
+
+pub(super) fn normalise(q: DQuat) -> DQuat {
+    q * inner(q, q).sqrt().recip()
+}
+
+/// `exp(a) = [cos|a|; sin|a| a/|a|]`.
+pub(super) fn exponential(a: DVec3) -> DQuat {
+    match a.length() {
+        0.0 => DQuat::IDENTITY,
+        angle => from_parts(angle.cos(), a * (angle.sin() / angle)),
+    }
+}
+
+/// `log q = v/|v| atan2(|v|, w)`: half of the rotation vector, length 0 to pi. At
+/// -1 it has no direction of its own and takes that of `or`.
+pub(super) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
+    let v = vector(q);
+    let sine = v.length();
+    if sine > 0.0 {
+        v / sine * sine.atan2(q.w)
+    } else if q.w < 0.0 {
+        or.normalize_or_zero() * std::f64::consts::PI
+    } else {
+        DVec3::ZERO
+    }
+}
+
+/// As [`logarithm_or`], without a direction at -1.
+pub(super) fn logarithm(q: DQuat) -> DVec3 {
+    logarithm_or(q, DVec3::ZERO)
+}
+
+/// `q^s = exp(s log q)`.
+pub(super) fn power(q: DQuat, s: f64) -> DQuat {
+    exponential(logarithm(q) * s)
+}
+
+/// Slerp, geometric: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`, `cos θ = a·b`
+/// (Shoemake 1985). The arc that the signs give; no shortest-path flip.
+pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    let chord = |q: DQuat| inner(q, q).sqrt();
+    let angle = 2.0 * chord(b - a).atan2(chord(b + a));
+    if angle < 1e-8 {
+        // Both weights' limits: the arc is straight to f64 rounding.
+        return normalise(a * (1.0 - t) + b * t);
+    }
+    let sine = angle.sin();
+    normalise(a * (((1.0 - t) * angle).sin() / sine) + b * ((t * angle).sin() / sine))
+}
+
+/// Slerp as `a (a⁻¹ b)^t`.
+pub fn slerp_from_start(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    multiply(a, power(multiply(invert(a), b), t))
+}
+
+/// Slerp as `(b a⁻¹)^t a`.
+pub fn slerp_from_start_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    multiply(power(multiply(b, invert(a)), t), a)
+}
+
+/// Slerp as `b (b⁻¹ a)^(1-t)`.
+pub fn slerp_from_end(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    multiply(b, power(multiply(invert(b), a), 1.0 - t))
+}
+
+/// Slerp as `(a b⁻¹)^(1-t) b`.
+pub fn slerp_from_end_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    multiply(power(multiply(a, invert(b)), 1.0 - t), b)
+}
+
+/// Normalised linear interpolation; no shortest-path flip.
+pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    normalise(a * (1.0 - t) + b * t)
+}
+
+/// The angle in radians (0 to pi) of the rotation between two rotations, accurate
+/// also when it is tiny. Neither needs to be exactly unit; `q` and `-q` are the
+/// same.
+pub fn angle_between(a: DQuat, b: DQuat) -> f64 {
+    let (a, b) = (normalise(a), normalise(b));
+    let (near, far) = ((a - b).length(), (a + b).length());
+    4.0 * near.min(far).atan2(near.max(far))
+}

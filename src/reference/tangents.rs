@@ -1,0 +1,85 @@
+//! Keys with their signs aligned, and the handles of the cubic methods.
+
+use glam::{DQuat, DVec3, Quat};
+
+use super::Kind;
+use super::quaternion::{exponential, inner, invert, logarithm, logarithm_or, multiply, normalise};
+use crate::method::Path;
+
+/// Below this, a dot product's sign is the rounding of f32 keys and says nothing.
+const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
+
+/// One track in f64.
+pub(super) struct Track {
+    pub(super) times: Vec<f64>,
+    pub(super) keys: Vec<DQuat>,
+}
+
+impl Track {
+    pub(super) fn new(path: Path, times: &[f64], keys: &[Quat]) -> Self {
+        let keys: Vec<DQuat> = keys.iter().map(|key| normalise(key.as_dquat())).collect();
+        let mut aligned: Vec<DQuat> = Vec::with_capacity(keys.len());
+        for (i, &key) in keys.iter().enumerate() {
+            let flipped = i > 0 && inner(keys[i - 1], aligned[i - 1]) < 0.0;
+            let turns = i > 0 && path == Path::Shortest && inner(keys[i - 1], key) < -SIGN_NOISE;
+            aligned.push(if flipped != turns { -key } else { key });
+        }
+        Self {
+            times: times.to_vec(),
+            keys: aligned,
+        }
+    }
+
+    pub(super) fn last(&self) -> usize {
+        self.keys.len() - 1
+    }
+
+    /// `q_i⁻¹ q_{i+1}`.
+    pub(super) fn difference(&self, i: usize) -> DQuat {
+        multiply(invert(self.keys[i]), self.keys[i + 1])
+    }
+
+    pub(super) fn step(&self, i: usize) -> f64 {
+        self.times[i + 1] - self.times[i]
+    }
+
+    /// The difference and the time step before key `i` (after it: the same at
+    /// `i`); a closed track continues across its seam.
+    fn side(&self, i: usize, before: bool) -> (DQuat, f64) {
+        let interval = match (i, before) {
+            (0, true) => self.last() - 1,
+            (i, true) => i - 1,
+            (i, false) if i == self.last() => 0,
+            (i, false) => i,
+        };
+        (self.difference(interval), self.step(interval))
+    }
+
+    /// The incoming and the outgoing handle of key `i`: `b_i = q_i exp(-in)`,
+    /// `a_i = q_i exp(out)`.
+    pub(super) fn handles(&self, kind: Kind, i: usize) -> (DVec3, DVec3) {
+        let (before, h_before) = self.side(i, true);
+        let (after, h_after) = self.side(i, false);
+        if kind == Kind::CatmullRom {
+            let direction = logarithm(before) + logarithm(after);
+            let sixth = logarithm_or(multiply(before, after), direction) / 6.0;
+            return (sixth, sixth);
+        }
+        let left = logarithm(before) * (h_after / h_before);
+        let right = logarithm(after) * (h_before / h_after);
+        let product = multiply(exponential(left), exponential(right));
+        let tangent = nearest_branch(product, left + right) / (h_before + h_after);
+        (tangent * (h_before / 3.0), tangent * (h_after / 3.0))
+    }
+}
+
+/// The logarithm of `q` nearest to `target` among all of its branches.
+fn nearest_branch(q: DQuat, target: DVec3) -> DVec3 {
+    let principal = logarithm_or(q, target);
+    let axis = match principal.length() {
+        length if length > 1e-9 => principal / length,
+        _ => target.normalize_or_zero(),
+    };
+    let nearest = (target - principal).dot(axis) / std::f64::consts::TAU;
+    principal + axis * (nearest.round() * std::f64::consts::TAU)
+}

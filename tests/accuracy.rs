@@ -1,0 +1,279 @@
+//! How far the engine is from the textbook, in radians, with stated bounds: slerp
+//! 6e-7 (largest) and 1e-7 (rms), cubic methods 2e-6 and 2e-7, norms 4e-7.
+
+mod support;
+
+use glam::{DQuat, Quat};
+use support::{Random, hostile_set};
+use tumble::reference::{Curve, angle_between};
+use tumble::{
+    Clip, Device, Ends, Engine, Form, FrameRate, Frames, Interpolation, METHODS, Path, Rotations,
+    TrackSet,
+};
+
+/// Largest and rms error in radians, largest | |q| - 1 |.
+#[derive(Debug, Default)]
+struct Errors {
+    largest: f64,
+    rms: f64,
+    norm: f64,
+}
+
+fn clip(set: &TrackSet, interpolation: Interpolation) -> Clip {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    engine.upload(set, interpolation).unwrap()
+}
+
+fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Errors {
+    let clip = clip(set, interpolation);
+    let timeline = clip.timeline(frames).unwrap();
+    let rotations = clip.evaluate(frames).unwrap();
+    let mut errors = Errors::default();
+    let Interpolation {
+        method, path, ends, ..
+    } = interpolation;
+    for (t, track) in set.tracks().enumerate() {
+        let curve = Curve::new(method.reference, path, ends, track.times, track.keys);
+        for s in 0..rotations.samples() {
+            let found = rotations.get(t, s).unwrap().as_dquat();
+            let error = angle_between(found, curve.rotation(timeline.time(t, s)));
+            // `max` would swallow NaN.
+            assert!(
+                error.is_finite(),
+                "{method}: track {t}, sample {s}: {found}"
+            );
+            errors.largest = errors.largest.max(error);
+            errors.rms += error * error;
+            errors.norm = errors.norm.max((found.length() - 1.0).abs());
+        }
+    }
+    errors.rms = (errors.rms / rotations.as_quats().len() as f64).sqrt();
+    errors
+}
+
+fn assert_within_bounds(set: &TrackSet, interpolation: Interpolation, frames: &Frames, what: &str) {
+    let (largest, rms) = match interpolation.method.form {
+        Form::Arc => (6e-7, 1e-7),
+        _ => (2e-6, 2e-7),
+    };
+    let errors = errors(set, interpolation, frames);
+    println!("{}, {what}: {errors:?}", interpolation.method);
+    assert!(
+        errors.largest <= largest && errors.rms <= rms && errors.norm <= 4e-7,
+        "{interpolation:?}, {what}: {errors:?}"
+    );
+}
+
+const RATES: [&str; 5] = ["25", "60", "120", "30000/1001", "999"];
+
+fn rate(text: &str) -> FrameRate {
+    text.parse().unwrap()
+}
+
+/// Chains that turn by up to `step` radians between keys `start` seconds on.
+fn smooth_set(seed: u64, start: f64, step: f64) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    for _ in 0..48 {
+        let (mut times, mut keys) = (Vec::new(), Vec::new());
+        let (mut time, mut rotation) = (start, random.rotation());
+        for _ in 0..26 {
+            times.push(time);
+            keys.push(rotation.as_quat());
+            time += 0.8 * random.between(0.5, 1.5);
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+            rotation = (rotation * turn).normalize();
+        }
+        set.push("", &times, &keys).unwrap();
+    }
+    set
+}
+
+#[test]
+fn every_method_is_within_its_bounds_for_steps_up_to_half_a_turn() {
+    let set = smooth_set(1, 0.0, std::f64::consts::PI);
+    for method in METHODS {
+        for fps in RATES {
+            assert_within_bounds(&set, method.into(), &Frames::rate(rate(fps)), fps);
+        }
+    }
+}
+
+/// Catches a time kept in f32: at 24 hours its unit is 8 ms.
+#[test]
+fn accuracy_does_not_decay_by_hour_24() {
+    let set = smooth_set(2, 86_400.0, 1.6);
+    for method in METHODS {
+        for fps in RATES {
+            assert_within_bounds(&set, method.into(), &Frames::rate(rate(fps)), "24 h");
+        }
+    }
+}
+
+/// A clip of 24 hours sampled in its last second.
+#[test]
+fn accuracy_does_not_decay_along_a_day() {
+    let mut random = Random(6);
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..=86_400).map(f64::from).collect();
+    let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+    set.push("", &times, &keys).unwrap();
+    for method in METHODS {
+        for fps in RATES {
+            let frames = Frames::rate(rate(fps)).between(86_390.0, 86_400.0);
+            assert_within_bounds(
+                &set,
+                method.into(),
+                &frames,
+                "the last ten seconds of a day",
+            );
+        }
+    }
+}
+
+/// One-frame gaps beside long ones, tiny angles, wild tangents: those too.
+#[test]
+fn hostile_keys_are_within_the_bounds() {
+    for seed in 0..4 {
+        let set = hostile_set(seed, 64);
+        for method in METHODS {
+            let frames = Frames::fps(60).between(-1.0, 40.0);
+            assert_within_bounds(&set, method.into(), &frames, "hostile keys");
+        }
+    }
+}
+
+#[test]
+fn arbitrary_times_are_within_the_bounds() {
+    let mut random = Random(3);
+    let set = smooth_set(3, 1e5, 2.0);
+    let times = (0..2000)
+        .map(|_| 1e5 + random.between(-1.0, 25.0))
+        .collect();
+    let frames = Frames::at(times);
+    for method in METHODS {
+        assert_within_bounds(&set, method.into(), &frames, "arbitrary times");
+    }
+}
+
+#[test]
+fn every_option_is_within_the_bounds() {
+    let set = smooth_set(4, 0.0, 2.0);
+    let spin = glam::DVec3::new(0.5, -1.0, 0.25);
+    for method in METHODS {
+        for ends in [
+            Ends::Natural,
+            Ends::Clamped {
+                start: spin,
+                end: -spin,
+            },
+            Ends::Frozen,
+        ] {
+            let interpolation = Interpolation {
+                ends,
+                ..method.into()
+            };
+            assert_within_bounds(&set, interpolation, &Frames::fps(60), "ends");
+        }
+        let interpolation = Interpolation {
+            path: Path::AsAuthored,
+            ..method.into()
+        };
+        assert_within_bounds(&set, interpolation, &Frames::fps(60), "as authored");
+    }
+    let mut closed = TrackSet::new();
+    for track in set.tracks() {
+        let mut keys = track.keys.to_vec();
+        *keys.last_mut().unwrap() = -keys[0];
+        closed.push("", track.times, &keys).unwrap();
+    }
+    for method in METHODS {
+        let interpolation = Interpolation {
+            ends: Ends::Loop,
+            ..method.into()
+        };
+        assert_within_bounds(&closed, interpolation, &Frames::fps(60), "loop");
+    }
+}
+
+fn bits(q: Quat) -> [u32; 4] {
+    q.to_array().map(f32::to_bits)
+}
+
+/// Not nearly: the key's own bits, on frames and at explicit times, at hour 24 too,
+/// whatever the sign it was stored with.
+#[test]
+fn keys_are_reproduced_exactly() {
+    for start in [0.0, -3.5, 86_400.0] {
+        let mut random = Random(9);
+        let mut set = TrackSet::new();
+        for _ in 0..20 {
+            let times: Vec<f64> = (0..26).map(|i| start + f64::from(i) * 0.8).collect();
+            let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+            set.push("", &times, &keys).unwrap();
+        }
+        for method in METHODS.into_iter().filter(|method| method.interpolates) {
+            for ends in [Ends::Parabolic, Ends::Natural, Ends::Frozen] {
+                let clip = clip(
+                    &set,
+                    Interpolation {
+                        ends,
+                        ..method.into()
+                    },
+                );
+                let frames = clip.evaluate(&Frames::fps(25)).unwrap();
+                let times = clip
+                    .evaluate(&Frames::at(set.track(0).times.to_vec()))
+                    .unwrap();
+                for (t, track) in set.tracks().enumerate() {
+                    for (k, &key) in track.keys.iter().enumerate() {
+                        let found = frames.get(t, 20 * k).unwrap();
+                        assert_eq!(bits(found), bits(key), "{method}, track {t}, key {k}");
+                        assert_eq!(bits(times.get(t, k).unwrap()), bits(key));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn end_values_are_held_outside_the_keys() {
+    let mut set = TrackSet::new();
+    let keys = [0.0, 1.0, 0.4, 0.9].map(Quat::from_rotation_x);
+    set.push("short", &[1.0, 2.0, 3.0, 4.0], &keys).unwrap();
+    set.push("single", &[2.5], &keys[1..2]).unwrap();
+    for method in METHODS {
+        let clip = clip(&set, method.into());
+        let frames = clip.evaluate(&Frames::fps(10).between(0.0, 9.0)).unwrap();
+        let held = |a, b| bits(frames.get(0, a).unwrap()) == bits(frames.get(0, b).unwrap());
+        assert!(held(0, 9) && held(40, 90) && !held(9, 15), "{method}");
+        for s in 0..frames.samples() {
+            assert_eq!(bits(frames.get(1, s).unwrap()), bits(keys[1]), "{method}");
+        }
+        if method.interpolates {
+            assert_eq!(bits(frames.get(0, 0).unwrap()), bits(keys[0]));
+            assert_eq!(bits(frames.get(0, 90).unwrap()), bits(keys[3]));
+        }
+    }
+}
+
+/// `times[k] = start + k / fps` means the samples that frames mean.
+#[test]
+fn times_of_frames_are_within_rounding_of_frames() {
+    let set = smooth_set(11, 0.0, 2.0);
+    for method in METHODS {
+        let clip = clip(&set, method.into());
+        let frames = Frames::fps(60);
+        let timeline = clip.timeline(&frames).unwrap();
+        let times = (0..timeline.len()).map(|s| timeline.time(0, s)).collect();
+        let by_frame: Rotations = clip.evaluate(&frames).unwrap();
+        let by_time = clip.evaluate(&Frames::at(times)).unwrap();
+        for (a, b) in by_frame.as_quats().iter().zip(by_time.as_quats()) {
+            assert!(
+                angle_between(a.as_dquat(), b.as_dquat()) < 2e-6,
+                "{method}: {a} {b}"
+            );
+        }
+    }
+}
