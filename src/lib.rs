@@ -47,6 +47,8 @@ mod clip;
 mod clock;
 mod cpu;
 mod engine;
+pub mod formats;
+pub mod generate;
 mod gpu;
 pub mod method;
 mod numeric;

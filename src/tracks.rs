@@ -317,7 +317,7 @@ fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackErro
 
 /// f32 rounding moves a unit quaternion's squared norm by at most 4 × 2^-24 or
 /// so; below this the key is kept as it is, so that loading is idempotent.
-const ROUNDING: f64 = 4.0e-7;
+pub(crate) const ROUNDING: f64 = 4.0e-7;
 
 fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = to_f64(quat);

@@ -167,8 +167,8 @@ impl Submission {
         unsafe {
             self.device
                 .raw
-                .cmd_copy_buffer(self.commands, from.raw, to.raw, &region)
-        };
+                .cmd_copy_buffer(self.commands, from.raw, to.raw, &region);
+        }
     }
 
     /// Records that what was written before `from` is seen after `to`.

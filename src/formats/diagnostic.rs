@@ -1,0 +1,145 @@
+//! What is wrong with an input, where, and what to do: every message that a file
+//! can cause, each with a code that is documented here.
+
+use std::fmt;
+
+/// Whether an input is refused, or read with a reservation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Severity {
+    /// The input is refused.
+    Error,
+    /// The input is read; something about it is probably not meant.
+    Warning,
+}
+
+/// One thing to say about an input.
+///
+/// Displayed as `FILE:LINE:COLUMN: error[CODE]: what is wrong, the value, the fix`.
+/// Lines and columns count from 1, columns in characters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// The input's name, as it was given.
+    pub file: String,
+    /// Line and column, where the fault has a place.
+    pub place: Option<(u64, u64)>,
+    /// Which fault.
+    pub code: Code,
+    /// What is wrong, in words.
+    pub message: String,
+    /// How often it occurs; the place is that of the first time.
+    pub count: u64,
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.file)?;
+        if let Some((line, column)) = self.place {
+            write!(f, "{line}:{column}:")?;
+        }
+        let severity = match self.code.severity() {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        write!(f, " {severity}[{}]: {}", self.code, self.message)?;
+        if self.count > 1 {
+            write!(f, " ({} times; this is the first)", self.count)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+macro_rules! codes {
+    ($($variant:ident = $code:literal, $title:literal, $explanation:literal;)+) => {
+        /// Every fault of an input. Codes starting with `W` are warnings.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
+        pub enum Code {
+            $(#[doc = concat!($title, ". ", $explanation)] $variant,)+
+        }
+
+        impl Code {
+            /// Every code, in order.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// The code, such as `E012`.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $code,)+ }
+            }
+
+            /// What it stands for, in a few words.
+            pub fn title(self) -> &'static str {
+                match self { $(Self::$variant => $title,)+ }
+            }
+
+            /// Why it is refused or warned of, and what to do.
+            pub fn explanation(self) -> &'static str {
+                match self { $(Self::$variant => $explanation,)+ }
+            }
+        }
+    };
+}
+
+codes! {
+    Open = "E001", "the input cannot be read", "The system refused to open or read it; its reason is given.";
+    NotAFile = "E002", "not a file", "Directories, sockets and devices hold no keyframes. A named pipe is read only when that is asked for; `-` reads standard input.";
+    Changed = "E003", "the file changed while it was read", "Its length or time of change differ between start and end of reading; read it again when its writer is done.";
+    OtherFormat = "E004", "another format", "The first bytes are those of another format than `.dat`.";
+    Encoding = "E005", "not plain text", "A `.dat` file is ASCII or UTF-8 text; UTF-16, NUL bytes and invalid UTF-8 are refused.";
+    Character = "E006", "a character that does not belong", "Only printable ASCII, blanks and tabs make up numbers; no-break spaces, form feeds and bare carriage returns are refused because editors hide them.";
+    LineTooLong = "E007", "a line is too long", "No real set has lines this long; the file is probably not keyframe data.";
+    FileTooLong = "E008", "the file is too long", "The limit guards against endless inputs; raise it if the file is meant.";
+    Empty = "E010", "an empty file", "There is not even a header.";
+    NoHeader = "E011", "no header", "The first line is `# <boxes> <box length>`, such as `# 4 3.0`.";
+    HeaderShort = "E012", "the header lacks a number", "The header has the number of boxes and the length of a box.";
+    Boxes = "E013", "not a number of boxes", "The number of boxes is a whole number from 1 to 65536, in plain digits.";
+    BoxLength = "E014", "not a box length", "The length of a box is a finite number.";
+    NoKeys = "E015", "no keys", "A set has at least one key line behind its header.";
+    SecondHeader = "E016", "a second header", "Two sets in one file? Split it: one header, then keys.";
+    Columns = "E020", "the wrong number of columns", "A key line has a time and four numbers for each box: `time w x y z w x y z …`.";
+    Number = "E021", "not a number", "Numbers are decimal, with a point, and may have an exponent: `-1.25e-3`.";
+    NotFinite = "E022", "not finite", "NaN and infinity are no rotation and no time.";
+    TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
+    TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
+    Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of it are normalised; others are more likely a mistake, such as a missing column.";
+    TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line.";
+    Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
+    ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
+    MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
+    HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
+    BoxLengthSign = "W004", "a box length that is not positive", "Rotations do not need it; drawing the boxes does.";
+    BlankLine = "W005", "a blank line between keys", "It is skipped; is something missing there?";
+    MaybeCut = "W006", "the last number may be cut", "The file ends without a line end, and its last number has fewer digits than all others.";
+    Tiny = "W007", "a number too small for f32", "It becomes 0.";
+    NormOff = "W008", "a quaternion far from unit length", "It is normalised.";
+    Order = "W009", "components may be in the order x y z w", "Every fourth column is near 1 and the first near 0, as when small rotations are written with w last. This format has w first.";
+    Gap = "W010", "an unusual gap between times", "Under 1e-9 s or over 1e9 s: are the times seconds?";
+    OneKey = "W011", "only one key", "The set stands still.";
+    HalfTurn = "W012", "neighbouring keys 180° apart", "Both ways round are equally short; the signs as stored decide.";
+}
+
+impl Code {
+    /// The code with that name, in any case.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|code| code.name().eq_ignore_ascii_case(name))
+    }
+
+    /// Whether it refuses the input.
+    pub fn severity(self) -> Severity {
+        if self.name().starts_with('W') {
+            Severity::Warning
+        } else {
+            Severity::Error
+        }
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}

@@ -1,0 +1,157 @@
+//! Numbers as `.dat` files have them, strictly: what is not plainly a decimal
+//! number is refused with a hint at what it looks like.
+
+use super::diagnostic::Code;
+
+/// No number needs more characters.
+const MAX_LENGTH: usize = 64;
+
+/// A number that is kept, perhaps as 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Number {
+    pub(super) value: f64,
+    /// It was not 0 but is too small for f32.
+    pub(super) vanished: bool,
+}
+
+/// Why a token is no number: code and message.
+pub(super) type Refusal = (Code, String);
+
+/// Reads one token.
+pub(super) fn parse(token: &str) -> Result<Number, Refusal> {
+    if token.len() > MAX_LENGTH {
+        let start: String = token.chars().take(16).collect();
+        let message = format!(
+            "`{start}…` has {} characters; a number has at most {MAX_LENGTH}",
+            token.chars().count()
+        );
+        return Err((Code::TokenTooLong, message));
+    }
+    if !is_decimal(token) {
+        return Err(refuse(token));
+    }
+    // Rust's parser takes exactly this grammar, correctly rounded.
+    let value: f64 = token.parse().map_err(|_| refuse(token))?;
+    if value.abs() > f64::from(f32::MAX) {
+        let message =
+            format!("`{token}` is too large; the largest f32 is 3.4e38, check the exponent");
+        return Err((Code::TooLarge, message));
+    }
+    let written_zero = !mantissa(token).bytes().any(|b| (b'1'..=b'9').contains(&b));
+    let vanished = value.abs() < f64::from(f32::MIN_POSITIVE) && !written_zero;
+    let value = if vanished { 0.0 } else { value };
+    Ok(Number { value, vanished })
+}
+
+fn mantissa(token: &str) -> &str {
+    token.split(['e', 'E']).next().unwrap_or(token)
+}
+
+/// `[+-] digits [. digits] [e [+-] digits]`, with a digit on either side of the
+/// point.
+fn is_decimal(token: &str) -> bool {
+    let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
+    let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, Some(exponent)),
+        None => (unsigned, None),
+    };
+    let digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let exponent_fits = exponent.is_none_or(|exponent| {
+        let unsigned = exponent.strip_prefix(['+', '-']).unwrap_or(exponent);
+        !unsigned.is_empty() && digits(unsigned)
+    });
+    digits(whole) && digits(fraction) && !(whole.is_empty() && fraction.is_empty()) && exponent_fits
+}
+
+fn refuse(token: &str) -> Refusal {
+    let lower = token.to_ascii_lowercase();
+    let bare = lower.trim_start_matches(['+', '-']);
+    let words = ["nan", "inf", "infinity", "ind", "qnan", "snan"];
+    if words.contains(&bare) || bare.contains('#') || bare.starts_with("nan(") {
+        let message = format!("`{token}` is not finite; remove or repair this key");
+        return (Code::NotFinite, message);
+    }
+    let hint = if bare.starts_with("0x") {
+        "hexadecimal is not read; write it in decimal"
+    } else if token.contains(',') {
+        "use a point for decimals and blanks between columns"
+    } else if token.contains('_') {
+        "remove the underscores"
+    } else if is_decimal(token.trim_end_matches(['f', 'F', 'l', 'L'])) {
+        "remove the suffix"
+    } else if is_decimal(&lower.replacen('d', "e", 1)) {
+        "write the exponent with e"
+    } else if is_glued(&lower) {
+        "two numbers seem glued together; put a blank between them"
+    } else {
+        "numbers look like -1.25 or 3.4e-5"
+    };
+    (Code::Number, format!("`{token}` is not a number; {hint}"))
+}
+
+/// A sign in the middle that no exponent explains, or a second point.
+fn is_glued(lower: &str) -> bool {
+    let signs = lower
+        .char_indices()
+        .skip(1)
+        .filter(|&(i, c)| matches!(c, '+' | '-') && !lower[..i].ends_with('e'));
+    let numeric = lower
+        .bytes()
+        .all(|b| b.is_ascii_digit() || b"+-.e".contains(&b));
+    numeric && (signs.count() > 0 || lower.matches('.').count() > 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ordinary_and_odd_numbers_are_read() {
+        for (token, value) in [
+            ("+1", 1.0),
+            (".5", 0.5),
+            ("5.", 5.0),
+            ("00001", 1.0),
+            ("-0", 0.0),
+            ("-1.25E-3", -0.00125),
+            ("0e999", 0.0),
+        ] {
+            let number = parse(token).unwrap();
+            assert_eq!((number.value, number.vanished), (value, false), "{token}");
+        }
+        for token in ["1e-400", "1e-39", "-1.4e-45"] {
+            let vanished = Number {
+                value: 0.0,
+                vanished: true,
+            };
+            assert_eq!(parse(token), Ok(vanished), "{token}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_with_a_hint() {
+        for (token, code, hint) in [
+            ("nan", Code::NotFinite, "not finite"),
+            ("-inf", Code::NotFinite, "not finite"),
+            ("1.#QNAN", Code::NotFinite, "not finite"),
+            ("1e400", Code::TooLarge, "too large"),
+            ("1e39", Code::TooLarge, "too large"),
+            ("0x1p3", Code::Number, "hexadecimal"),
+            ("1_000", Code::Number, "underscores"),
+            ("1.5f", Code::Number, "suffix"),
+            ("1d5", Code::Number, "with e"),
+            ("0,5", Code::Number, "point"),
+            ("0.0-7.5", Code::Number, "glued"),
+            ("1.2.3", Code::Number, "glued"),
+            (".", Code::Number, "look like"),
+            ("1e", Code::Number, "look like"),
+            ("abc", Code::Number, "look like"),
+        ] {
+            let (found, message) = parse(token).unwrap_err();
+            assert_eq!(found, code, "{token}");
+            assert!(message.contains(hint), "{token}: {message}");
+        }
+        assert_eq!(parse(&"1".repeat(65)).unwrap_err().0, Code::TokenTooLong);
+    }
+}

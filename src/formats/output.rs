@@ -1,0 +1,285 @@
+//! Files are written whole or not at all: under a temporary name in their own
+//! directory, then renamed. Standard output is the exception, for pipes.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// Why an output cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// It is there already.
+    #[error("{}: exists; give --overwrite to replace it", path.display())]
+    Exists {
+        /// The output.
+        path: PathBuf,
+    },
+    /// It is a directory.
+    #[error("{}: is a directory; give a file in it", path.display())]
+    Directory {
+        /// The output.
+        path: PathBuf,
+    },
+    /// Its directory is not there.
+    #[error("{}: its directory {} does not exist; create it first", path.display(), parent.display())]
+    NoDirectory {
+        /// The output.
+        path: PathBuf,
+        /// The directory.
+        parent: PathBuf,
+    },
+    /// It is one of the inputs, perhaps by another name.
+    #[error("{}: is the input {}; give another output", path.display(), input.display())]
+    IsInput {
+        /// The output.
+        path: PathBuf,
+        /// The input.
+        input: PathBuf,
+    },
+    /// Writing failed; what was there before is untouched.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The output.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl OutputError {
+    /// Whether the reader of a pipe went away.
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+/// An output being written. Dropped before [`Output::commit`], it leaves nothing
+/// behind.
+pub struct Output {
+    path: PathBuf,
+    writer: Sink,
+}
+
+enum Sink {
+    File {
+        temporary: BufWriter<NamedTempFile>,
+        overwrite: bool,
+    },
+    Standard(BufWriter<io::Stdout>),
+}
+
+const BUFFER: usize = 1 << 18;
+
+impl Output {
+    /// Opens a temporary file beside `path`, after every check that can be made
+    /// before any work; `-` is standard output.
+    ///
+    /// # Errors
+    /// An [`OutputError`]; nothing has been touched then.
+    pub fn create(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
+        let path = path.to_owned();
+        if path.as_os_str() == "-" {
+            let writer = Sink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
+            return Ok(Self { path, writer });
+        }
+        check_target(&path, overwrite, inputs)?;
+        let parent = parent(&path);
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".tumble-").suffix(".part");
+        #[cfg(unix)]
+        {
+            // As `File::create` does: readable by all, less the umask.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let temporary = builder
+            .tempfile_in(&parent)
+            .map_err(|source| OutputError::Write {
+                path: path.clone(),
+                source,
+            })?;
+        let temporary = BufWriter::with_capacity(BUFFER, temporary);
+        Ok(Self {
+            path,
+            writer: Sink::File {
+                temporary,
+                overwrite,
+            },
+        })
+    }
+
+    /// The temporary file, to remove when the process is stopped by a signal.
+    pub fn temporary_path(&self) -> Option<&Path> {
+        match &self.writer {
+            Sink::File { temporary, .. } => Some(temporary.get_ref().path()),
+            Sink::Standard(_) => None,
+        }
+    }
+
+    /// Writes out everything and gives the file its name.
+    ///
+    /// # Errors
+    /// When the system cannot; the old file, if any, is intact then.
+    pub fn commit(self) -> Result<(), OutputError> {
+        let Self { path, writer } = self;
+        let named = |source| OutputError::Write {
+            path: path.clone(),
+            source,
+        };
+        match writer {
+            Sink::Standard(mut writer) => writer.flush().map_err(named),
+            Sink::File {
+                temporary,
+                overwrite,
+            } => {
+                let temporary = temporary.into_inner().map_err(|e| named(e.into_error()))?;
+                temporary.as_file().sync_all().map_err(named)?;
+                let persisted = if overwrite {
+                    temporary.persist(&path)
+                } else {
+                    temporary.persist_noclobber(&path)
+                };
+                match persisted {
+                    Ok(_) => Ok(()),
+                    Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
+                        Err(OutputError::Exists { path: path.clone() })
+                    }
+                    Err(error) => Err(named(error.error)),
+                }
+            }
+        }
+    }
+
+    /// An error of writing to this output.
+    pub fn error(&self, source: io::Error) -> OutputError {
+        OutputError::Write {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.writer {
+            Sink::File { temporary, .. } => temporary.write(bytes),
+            Sink::Standard(writer) => writer.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.writer {
+            Sink::File { temporary, .. } => temporary.flush(),
+            Sink::Standard(writer) => writer.flush(),
+        }
+    }
+}
+
+/// Every check that needs no writing.
+///
+/// # Errors
+/// An [`OutputError`].
+pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    let parent = parent(path);
+    if !parent.is_dir() {
+        let path = path.to_owned();
+        return Err(OutputError::NoDirectory { path, parent });
+    }
+    if path.is_dir() {
+        return Err(OutputError::Directory {
+            path: path.to_owned(),
+        });
+    }
+    // Also through links: both names lead to one file.
+    if let Ok(own) = fs::canonicalize(path) {
+        let same = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == own);
+        if let Some(input) = inputs.iter().find(same) {
+            return Err(OutputError::IsInput {
+                path: path.to_owned(),
+                input: input.clone(),
+            });
+        }
+    }
+    if !overwrite && fs::symlink_metadata(path).is_ok() {
+        return Err(OutputError::Exists {
+            path: path.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap();
+        entries
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn a_file_appears_whole_or_not_at_all() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("out");
+        let mut output = Output::create(&path, false, &[]).unwrap();
+        output.write_all(b"half").unwrap();
+        drop(output);
+        assert_eq!(names(directory.path()), Vec::<String>::new());
+        let mut output = Output::create(&path, false, &[]).unwrap();
+        output.write_all(b"whole").unwrap();
+        output.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(names(directory.path()), ["out"]);
+    }
+
+    #[test]
+    fn an_existing_file_survives_unless_overwriting_succeeds() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("out");
+        fs::write(&path, "old").unwrap();
+        let refused = Output::create(&path, false, &[]);
+        assert!(matches!(refused, Err(OutputError::Exists { .. })));
+        let mut output = Output::create(&path, true, &[]).unwrap();
+        output.write_all(b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        output.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn impossible_targets_are_refused_before_any_work() {
+        let directory = tempfile::tempdir().unwrap();
+        let input = directory.path().join("in");
+        fs::write(&input, "keys").unwrap();
+        let inputs = [input.clone()];
+        let create = |path: &Path| Output::create(path, true, &inputs).err();
+        assert!(matches!(
+            create(directory.path()),
+            Some(OutputError::Directory { .. })
+        ));
+        let missing = directory.path().join("none/out");
+        assert!(matches!(
+            create(&missing),
+            Some(OutputError::NoDirectory { .. })
+        ));
+        assert!(matches!(create(&input), Some(OutputError::IsInput { .. })));
+        #[cfg(unix)]
+        {
+            let link = directory.path().join("link");
+            std::os::unix::fs::symlink(&input, &link).unwrap();
+            assert!(matches!(create(&link), Some(OutputError::IsInput { .. })));
+        }
+    }
+}
