@@ -1,0 +1,254 @@
+//! Numbers that other projects' tests expect. Only numbers are taken; each names
+//! where it comes from. Quaternions are written `w x y z`.
+
+use glam::{DQuat, DVec3, Quat};
+use tumble::reference::{Curve, Kind, angle_between, nlerp, slerp};
+use tumble::{Device, Ends, Engine, Frames, Interpolation, Path, TrackSet, method};
+
+fn q(wxyz: [f64; 4]) -> DQuat {
+    DQuat::from_xyzw(wxyz[1], wxyz[2], wxyz[3], wxyz[0])
+}
+
+fn about(axis: [f64; 3], degrees: f64) -> DQuat {
+    DQuat::from_axis_angle(DVec3::from_array(axis).normalize(), degrees.to_radians())
+}
+
+fn assert_near(found: DQuat, expected: [f64; 4], tolerance: f64) {
+    let expected = q(expected);
+    let off = (found - expected).length();
+    assert!(off <= tolerance, "{found} is not {expected}: {off:e}");
+}
+
+/// The engine's slerp over keys in f32, at any times.
+fn engine_slerp(path: Path, times: &[f64], keys: &[DQuat], at: &[f64]) -> Vec<DQuat> {
+    let mut set = TrackSet::new();
+    let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
+    set.push("", times, &keys).unwrap();
+    let interpolation = Interpolation {
+        path,
+        ..method::SLERP.into()
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let rotations = engine
+        .evaluate(&set, interpolation, &Frames::at(at.to_vec()))
+        .unwrap();
+    rotations.as_quats().iter().map(|q| q.as_dquat()).collect()
+}
+
+/// mosra/magnum, src/Magnum/Math/Test/QuaternionTest.cpp (MIT).
+#[test]
+fn magnum_slerp_and_lerp() {
+    let (a, b) = (about([1.0; 3], 15.0), about([1.0, 0.0, 0.0], 23.0));
+    let expected = [0.9904423, 0.1191653, 0.0491109, 0.0491109];
+    assert_near(slerp(a, b, 0.35), expected, 1e-5);
+    assert_near(
+        nlerp(a, b, 0.35),
+        [0.990445, 0.119127, 0.049134, 0.049134],
+        1e-5,
+    );
+    let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.35]);
+    assert_near(engine[0], expected, 1e-5);
+}
+
+/// mosra/magnum, the same file (MIT). Its shortest path negates the first key, ours
+/// the second, so the sign of its result is the opposite of ours.
+#[test]
+fn magnum_long_and_short_path() {
+    let (a, b) = (about([0.0, 0.0, 1.0], 0.0), about([0.0, 0.0, 1.0], 225.0));
+    let (long, short) = (
+        [0.881921, 0.0, 0.0, 0.471397],
+        [0.95694, 0.0, 0.0, -0.290285],
+    );
+    assert_near(slerp(a, b, 0.25), long, 1e-5);
+    assert_near(slerp(a, -b, 0.25), short, 1e-5);
+    assert_near(nlerp(a, b, 0.25), [0.942977, 0.0, 0.0, 0.332859], 1e-5);
+    assert_near(nlerp(a, -b, 0.25), [0.964667, 0.0, 0.0, -0.26347], 1e-5);
+    let times = [0.0, 1.0];
+    assert_near(
+        engine_slerp(Path::AsAuthored, &times, &[a, b], &[0.25])[0],
+        long,
+        1e-5,
+    );
+    assert_near(
+        engine_slerp(Path::Shortest, &times, &[a, b], &[0.25])[0],
+        short,
+        1e-5,
+    );
+}
+
+/// mosra/magnum-plugins, src/MagnumPlugins/GltfImporter/Test, animation-patching (MIT):
+/// rotations about z by 45° a key, some stored with the other sign.
+#[test]
+fn magnum_shortest_path_patching() {
+    let keys = [
+        [-0.382683, 0.0, 0.0, 0.92388],
+        [-0.707107, 0.0, 0.0, 0.707107],
+        [-0.92388, 0.0, 0.0, 0.382683],
+        [-1.0, 0.0, 0.0, 0.0],
+        [0.92388, 0.0, 0.0, 0.382683],
+        [0.707107, 0.0, 0.0, 0.707107],
+        [-0.382683, 0.0, 0.0, -0.92388],
+        [0.0, 0.0, 0.0, -1.0],
+        [-0.382683, 0.0, 0.0, 0.92388],
+    ]
+    .map(q);
+    let times: Vec<f64> = (0..9).map(f64::from).collect();
+    let between: Vec<f64> = (0..8).map(|i| f64::from(i) + 0.5).collect();
+    let short = [247.5, 292.5, 337.5, 22.5, 67.5, 112.5, 157.5, 202.5];
+    let raw = [247.5, 292.5, 337.5, 202.5, 67.5, -67.5, -202.5, -337.5];
+    for (path, expected) in [(Path::Shortest, short), (Path::AsAuthored, raw)] {
+        let found = engine_slerp(path, &times, &keys, &between);
+        for (rotation, degrees) in found.into_iter().zip(expected) {
+            let off = angle_between(rotation, about([0.0, 0.0, 1.0], degrees));
+            assert!(
+                off.to_degrees() < 1e-3,
+                "{path:?}: {rotation} at {degrees}°"
+            );
+        }
+    }
+}
+
+/// mrdoob/three.js, test/unit/src/math/Quaternion.tests.js (MIT).
+#[test]
+fn three_js_slerp() {
+    let a = q([
+        0.5185120064806223,
+        0.6753410084407496,
+        0.4087830051091744,
+        0.32856700410659473,
+    ]);
+    let b = q([
+        0.5001871596632682,
+        0.6602792107657797,
+        0.43647413932562285,
+        0.35119011210236006,
+    ]);
+    assert!((slerp(a, b, 0.0) - a).length() < 2.3e-16);
+    assert!((slerp(a, b, 1.0) - b).length() < 2.3e-16);
+    let middle = slerp(a, b, 0.5);
+    assert!((middle.dot(a) - middle.dot(b)).abs() <= 2.3e-16);
+    for t in [0.25, 0.5, 0.75] {
+        assert!((slerp(a, b, t).length() - 1.0).abs() <= 2.3e-16);
+    }
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let (x, z) = (q([0.0, 1.0, 0.0, 0.0]), q([0.0, 0.0, 0.0, 1.0]));
+    assert_near(slerp(x, z, 0.5), [0.0, half, 0.0, half], 1e-15);
+    let (left, right) = (q([half, 0.0, half, 0.0]), q([half, 0.0, -half, 0.0]));
+    assert_near(slerp(left, right, 0.5), [1.0, 0.0, 0.0, 0.0], 1e-15);
+}
+
+/// rustgd/cgmath issue 498: nearly opposite quaternions.
+#[test]
+fn cgmath_nearly_opposite_keys() {
+    let a = q([0.00052311074, 0.9999999, 0.00014682197, -1.6342687e-05]);
+    let b = q([0.019973433, -0.99980056, -0.00015678025, 1.3882192e-05]);
+    let expected = [
+        -0.009725671261548996,
+        0.9999527335166931,
+        0.00015180908667389303,
+        -1.5113232620933559e-05,
+    ];
+    assert_near(slerp(a, -b, 0.5), expected, 2e-6);
+    let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.5]);
+    assert_near(engine[0], expected, 2e-6);
+}
+
+/// redorav/hlslpp issue 68: a pair so close that an acos became NaN; google/filament
+/// pull request 3478: keys a little off unit length, on opposite sides.
+#[test]
+fn pairs_that_broke_others_give_unit_rotations() {
+    let a = q([-0.999254525, -0.011218898, -0.0367633253, -0.00361495349]);
+    let b = q([-0.999251783, -0.0114078531, -0.0367971063, -0.00342923636]);
+    let found = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.691265166])[0];
+    assert!((found.length() - 1.0).abs() < 4e-7);
+    assert!((slerp(a, b, 0.691265166).length() - 1.0).abs() < 1e-15);
+
+    let a = q([0.19, 0.76, 0.39, 0.51]).normalize();
+    let b = q([-0.17, -0.72, -0.45, -0.49]).normalize();
+    let found = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.5])[0];
+    assert!((found.length() - 1.0).abs() < 4e-7);
+    for end in [a, b] {
+        assert!(angle_between(found, end).to_degrees() < 6.0);
+    }
+}
+
+/// KhronosGroup/glTF-Sample-Models, BoxAnimated (CC-BY 4.0): keys 180° apart, whose
+/// dot product of -4.5e-11 is noise; the signs as stored decide, on every device.
+#[test]
+fn box_animated_turns_as_its_signs_say() {
+    let keys = [
+        q([-1.0, 0.0, 0.0, 0.0]),
+        q([4.4896593387466766e-11, 1.0, 0.0, 0.0]),
+    ];
+    for path in [Path::Shortest, Path::AsAuthored] {
+        let found = engine_slerp(path, &[1.25, 2.5], &keys, &[1.875])[0];
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        assert_near(found, [-half, half, 0.0, 0.0], 1e-6);
+    }
+}
+
+/// KhronosGroup/glTF-Sample-Models, AnimatedTriangle (CC0): keys 1.5e-4 off unit
+/// length, and a last step that goes on turning the same way on the short path.
+#[test]
+fn animated_triangle_keeps_turning() {
+    let keys = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.707, 0.0, 0.0, 0.707],
+        [0.0, 0.0, 0.0, 1.0],
+        [-0.707, 0.0, 0.0, 0.707],
+        [1.0, 0.0, 0.0, 0.0],
+    ]
+    .map(q);
+    let times: Vec<f64> = (0..5).map(|i| f64::from(i) / 4.0).collect();
+    let at: Vec<f64> = (0..=16).map(|i| f64::from(i) / 16.0).collect();
+    let found = engine_slerp(Path::Shortest, &times, &keys, &at);
+    for (i, rotation) in (0..).zip(found) {
+        let off = angle_between(rotation, about([0.0, 0.0, 1.0], 22.5 * f64::from(i)));
+        assert!(off < 1e-6, "sample {i}: {off:e}");
+    }
+}
+
+/// KhronosGroup/glTF-Asset-Generator, Animation_SamplerType: LINEAR yaw is linear.
+#[test]
+fn gltf_linear_yaw_is_linear() {
+    let keys = [90.0, 0.0, -90.0, 0.0, 90.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
+    let times: Vec<f64> = (0..5).map(f64::from).collect();
+    for (at, yaw) in [(0.25, 67.5), (1.5, -45.0), (2.75, -22.5), (3.9, 81.0)] {
+        let found = engine_slerp(Path::Shortest, &times, &keys, &[at])[0];
+        assert!(angle_between(found, about([0.0, 1.0, 0.0], yaw)) < 1e-6);
+    }
+}
+
+/// scipy/scipy, scipy/spatial/tests/test_slerp.py (BSD-3-Clause).
+#[test]
+fn scipy_geometric_slerp() {
+    let (start, end) = (q([1.0, 0.0, 0.0, 0.0]), q([0.0, 1.0, 0.0, 0.0]));
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    for (t, expected) in [
+        (0.0, [1.0, 0.0, 0.0, 0.0]),
+        (1.0 / 3.0, [0.8660254037844386, 0.5, 0.0, 0.0]),
+        (0.5, [half, half, 0.0, 0.0]),
+        (2.0 / 3.0, [0.5, 0.8660254037844386, 0.0, 0.0]),
+        (1.0, [0.0, 1.0, 0.0, 0.0]),
+    ] {
+        assert_near(slerp(start, end, t), expected, 1e-15);
+        let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[start, end], &[t]);
+        assert_near(engine[0], expected, 1.2e-7);
+    }
+}
+
+/// RobotLocomotion/drake, common/trajectories/test/piecewise_quaternion_test.cc
+/// (BSD-3-Clause): angular velocity is constant between keys and takes the short
+/// way where the keys' signs differ. Our keys are f32, hence the tolerance.
+#[test]
+fn drake_angular_velocity_across_a_sign_flip() {
+    let axis = DVec3::new(1.0, 2.0, 3.0).normalize();
+    let keys: Vec<Quat> = [1.0, -3.883185307179586, 5.3]
+        .map(|angle| DQuat::from_axis_angle(axis, angle).as_quat())
+        .to_vec();
+    let times = [0.0, 1.6, 2.32];
+    let curve = Curve::new(Kind::Slerp, Path::Shortest, Ends::default(), &times, &keys);
+    for (time, rate) in [(0.8, 0.875), (2.0, 4.027777777777778)] {
+        assert!((curve.velocity(time) - axis * rate).length() < 1e-6);
+    }
+}
