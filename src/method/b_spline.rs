@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::curve::{self, Cumulative, Curve};
 use super::keys::Keys;
@@ -46,6 +46,18 @@ fn curves(keys: &Keys, intervals: Range<usize>, emit: &mut dyn FnMut(Curve)) {
     }
 }
 
+/// Each iteration shrinks the error by a third of the step's half-angle or more.
+const END_ITERATIONS: usize = 48;
+
+/// `exp(a) v exp(-a)`.
+fn rotate(a: DVec3, v: DVec3) -> DVec3 {
+    let turned = product(
+        product(exp(a), DQuat::from_xyzw(v.x, v.y, v.z, 0.0)),
+        exp(-a),
+    );
+    DVec3::new(turned.x, turned.y, turned.z)
+}
+
 /// The half-rotation vector of interval `i`; before the first and after the last
 /// key the ends say what it is.
 fn step_vector(keys: &Keys, i: isize) -> DVec3 {
@@ -60,10 +72,16 @@ fn step_vector(keys: &Keys, i: isize) -> DVec3 {
     }
     match keys.ends {
         Ends::Parabolic => at_end * 2.0 - keys.log_step(if i < 0 { 1 } else { last - 1 }),
-        // The velocity at the end is the mean of the steps on both sides of it.
-        Ends::Clamped { start, end } => {
-            let velocity = if i < 0 { start } else { end };
-            velocity * keys.duration(inner) - at_end
+        Ends::Clamped { start, .. } if i < 0 => {
+            // B₁' = B₂' = 1/2 and B₂ = 1/6 at t = 0.
+            rotate(at_end / 6.0, start * keys.duration(inner) - at_end)
+        }
+        Ends::Clamped { end, .. } => {
+            // B₂' = B₃' = 1/2 and B₃ = 1/6 at t = 1: the unknown also turns the frame.
+            let target = end * keys.duration(inner);
+            (0..END_ITERATIONS).fold(target - at_end, |step, _| {
+                target - rotate(-step / 6.0, at_end)
+            })
         }
         Ends::Natural | Ends::Loop | Ends::Frozen => at_end,
     }

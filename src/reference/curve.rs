@@ -211,20 +211,34 @@ fn between(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> [DVec3; 3] {
     [out, logarithm(multiply(invert(a), b)), incoming]
 }
 
+/// `exp(by) v exp(-by)`.
+fn turned(v: DVec3, by: DVec3) -> DVec3 {
+    let v = DQuat::from_xyzw(v.x, v.y, v.z, 0.0);
+    vector(multiply(multiply(exponential(by), v), exponential(-by)))
+}
+
 fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
     let before = match ends {
         _ if i > 0 => step(i - 1),
         Ends::Loop => step(last),
-        Ends::Clamped { start, .. } => start * track.step(0) - step(0),
+        // ω h = exp(-w₂/6) w₁ exp(w₂/6) + w₂ at t = 0, solved for w₁.
+        Ends::Clamped { start, .. } => turned(start * track.step(0) - step(0), step(0) / 6.0),
         Ends::Parabolic => 2.0 * step(0) - step(1),
         _ => step(0),
     };
     let after = match ends {
         _ if i < last => step(i + 1),
         Ends::Loop => step(0),
-        Ends::Clamped { end, .. } => end * track.step(last) - step(last),
+        // ω h = exp(-w₃/6) w₂ exp(w₃/6) + w₃ at t = 1: w₃ by iteration.
+        Ends::Clamped { end, .. } => {
+            let mut w = DVec3::ZERO;
+            for _ in 0..60 {
+                w = end * track.step(last) - turned(step(last), -w / 6.0);
+            }
+            w
+        }
         Ends::Parabolic => 2.0 * step(last) - step(last - 1),
         _ => step(last),
     };
