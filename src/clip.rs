@@ -1,95 +1,107 @@
-//! A clip: a set prepared for one method, ready to be evaluated at any frames.
+//! A clip: a set prepared for one method, on a device, ready for any frames.
 
-use crate::method::{Interpolation, InterpolationError};
-use crate::prepare::{Part, Prepared, prepare};
-use crate::tracks::TrackSet;
+use glam::Quat;
 
-/// The prepared tracks, on the host: what every device's schedule is made from.
-pub(crate) struct ClipData {
-    pub(crate) interpolation: Interpolation,
-    pub(crate) groups: Vec<Prepared>,
-    /// Every part in order of tracks and time: (group, place in the group).
-    parts: Vec<(u32, u32)>,
-    /// Where each track's parts start in `parts`, and one end more.
-    tracks: Vec<usize>,
-    span: Option<(f64, f64)>,
+use crate::clock::{Frames, FramesError, Timeline};
+use crate::engine::{Backend, Engine, Error};
+use crate::gpu::ClipBuffers;
+use crate::prepare::ClipData;
+use crate::rotations::{Layout, Rotations, Storage};
+
+/// A set prepared for one method, on its engine's device; evaluate it as often as
+/// needed, at any frames.
+pub struct Clip {
+    pub(crate) engine: Engine,
+    pub(crate) data: ClipData,
+    /// On a Vulkan device.
+    pub(crate) buffers: Option<ClipBuffers>,
 }
 
-/// A part and the lists that it points into.
-#[derive(Clone, Copy)]
-pub(crate) struct PartRef<'a> {
-    pub(crate) prepared: &'a Prepared,
-    pub(crate) part: &'a Part,
-}
+impl Clip {
+    /// Number of tracks.
+    pub fn track_count(&self) -> usize {
+        self.data.track_count()
+    }
 
-impl ClipData {
-    /// Prepares a set. Groups are merged while their segments stay within
-    /// `group_bytes`; without a limit they stay as they were prepared.
-    pub(crate) fn new(
-        set: &TrackSet,
-        interpolation: Interpolation,
-        group_bytes: Option<usize>,
-    ) -> Result<Self, InterpolationError> {
-        let mut groups = prepare(set, &interpolation)?;
-        if let Some(limit) = group_bytes {
-            groups = merge(groups, limit);
-        }
-        let mut parts = Vec::new();
-        let mut tracks = Vec::with_capacity(set.track_count() + 1);
-        for (g, group) in groups.iter().enumerate() {
-            for (p, part) in group.parts.iter().enumerate() {
-                while tracks.len() <= part.track {
-                    tracks.push(parts.len());
-                }
-                parts.push((g as u32, p as u32));
+    /// The samples that `frames` means for this clip.
+    ///
+    /// # Errors
+    /// When they do not fit it.
+    pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
+        frames.resolve(self.data.track_count(), self.data.time_span())
+    }
+
+    /// The rotation of every track at every sample, `[track][frame]`.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn evaluate(&self, frames: &Frames) -> Result<Rotations, Error> {
+        self.evaluate_as(frames, Layout::TrackMajor)
+    }
+
+    /// As [`Clip::evaluate`], in the given layout.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
+        let timeline = self.timeline(frames)?;
+        let (tracks, samples) = (self.data.track_count(), timeline.len());
+        let storage: Box<dyn Storage> = match (&*self.engine.backend, &self.buffers) {
+            (Backend::Vulkan(opened), Some(buffers)) => opened
+                .engine
+                .evaluate(&self.data, buffers, &timeline, layout)?,
+            _ => {
+                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+                self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
+                Box::new(quats)
             }
+        };
+        Ok(Rotations::new(storage, tracks, samples, layout))
+    }
+
+    /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it
+    /// is used again: the first touch of fresh memory costs more than evaluating.
+    ///
+    /// # Errors
+    /// Also when `output` is not exactly as long as the result.
+    pub fn evaluate_into(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        self.evaluate_timeline_into(&self.timeline(frames)?, layout, output)
+    }
+
+    pub(crate) fn evaluate_timeline_into(
+        &self,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let needed = self.data.track_count() * timeline.len();
+        if output.len() != needed {
+            return Err(Error::OutputLength {
+                given: output.len(),
+                needed,
+            });
         }
-        tracks.push(parts.len());
-        Ok(Self {
-            interpolation,
-            groups,
-            parts,
-            tracks,
-            span: set.time_span(),
-        })
-    }
-
-    pub(crate) fn track_count(&self) -> usize {
-        self.tracks.len() - 1
-    }
-
-    pub(crate) fn time_span(&self) -> Option<(f64, f64)> {
-        self.span
-    }
-
-    /// The parts of one track in order of time.
-    pub(crate) fn parts_of(&self, track: usize) -> impl Iterator<Item = PartRef<'_>> {
-        self.parts[self.tracks[track]..self.tracks[track + 1]]
-            .iter()
-            .map(|&(group, part)| {
-                let prepared = &self.groups[group as usize];
-                PartRef {
-                    prepared,
-                    part: &prepared.parts[part as usize],
-                }
-            })
+        match (&*self.engine.backend, &self.buffers) {
+            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, layout, output)?),
+            (Backend::Vulkan(opened), Some(buffers)) => Ok(opened
+                .engine
+                .evaluate_into(&self.data, buffers, timeline, layout, output)?),
+            (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
+        }
     }
 }
 
-fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
-    let bytes = |group: &Prepared| {
-        group
-            .segments
-            .as_bytes()
-            .len()
-            .max(size_of_val(group.constants.as_slice()))
-    };
-    let mut merged: Vec<Prepared> = Vec::new();
-    for group in groups {
-        match merged.last_mut() {
-            Some(last) if bytes(last) + bytes(&group) <= limit => last.append(group),
-            _ => merged.push(group),
-        }
+impl std::fmt::Debug for Clip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Clip")
+            .field("engine", &self.engine)
+            .field("method", &self.data.interpolation.method)
+            .field("tracks", &self.track_count())
+            .finish_non_exhaustive()
     }
-    merged
 }

@@ -5,117 +5,18 @@ use std::sync::Arc;
 
 use glam::Quat;
 
-use crate::clip::ClipData;
-use crate::clock::{Frames, FramesError, Timeline};
+use crate::clip::Clip;
+use crate::clock::{Frames, FramesError};
 use crate::cpu::{CpuEngine, VectorWidth};
+use crate::device::{Device, EngineOptions, VulkanDevice};
 use crate::gpu::{
-    self, CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, PhysicalDevice, VulkanEngine,
-    VulkanError, VulkanHandles,
+    CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError, VulkanHandles,
 };
 use crate::method::{Interpolation, InterpolationError};
+use crate::prepare::ClipData;
 use crate::rotations::{Layout, Rotations};
 use crate::segment::segment_size;
 use crate::tracks::TrackSet;
-
-/// Where an engine evaluates: the CPU, or one Vulkan device.
-#[derive(Clone)]
-pub enum Device {
-    /// The f32 twins of the shaders, on all cores.
-    Cpu,
-    /// A Vulkan device.
-    Vulkan(VulkanDevice),
-}
-
-/// A Vulkan device, not yet opened.
-#[derive(Clone)]
-pub struct VulkanDevice {
-    physical: Box<PhysicalDevice>,
-}
-
-impl VulkanDevice {
-    /// Name, kind and limits.
-    pub fn info(&self) -> &DeviceInfo {
-        &self.physical.info
-    }
-}
-
-impl Device {
-    /// Every Vulkan device that can compute, fastest kind first. The CPU is always
-    /// there and not listed.
-    ///
-    /// # Errors
-    /// When there is no Vulkan loader, or it fails.
-    pub fn list() -> Result<Vec<Self>, VulkanError> {
-        Self::list_with(false)
-    }
-
-    /// As [`Device::list`], with the Khronos validation layer watching every call
-    /// to the devices ([`Engine::validation_messages`]).
-    ///
-    /// # Errors
-    /// Also when the layer is not installed.
-    pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
-        let devices = gpu::list(validation)?;
-        Ok(devices
-            .into_iter()
-            .map(|physical| {
-                Self::Vulkan(VulkanDevice {
-                    physical: Box::new(physical),
-                })
-            })
-            .collect())
-    }
-
-    /// The first Vulkan device, else the CPU.
-    pub fn auto() -> Self {
-        Self::list()
-            .ok()
-            .and_then(|devices| devices.into_iter().next())
-            .unwrap_or(Self::Cpu)
-    }
-
-    /// Its name: the driver's, or `CPU`.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Cpu => "CPU",
-            Self::Vulkan(device) => &device.info().name,
-        }
-    }
-}
-
-impl std::fmt::Debug for Device {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("Device").field(&self.name()).finish()
-    }
-}
-
-/// How results of a Vulkan device reach the host.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Transfer {
-    /// In place where the device shares the host's memory, else staged.
-    #[default]
-    Automatic,
-    /// The kernel writes into memory that the host reads.
-    InPlace,
-    /// The kernel writes into the device's memory; copies bring it over.
-    Staged,
-}
-
-/// Choices for an [`Engine`]; none of them changes a bit of any result.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub struct EngineOptions {
-    /// Bytes of device memory to use besides results; no limit by default.
-    pub memory: Option<u64>,
-    /// Worker threads of the CPU; by default the process's shared ones.
-    pub threads: Option<usize>,
-    /// The widest vector instructions to use on the CPU; by default all there are.
-    pub vector_width: Option<VectorWidth>,
-    /// How results come back from a Vulkan device.
-    pub transfer: Transfer,
-    /// Use a device although its canaries fail: its bits may differ.
-    pub allow_inexact: bool,
-}
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
@@ -177,17 +78,17 @@ impl From<EvaluateError> for Error {
 /// allowed; a Vulkan device serves them one after another.
 #[derive(Clone)]
 pub struct Engine {
-    backend: Arc<Backend>,
+    pub(crate) backend: Arc<Backend>,
 }
 
 /// An open Vulkan device, and what is known of it.
-struct Opened {
-    engine: VulkanEngine,
+pub(crate) struct Opened {
+    pub(crate) engine: VulkanEngine,
     canaries: Vec<CanaryReport>,
     info: DeviceInfo,
 }
 
-enum Backend {
+pub(crate) enum Backend {
     Cpu(CpuEngine),
     Vulkan(Box<Opened>),
 }
@@ -410,105 +311,6 @@ impl std::fmt::Debug for Engine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Engine")
             .field("device", &self.device_name())
-            .finish_non_exhaustive()
-    }
-}
-
-/// A set prepared for one method, on its engine's device; evaluate it as often as
-/// needed, at any frames.
-pub struct Clip {
-    engine: Engine,
-    data: ClipData,
-    /// On a Vulkan device.
-    buffers: Option<ClipBuffers>,
-}
-
-impl Clip {
-    /// Number of tracks.
-    pub fn track_count(&self) -> usize {
-        self.data.track_count()
-    }
-
-    /// The samples that `frames` means for this clip.
-    ///
-    /// # Errors
-    /// When they do not fit it.
-    pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
-        frames.resolve(self.data.track_count(), self.data.time_span())
-    }
-
-    /// The rotation of every track at every sample, `[track][frame]`.
-    ///
-    /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
-    pub fn evaluate(&self, frames: &Frames) -> Result<Rotations, Error> {
-        self.evaluate_as(frames, Layout::TrackMajor)
-    }
-
-    /// As [`Clip::evaluate`], in the given layout.
-    ///
-    /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
-    pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
-        let timeline = self.timeline(frames)?;
-        let (tracks, samples) = (self.data.track_count(), timeline.len());
-        let storage: Box<dyn crate::rotations::Storage> =
-            match (&*self.engine.backend, &self.buffers) {
-                (Backend::Vulkan(opened), Some(buffers)) => opened
-                    .engine
-                    .evaluate(&self.data, buffers, &timeline, layout)?,
-                _ => {
-                    let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
-                    self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
-                    Box::new(quats)
-                }
-            };
-        Ok(Rotations::new(storage, tracks, samples, layout))
-    }
-
-    /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again: the first touch of fresh memory costs more than evaluating.
-    ///
-    /// # Errors
-    /// Also when `output` is not exactly as long as the result.
-    pub fn evaluate_into(
-        &self,
-        frames: &Frames,
-        layout: Layout,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        self.evaluate_timeline_into(&self.timeline(frames)?, layout, output)
-    }
-
-    fn evaluate_timeline_into(
-        &self,
-        timeline: &Timeline,
-        layout: Layout,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let needed = self.data.track_count() * timeline.len();
-        if output.len() != needed {
-            return Err(Error::OutputLength {
-                given: output.len(),
-                needed,
-            });
-        }
-        match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, layout, output)?),
-            (Backend::Vulkan(opened), Some(buffers)) => Ok(opened
-                .engine
-                .evaluate_into(&self.data, buffers, timeline, layout, output)?),
-            (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
-        }
-    }
-}
-
-impl std::fmt::Debug for Clip {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Clip")
-            .field("engine", &self.engine)
-            .field("method", &self.data.interpolation.method)
-            .field("tracks", &self.track_count())
             .finish_non_exhaustive()
     }
 }

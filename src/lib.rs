@@ -46,6 +46,7 @@
 mod clip;
 mod clock;
 mod cpu;
+mod device;
 mod engine;
 pub mod formats;
 pub mod generate;
@@ -60,9 +61,11 @@ mod segment;
 pub mod spirv;
 mod tracks;
 
+pub use clip::Clip;
 pub use clock::{FrameRate, Frames, FramesError, MAX_FRAMES, Timeline};
 pub use cpu::VectorWidth;
-pub use engine::{Clip, Device, Engine, EngineOptions, Error, Transfer, VulkanDevice};
+pub use device::{Device, EngineOptions, Transfer, VulkanDevice};
+pub use engine::{Engine, Error};
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanError, VulkanHandles};
 pub use method::{Ends, Form, Interpolation, InterpolationError, METHODS, Method, Path};
 pub use rotations::{Layout, Rotations};

@@ -47,9 +47,9 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
         let mut random = Random(1);
         let mut compared = 0;
         for seed in 0.. {
-            let set = hostile_set(seed, 512);
+            let set = hostile_set(seed, 1024);
             let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
-            let frames = Frames::rate(rate.parse().unwrap()).between(-1.5, 35.0);
+            let frames = Frames::rate(rate.parse().unwrap()).between(-1.0, 20.0);
             for method in METHODS {
                 let interpolation = Interpolation {
                     ends: random.pick(&ENDS),

@@ -1,5 +1,6 @@
 //! Numbers that other projects' tests expect. Only numbers are taken; each names
 //! where it comes from. Quaternions are written `w x y z`.
+#![allow(clippy::approx_constant)] // theirs have fewer digits
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, Kind, angle_between, nlerp, slerp};

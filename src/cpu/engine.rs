@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::dispatch::{Kernel, Kernels, VectorWidth};
 use super::evaluate::{Affine, Evaluate, Scratch};
-use crate::clip::{ClipData, PartRef};
 use crate::clock::{FramesError, Timeline};
 use crate::numeric::round_f32;
+use crate::prepare::{ClipData, PartRef};
 use crate::rotations::Layout;
 use crate::schedule::{Distance, Run, RunSource};
 use crate::segment::Segments;

@@ -7,14 +7,16 @@ use glam::Quat;
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
+use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
 use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
+use super::slot::{Finish, Slot, Target};
 use super::submission::{Access, Binding, Submission};
-use super::window::{GroupWork, Window, windows, work};
-use crate::clip::ClipData;
+use super::window::{Window, windows, work};
 use crate::clock::{FramesError, Ticks, Timeline};
-use crate::engine::{EngineOptions, Transfer};
+use crate::device::{EngineOptions, Transfer};
 use crate::method::Form;
+use crate::prepare::ClipData;
 use crate::rotations::{Layout, Storage};
 use crate::segment::shader::WORKGROUP;
 use crate::segment::{Item, Launch};
@@ -41,38 +43,7 @@ pub(crate) struct VulkanEngine {
     group_bytes: u64,
     /// Bytes that the segments of one clip may take; no limit unless one was asked.
     clip_bytes: Option<u64>,
-    /// Output buffers given back: touching fresh memory costs more than evaluating.
-    free: Arc<Mutex<Vec<Buffer>>>,
-}
-
-/// What one window needs; the submission comes first, so that it is waited for
-/// before its buffers go.
-struct Slot {
-    submission: Submission,
-    /// Items and distances, as the host writes them.
-    items: Buffer,
-    distances: Buffer,
-    /// The same in the device's own memory, where that is not the host's.
-    device_items: Option<Buffer>,
-    device_distances: Option<Buffer>,
-    /// A window's rotations: where the kernel writes, and where the host reads.
-    rotations: Option<Buffer>,
-    readback: Option<Buffer>,
-    done: Option<Finish>,
-}
-
-/// What is left to do when a window has been computed.
-struct Finish {
-    window: Window,
-    patches: Vec<(usize, [f32; 4])>,
-}
-
-/// Where results go.
-pub(super) enum Target<'a> {
-    /// Straight into a mapped buffer.
-    Buffer(&'a mut Buffer),
-    /// Through a window's own buffer into the caller's memory.
-    Slice(&'a mut [[f32; 4]]),
+    free: FreeBuffers,
 }
 
 /// The segments and constants of a clip, on the device.
@@ -245,12 +216,7 @@ impl VulkanEngine {
         }
         let mut buffer = self.output_buffer(bytes)?;
         self.run(clip, buffers, timeline, layout, Target::Buffer(&mut buffer))?;
-        let free = Arc::clone(&self.free);
-        Ok(Box::new(MappedQuats {
-            buffer: Some(buffer),
-            count,
-            free,
-        }))
+        Ok(Box::new(MappedQuats::new(buffer, count, &self.free)))
     }
 
     /// Evaluates into the caller's memory.
@@ -445,131 +411,5 @@ impl VulkanEngine {
         let groups = items.div_ceil(WORKGROUP);
         let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
         [x, groups.div_ceil(x)]
-    }
-}
-
-impl Slot {
-    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
-        Ok(Self {
-            submission: Submission::new(device)?,
-            items: Buffer::new(device, "tumble items", 0, Residence::Upload)?,
-            distances: Buffer::new(device, "tumble distances", 0, Residence::Upload)?,
-            device_items: None,
-            device_distances: None,
-            rotations: None,
-            readback: None,
-            done: None,
-        })
-    }
-
-    /// Makes sure of a buffer of at least `size` bytes.
-    fn grow(
-        device: &Arc<LogicalDevice>,
-        buffer: &mut Option<Buffer>,
-        size: u64,
-        residence: Residence,
-    ) -> Result<(), VulkanError> {
-        if buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
-            *buffer = None; // before the new one, so that both need not fit
-            *buffer = Some(Buffer::new(device, "tumble window", size, residence)?);
-        }
-        Ok(())
-    }
-
-    /// Writes the work lists of all groups, one behind the other.
-    fn write(
-        &mut self,
-        device: &Arc<LogicalDevice>,
-        lists: &[GroupWork],
-    ) -> Result<(), VulkanError> {
-        let item_bytes = lists.iter().map(GroupWork::item_count).sum::<usize>() * size_of::<Item>();
-        let distance_count = lists.iter().map(GroupWork::distance_count).sum::<usize>();
-        if self.items.size() < item_bytes as u64 {
-            self.items = Buffer::new(device, "tumble items", item_bytes as u64, Residence::Upload)?;
-        }
-        let distance_bytes = (distance_count * size_of::<f32>()) as u64;
-        if self.distances.size() < distance_bytes {
-            self.distances = Buffer::new(
-                device,
-                "tumble distances",
-                distance_bytes,
-                Residence::Upload,
-            )?;
-        }
-        let items: &mut [Item] = bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
-        let distances: &mut [f32] =
-            bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes as usize));
-        let (mut next_item, mut next_distance) = (0, 0);
-        for chunk in lists.iter().flat_map(|list| &list.chunks) {
-            let place = &mut items[next_item..next_item + chunk.items.len()];
-            place.copy_from_slice(&chunk.items);
-            if !chunk.distances.is_empty() {
-                for item in place {
-                    item.first += next_distance as i32;
-                }
-            }
-            let end = next_distance + chunk.distances.len();
-            distances[next_distance..end].copy_from_slice(&chunk.distances);
-            next_item += chunk.items.len();
-            next_distance = end;
-        }
-        Ok(())
-    }
-
-    /// Waits for the window in flight, if any, and brings its results home.
-    fn finish(&mut self, target: &mut Target<'_>) -> Result<(), VulkanError> {
-        self.submission.wait()?;
-        let Some(Finish { window, patches }) = self.done.take() else {
-            return Ok(());
-        };
-        let all = window.start..window.start + window.len();
-        let output: &mut [[f32; 4]] = match target {
-            Target::Buffer(buffer) => bytemuck::cast_slice_mut(
-                buffer.bytes_mut(all.start * size_of::<Quat>()..all.end * size_of::<Quat>()),
-            ),
-            Target::Slice(slice) => {
-                let output = &mut slice[all];
-                let written = self.readback.as_ref().or(self.rotations.as_ref());
-                let bytes = 0..size_of_val(output);
-                let written = written.map_or(&[][..], |buffer| buffer.bytes(bytes));
-                output.copy_from_slice(bytemuck::cast_slice(written));
-                output
-            }
-        };
-        for (place, rotation) in patches {
-            output[place] = rotation;
-        }
-        Ok(())
-    }
-}
-
-/// A result in mapped memory; the buffer goes back to its engine.
-struct MappedQuats {
-    buffer: Option<Buffer>,
-    count: usize,
-    free: Arc<Mutex<Vec<Buffer>>>,
-}
-
-impl Storage for MappedQuats {
-    fn quats(&self) -> &[Quat] {
-        let all = 0..self.count * size_of::<Quat>();
-        bytemuck::cast_slice(
-            self.buffer
-                .as_ref()
-                .map_or(&[][..], |buffer| buffer.bytes(all)),
-        )
-    }
-}
-
-/// Output buffers kept for the next evaluation.
-const KEPT: usize = 4;
-
-impl Drop for MappedQuats {
-    fn drop(&mut self) {
-        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        if free.len() == KEPT {
-            free.remove(0);
-        }
-        free.extend(self.buffer.take());
     }
 }

@@ -9,7 +9,7 @@ use super::engine::VulkanEngine;
 use super::error::VulkanError;
 use super::instance::Instance;
 use super::physical::PhysicalDevice;
-use crate::engine::EngineOptions;
+use crate::device::EngineOptions;
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).

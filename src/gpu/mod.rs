@@ -9,8 +9,10 @@ mod engine;
 mod error;
 mod handles;
 mod instance;
+mod mapped;
 mod physical;
 mod pipeline;
+mod slot;
 mod submission;
 mod window;
 

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::clip::ClipData;
 use crate::clock::{FramesError, Timeline};
 use crate::numeric::round_f32;
+use crate::prepare::ClipData;
 use crate::prepare::Prepared;
 use crate::rotations::Layout;
 use crate::schedule::{Distance, Run, RunSource};

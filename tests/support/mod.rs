@@ -61,8 +61,7 @@ impl Random {
     }
 }
 
-/// A set that asks for trouble: steps from 1e-7 rad to half a turn, components of
-/// 1e-30, gaps of one frame and of a thousand seconds, one and two keys, tracks
+/// A set that asks for trouble: steps from 1e-7 rad to pi, components of 1e-30, gaps of one frame and of a thousand seconds, one and two keys, tracks
 /// that start and end at their own times.
 pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
     let mut random = Random(seed);
@@ -83,11 +82,16 @@ pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
             time += match random.next() % 64 {
                 0..4 => 1.0 / 25.0,
                 4..8 => 1e-5,
-                8 => 100.0,
+                8 => 1000.0,
                 _ => random.between(0.05, 2.0),
             };
-            let angle = random.pick(&[0.0, 1e-7, 1e-4, 0.03, 0.5, 1.0, 2.0, 3.0]);
-            let angle = angle * random.between(0.7, 1.04);
+            let angle = match random.next() % 32 {
+                0 => std::f64::consts::PI,
+                _ => {
+                    random.pick(&[0.0, 1e-7, 1e-4, 0.03, 0.5, 1.0, 2.0, 3.0])
+                        * random.between(0.7, 1.04)
+                }
+            };
             rotation = (rotation * DQuat::from_axis_angle(random.direction(), angle)).normalize();
         }
         set.push("", &times, &quats)

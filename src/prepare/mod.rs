@@ -2,6 +2,10 @@
 //! clip and rounded once. Independent of frame rate and device, so the CPU and
 //! every Vulkan device evaluate the same segments.
 
+mod clip_data;
+
+pub(crate) use clip_data::{ClipData, PartRef};
+
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 

@@ -1,0 +1,104 @@
+//! Where to evaluate, and how: a device is a value, never a global.
+
+use crate::cpu::VectorWidth;
+use crate::gpu::{self, DeviceInfo, PhysicalDevice, VulkanError};
+
+/// Where an engine evaluates: the CPU, or one Vulkan device.
+#[derive(Clone)]
+pub enum Device {
+    /// The f32 twins of the shaders, on all cores.
+    Cpu,
+    /// A Vulkan device.
+    Vulkan(VulkanDevice),
+}
+
+/// A Vulkan device, not yet opened.
+#[derive(Clone)]
+pub struct VulkanDevice {
+    pub(crate) physical: Box<PhysicalDevice>,
+}
+
+impl VulkanDevice {
+    /// Name, kind and limits.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.physical.info
+    }
+}
+
+impl Device {
+    /// Every Vulkan device that can compute, fastest kind first. The CPU is always
+    /// there and not listed.
+    ///
+    /// # Errors
+    /// When there is no Vulkan loader, or it fails.
+    pub fn list() -> Result<Vec<Self>, VulkanError> {
+        Self::list_with(false)
+    }
+
+    /// As [`Device::list`], with the Khronos validation layer watching every call
+    /// to the devices ([`Engine::validation_messages`](crate::Engine::validation_messages)).
+    ///
+    /// # Errors
+    /// Also when the layer is not installed.
+    pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
+        let devices = gpu::list(validation)?;
+        Ok(devices
+            .into_iter()
+            .map(|physical| {
+                Self::Vulkan(VulkanDevice {
+                    physical: Box::new(physical),
+                })
+            })
+            .collect())
+    }
+
+    /// The first Vulkan device, else the CPU.
+    pub fn auto() -> Self {
+        Self::list()
+            .ok()
+            .and_then(|devices| devices.into_iter().next())
+            .unwrap_or(Self::Cpu)
+    }
+
+    /// Its name: the driver's, or `CPU`.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Cpu => "CPU",
+            Self::Vulkan(device) => &device.info().name,
+        }
+    }
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Device").field(&self.name()).finish()
+    }
+}
+
+/// How results of a Vulkan device reach the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Transfer {
+    /// In place where the device shares the host's memory, else staged.
+    #[default]
+    Automatic,
+    /// The kernel writes into memory that the host reads.
+    InPlace,
+    /// The kernel writes into the device's memory; copies bring it over.
+    Staged,
+}
+
+/// Choices for an [`Engine`](crate::Engine); none of them changes a bit of any result.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct EngineOptions {
+    /// Bytes of device memory to use besides results; no limit by default.
+    pub memory: Option<u64>,
+    /// Worker threads of the CPU; by default the process's shared ones.
+    pub threads: Option<usize>,
+    /// The widest vector instructions to use on the CPU; by default all there are.
+    pub vector_width: Option<VectorWidth>,
+    /// How results come back from a Vulkan device.
+    pub transfer: Transfer,
+    /// Use a device although its canaries fail: its bits may differ.
+    pub allow_inexact: bool,
+}

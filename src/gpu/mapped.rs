@@ -1,0 +1,53 @@
+//! Results that stay where the device wrote them.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::Quat;
+
+use super::buffer::Buffer;
+use crate::rotations::Storage;
+
+/// Output buffers given back by results: touching fresh memory costs more than
+/// evaluating.
+pub(super) type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
+
+/// A result in mapped memory; the buffer goes back to its engine.
+pub(super) struct MappedQuats {
+    buffer: Option<Buffer>,
+    count: usize,
+    free: FreeBuffers,
+}
+
+impl MappedQuats {
+    pub(super) fn new(buffer: Buffer, count: usize, free: &FreeBuffers) -> Self {
+        Self {
+            buffer: Some(buffer),
+            count,
+            free: Arc::clone(free),
+        }
+    }
+}
+
+impl Storage for MappedQuats {
+    fn quats(&self) -> &[Quat] {
+        let all = 0..self.count * size_of::<Quat>();
+        bytemuck::cast_slice(
+            self.buffer
+                .as_ref()
+                .map_or(&[][..], |buffer| buffer.bytes(all)),
+        )
+    }
+}
+
+/// Output buffers kept for the next evaluation.
+const KEPT: usize = 4;
+
+impl Drop for MappedQuats {
+    fn drop(&mut self) {
+        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        if free.len() == KEPT {
+            free.remove(0);
+        }
+        free.extend(self.buffer.take());
+    }
+}

@@ -1,0 +1,95 @@
+//! A whole set, prepared: the groups of its tracks, and where each track is.
+
+use super::{Part, Prepared, prepare};
+use crate::method::{Interpolation, InterpolationError};
+use crate::tracks::TrackSet;
+
+/// The prepared tracks, on the host: what every device's schedule is made from.
+pub(crate) struct ClipData {
+    pub(crate) interpolation: Interpolation,
+    pub(crate) groups: Vec<Prepared>,
+    /// Every part in order of tracks and time: (group, place in the group).
+    parts: Vec<(u32, u32)>,
+    /// Where each track's parts start in `parts`, and one end more.
+    tracks: Vec<usize>,
+    span: Option<(f64, f64)>,
+}
+
+/// A part and the lists that it points into.
+#[derive(Clone, Copy)]
+pub(crate) struct PartRef<'a> {
+    pub(crate) prepared: &'a Prepared,
+    pub(crate) part: &'a Part,
+}
+
+impl ClipData {
+    /// Prepares a set. Groups are merged while their segments stay within
+    /// `group_bytes`; without a limit they stay as they were prepared.
+    pub(crate) fn new(
+        set: &TrackSet,
+        interpolation: Interpolation,
+        group_bytes: Option<usize>,
+    ) -> Result<Self, InterpolationError> {
+        let mut groups = prepare(set, &interpolation)?;
+        if let Some(limit) = group_bytes {
+            groups = merge(groups, limit);
+        }
+        let mut parts = Vec::new();
+        let mut tracks = Vec::with_capacity(set.track_count() + 1);
+        for (g, group) in groups.iter().enumerate() {
+            for (p, part) in group.parts.iter().enumerate() {
+                while tracks.len() <= part.track {
+                    tracks.push(parts.len());
+                }
+                parts.push((g as u32, p as u32));
+            }
+        }
+        tracks.push(parts.len());
+        Ok(Self {
+            interpolation,
+            groups,
+            parts,
+            tracks,
+            span: set.time_span(),
+        })
+    }
+
+    pub(crate) fn track_count(&self) -> usize {
+        self.tracks.len() - 1
+    }
+
+    pub(crate) fn time_span(&self) -> Option<(f64, f64)> {
+        self.span
+    }
+
+    /// The parts of one track in order of time.
+    pub(crate) fn parts_of(&self, track: usize) -> impl Iterator<Item = PartRef<'_>> {
+        self.parts[self.tracks[track]..self.tracks[track + 1]]
+            .iter()
+            .map(|&(group, part)| {
+                let prepared = &self.groups[group as usize];
+                PartRef {
+                    prepared,
+                    part: &prepared.parts[part as usize],
+                }
+            })
+    }
+}
+
+fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
+    let bytes = |group: &Prepared| {
+        group
+            .segments
+            .as_bytes()
+            .len()
+            .max(size_of_val(group.constants.as_slice()))
+    };
+    let mut merged: Vec<Prepared> = Vec::new();
+    for group in groups {
+        match merged.last_mut() {
+            Some(last) if bytes(last) + bytes(&group) <= limit => last.append(group),
+            _ => merged.push(group),
+        }
+    }
+    merged
+}

@@ -1,0 +1,108 @@
+//! Rules of the house that a compiler does not know.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tumble::METHODS;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files(directory: &str, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut pending = vec![root().join(directory)];
+    while let Some(directory) = pending.pop() {
+        for entry in fs::read_dir(directory).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                pending.push(path);
+            } else if path.extension().is_some_and(|own| own == extension) {
+                found.push(path);
+            }
+        }
+    }
+    found
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    fs::read_to_string(root().join(path)).unwrap()
+}
+
+#[test]
+fn unsafe_code_stays_in_its_two_homes() {
+    for path in files("src", "rs") {
+        let relative = path.strip_prefix(root()).unwrap();
+        let home = relative.starts_with("src/gpu") || relative.ends_with("cpu/dispatch.rs");
+        let promised = relative.ends_with("src/engine.rs"); // passes a caller's promise on
+        let blocks = read(&path)
+            .lines()
+            .filter(|line| !line.trim_start().starts_with("//"))
+            .filter(|line| line.contains("unsafe {") || line.contains("unsafe fn"))
+            .count();
+        let allowed = if promised { 2 } else { 0 };
+        assert!(
+            home || blocks <= allowed,
+            "{}: {blocks} unsafe",
+            relative.display()
+        );
+    }
+}
+
+/// A form, a helper or a canary in WGSL without its twin would go unchecked.
+#[test]
+fn every_shader_function_has_its_twin() {
+    for shader in files("shaders", "wgsl") {
+        let text = read(&shader);
+        let name = shader.file_stem().unwrap().to_str().unwrap();
+        let Some(twin) = text.lines().find_map(|line| line.split("Twin: ").nth(1)) else {
+            let glue = ["kernel", "distance_in_frames", "distance_in_seconds"];
+            assert!(glue.contains(&name), "{name}.wgsl names no twin");
+            continue;
+        };
+        let twin = twin.trim_end_matches('.');
+        assert!(
+            read(twin).contains(&format!("{name}.wgsl")),
+            "{twin} does not name {name}.wgsl"
+        );
+    }
+}
+
+/// Two that share a mistake agree: the reference may use no line of the engine.
+#[test]
+fn the_reference_shares_nothing_with_the_engine() {
+    for path in files("src/reference", "rs") {
+        for line in read(&path).lines().filter(|line| line.contains("crate::")) {
+            assert!(
+                line.contains("crate::method::"),
+                "{}: {line}",
+                path.display()
+            );
+            for word in ["curve", "Curve", "Keys", "numeric"] {
+                assert!(!line.contains(word), "{}: {line}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_method_is_in_the_readme() {
+    let readme = read("README.md");
+    for method in METHODS {
+        assert!(
+            readme.contains(&format!("| `{}` |", method.name)),
+            "{method}"
+        );
+        let file = format!("src/method/{}.rs", method.name.replace('-', "_"));
+        assert!(root().join(&file).exists(), "{file}");
+    }
+}
+
+/// A file that needs scrolling for minutes is two files.
+#[test]
+fn files_stay_short() {
+    for path in [files("src", "rs"), files("shaders", "wgsl")].concat() {
+        let lines = read(&path).lines().count();
+        assert!(lines <= 450, "{}: {lines} lines", path.display());
+    }
+}
