@@ -31,8 +31,9 @@
 //! A [`TrackSet`] holds what was loaded. [`Frames`] says which samples to evaluate,
 //! at an exact [`FrameRate`] or at any times. A [`Method`] says how the rotation
 //! between keys follows from the keys. An [`Engine`] is one device; it prepares a
-//! set into a [`Clip`] and evaluates it into [`Rotations`]. [`reference`] is the
-//! textbook in f64, which shares nothing with the engine.
+//! set into a [`Clip`] and evaluates it into [`Rotations`]. [`mod@reference`] is
+//! the textbook in f64, which shares nothing with the engine; [`verify`] compares the
+//! three.
 //!
 //! # What is promised
 //!
@@ -60,6 +61,7 @@ mod schedule;
 mod segment;
 pub mod spirv;
 mod tracks;
+pub mod verify;
 
 pub use clip::Clip;
 pub use clock::{FrameRate, Frames, FramesError, MAX_FRAMES, Timeline};

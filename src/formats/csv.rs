@@ -18,7 +18,20 @@ pub fn write_csv(
     timeline: &Timeline,
     rotations: &Rotations,
 ) -> io::Result<()> {
-    let mut csv = ::csv::Writer::from_writer(writer);
+    let csv = ::csv::Writer::from_writer(writer);
+    write_rows(csv, set, timeline, rotations).map_err(|error| match error.into_kind() {
+        // The conversion that the crate offers loses the kind, a broken pipe's too.
+        ::csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    })
+}
+
+fn write_rows(
+    mut csv: ::csv::Writer<impl Write>,
+    set: &TrackSet,
+    timeline: &Timeline,
+    rotations: &Rotations,
+) -> ::csv::Result<()> {
     csv.write_field("frame")?;
     csv.write_field("time")?;
     for track in 0..set.track_count() {
@@ -43,5 +56,5 @@ pub fn write_csv(
         }
         csv.write_record(None::<&[u8]>)?;
     }
-    csv.flush()
+    Ok(csv.flush()?)
 }

@@ -23,6 +23,12 @@ pub enum OutputError {
         /// The output.
         path: PathBuf,
     },
+    /// It is a device, a pipe or a socket.
+    #[error("{}: is no file; give a file, or `-` for standard output", path.display())]
+    NotAFile {
+        /// The output.
+        path: PathBuf,
+    },
     /// Its directory is not there.
     #[error("{}: its directory {} does not exist; create it first", path.display(), parent.display())]
     NoDirectory {
@@ -190,6 +196,12 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
     }
     if path.is_dir() {
         return Err(OutputError::Directory {
+            path: path.to_owned(),
+        });
+    }
+    // A rename would put a file in its place.
+    if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file()) {
+        return Err(OutputError::NotAFile {
             path: path.to_owned(),
         });
     }

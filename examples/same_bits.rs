@@ -1,0 +1,34 @@
+//! Evaluates a generated set on the CPU and on every Vulkan device, and counts the
+//! rotations whose bits differ.
+//!
+//! `cargo run --release --example same_bits`
+
+use tumble::generate::{Generate, Steps};
+use tumble::{Device, Engine, Frames, METHODS};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let set = Generate {
+        boxes: 1000,
+        steps: Steps::Random,
+        ..Generate::default()
+    }
+    .track_set()?;
+    let frames = Frames::fps(60);
+    let cpu = Engine::new(Device::Cpu)?;
+    for device in Device::list()? {
+        let vulkan = Engine::new(device)?;
+        for method in METHODS {
+            let expected = cpu.evaluate(&set, method, &frames)?;
+            let found = vulkan.evaluate(&set, method, &frames)?;
+            let bits = |q: &glam::Quat| q.to_array().map(f32::to_bits);
+            let pairs = expected.as_quats().iter().zip(found.as_quats());
+            let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+            let total = expected.as_quats().len();
+            println!(
+                "{}, {method}: {differing} of {total} differ",
+                vulkan.device_name()
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! `tumble eval`: keyframe files in, rotations at every frame out.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use tumble::formats::npy::ComponentOrder;
+use tumble::{Layout, Method};
+
+use super::device::{DeviceArguments, Opened};
+use super::exit::{Failure, for_each};
+use super::input::Inputs;
+use super::interpolation::{Manner, method};
+use super::output::{Format, Target};
+use super::time::{Samples, Sampling};
+use super::{input, output, room, signals, words};
+
+/// Evaluate keyframe tracks at every frame
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The result is float32 of shape (tracks, frames, 4) in NPY, or CSV with a row for
+each frame. CPU and Vulkan give the same bits.
+
+Examples:
+  tumble eval data/pendulum.dat -o out.npy
+  tumble eval data/pendulum.dat -m slerp --fps 30000/1001 -o out.csv
+  tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
+  tumble eval *.dat -o results                 a file for each input, results/NAME.npy
+  tumble eval - -o - < data/pendulum.dat | python3 -c \\
+    'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Where to write: OUT.npy, OUT.csv, `-` (standard output), or a directory for several inputs
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
+    /// How to interpolate (`tumble methods`)
+    #[arg(
+        short,
+        long,
+        value_name = "METHOD",
+        default_value = "bessel-overhauser",
+        value_parser = method()
+    )]
+    method: Method,
+    #[command(flatten)]
+    sampling: Sampling,
+    #[command(flatten)]
+    manner: Manner,
+    #[command(flatten)]
+    device: DeviceArguments,
+    /// The order of NPY results in memory: (tracks, frames, 4) or (frames, tracks, 4)
+    #[arg(long, value_enum, default_value = "track")]
+    layout: LayoutArgument,
+    /// The order of a quaternion's components in NPY results
+    #[arg(long, value_enum, default_value = "xyzw")]
+    order: OrderArgument,
+    /// npy or csv [default: by the name of the output, else npy]
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LayoutArgument {
+    /// (tracks, frames, 4)
+    Track,
+    /// (frames, tracks, 4)
+    Frame,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum OrderArgument {
+    Xyzw,
+    Wxyz,
+}
+
+impl From<OrderArgument> for ComponentOrder {
+    fn from(order: OrderArgument) -> Self {
+        match order {
+            OrderArgument::Xyzw => Self::Xyzw,
+            OrderArgument::Wxyz => Self::Wxyz,
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    // Everything that can be refused is refused before any work.
+    let inputs = arguments
+        .inputs
+        .distinct(arguments.sampling.reads_standard_input())?;
+    let samples = arguments.sampling.samples()?;
+    let targets = output::plan(
+        &inputs,
+        arguments.output.as_deref(),
+        arguments.format,
+        arguments.overwrite,
+    )?;
+    let mut device = arguments.device.open()?;
+    let jobs: Vec<(PathBuf, Target)> = inputs.into_iter().zip(targets).collect();
+    for_each(&jobs, |(path, target)| {
+        if let Some(stop) = signals::stopped() {
+            return Err(stop);
+        }
+        arguments.evaluate(&mut device, &samples, path, target)
+    })
+}
+
+impl Arguments {
+    /// One input, from its file to its result.
+    fn evaluate(
+        &self,
+        device: &mut Opened,
+        samples: &Samples,
+        path: &Path,
+        target: &Target,
+    ) -> Result<(), Failure> {
+        let name = input::name(path);
+        let set = self.inputs.load(path)?;
+        let frames = samples.of(&set, &name);
+        let timeline = room::in_memory(&name, &set, &frames, 1)?;
+        target.has_room(&name, set.track_count(), timeline.len())?;
+        let layout = match (self.layout, target.format()) {
+            (LayoutArgument::Track, Format::Npy) => Layout::TrackMajor,
+            // A row of CSV holds one frame.
+            (LayoutArgument::Frame, _) | (_, Format::Csv | Format::Dat) => Layout::FrameMajor,
+        };
+        let started = Instant::now();
+        let rotations = device
+            .evaluate(&set, self.manner.with(self.method), &frames, layout)
+            .map_err(|error| Failure::evaluating(&name, &error))?;
+        let elapsed = started.elapsed();
+        target.write_rotations(&set, &timeline, &rotations, self.order.into())?;
+        words::note(&format!(
+            "{name}: {} × {}, {}, on {} in {} → {target}",
+            words::count(set.track_count(), "track"),
+            words::count(timeline.len(), "frame"),
+            self.method,
+            device.label,
+            words::duration(elapsed),
+        ));
+        Ok(())
+    }
+}

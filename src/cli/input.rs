@@ -1,0 +1,104 @@
+//! Inputs: keyframe files and lists of times, opened, read, and their warnings
+//! passed on.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tumble::TrackSet;
+use tumble::formats::dat::{DatOptions, Limits, open_dat};
+use tumble::formats::times::open_times;
+use tumble::formats::{Code, Diagnostic};
+
+use super::exit::Failure;
+use super::words;
+
+/// The inputs of a command, and what they may be.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Inputs {
+    /// Keyframe files (`-`: standard input)
+    #[arg(required = true, value_name = "INPUT")]
+    paths: Vec<PathBuf>,
+    /// Read named pipes too
+    #[arg(long)]
+    pipes: bool,
+    /// The largest input to read
+    #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
+    max_size: u64,
+}
+
+/// `-` is standard input.
+pub(crate) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// How messages call an input.
+pub(crate) fn name(path: &Path) -> String {
+    if is_standard(path) {
+        "standard input".to_owned()
+    } else {
+        path.display().to_string()
+    }
+}
+
+impl Inputs {
+    /// The inputs without repetitions, each of which earns a warning. Standard
+    /// input can be taken only once.
+    pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
+        let mut seen = HashSet::new();
+        let mut distinct = Vec::new();
+        for path in &self.paths {
+            if is_standard(path) && standard_input_taken {
+                let message =
+                    "standard input cannot be both the keys and the times; put one in a file";
+                return Err(Failure::usage(message));
+            }
+            // A missing file is told about when it is opened.
+            let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
+            if seen.insert(identity) {
+                distinct.push(path.clone());
+            } else {
+                words::warning(&format!("{}: given twice, done once", name(path)));
+            }
+        }
+        Ok(distinct)
+    }
+
+    /// Reads a keyframe file; its warnings go to standard error.
+    pub(crate) fn load(&self, path: &Path) -> Result<TrackSet, Failure> {
+        let (set, warnings) = self.load_quietly(path)?;
+        for warning in warnings {
+            words::note(&warning.to_string());
+        }
+        Ok(set)
+    }
+
+    /// Reads a keyframe file and hands over its warnings.
+    pub(crate) fn load_quietly(&self, path: &Path) -> Result<(TrackSet, Vec<Diagnostic>), Failure> {
+        let limits = Limits {
+            file: self.max_size,
+            ..Limits::default()
+        };
+        let loaded = open_dat(
+            path,
+            &DatOptions {
+                limits,
+                pipes: self.pipes,
+            },
+        );
+        let loaded = loaded.map_err(|diagnostic| {
+            let hint = match diagnostic.code {
+                Code::FileTooLong => " (--max-size)",
+                Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",
+                _ => "",
+            };
+            Failure::input(&diagnostic, hint)
+        })?;
+        Ok((loaded.set, loaded.warnings))
+    }
+}
+
+/// Reads a list of times.
+pub(crate) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
+    open_times(path).map_err(|diagnostic| Failure::input(&diagnostic, ""))
+}

@@ -1,0 +1,97 @@
+//! The commands. Each file holds one: its arguments and what it does with them.
+//!
+//! Data goes to standard output and words to standard error; [`exit`] says what
+//! the exit codes mean.
+
+mod completions;
+mod device;
+mod devices;
+mod eval;
+pub(crate) mod exit;
+mod explain;
+mod generate;
+mod info;
+mod input;
+mod interpolation;
+mod methods;
+mod output;
+mod progress;
+mod room;
+mod signals;
+mod stream;
+mod time;
+mod verify;
+mod words;
+
+pub(crate) use signals::stop_on_signals;
+pub(crate) use words::explain_panics;
+
+use clap::{Parser, Subcommand};
+
+use exit::Failure;
+
+const ABOUT: &str = "Interpolate tracks of rotation keys in bulk, on Vulkan or the CPU, \
+                     with the same bits";
+
+const EXAMPLES: &str = "\
+Examples:
+  tumble generate -o chain.dat                 make a file to play with
+  tumble info chain.dat                        what is in it
+  tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
+  tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
+  tumble verify chain.dat                      device = CPU, and both against f64
+  tumble devices                               what Vulkan offers here
+
+Exit codes:
+  0 done                           5 a Vulkan device was demanded, there is none
+  1 a bug in tumble                6 the device failed, or is not exact
+  2 the command line is wrong      7 output could not be written
+  3 some inputs failed             8 verification found a difference
+  4 all inputs failed              130, 141, 143 stopped by a signal";
+
+/// What the command line says.
+#[derive(Debug, Parser)]
+#[command(name = "tumble", version, about = ABOUT, after_help = EXAMPLES)]
+#[command(max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Eval(eval::Arguments),
+    Verify(verify::Arguments),
+    Devices(devices::Arguments),
+    Info(info::Arguments),
+    Generate(generate::Arguments),
+    Methods(methods::Arguments),
+    Explain(explain::Arguments),
+    Completions(completions::Arguments),
+}
+
+impl Command {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self {
+            Self::Eval(arguments) => eval::run(&arguments),
+            Self::Verify(arguments) => verify::run(&arguments),
+            Self::Devices(arguments) => devices::run(&arguments),
+            Self::Info(arguments) => info::run(&arguments),
+            Self::Generate(arguments) => generate::run(&arguments),
+            Self::Methods(arguments) => methods::run(&arguments),
+            Self::Explain(arguments) => explain::run(&arguments),
+            Self::Completions(arguments) => completions::run(&arguments),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    /// clap checks its own definition: clashing flags, bad defaults.
+    #[test]
+    fn the_command_line_is_well_defined() {
+        super::Arguments::command().debug_assert();
+    }
+}

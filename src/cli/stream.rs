@@ -1,0 +1,61 @@
+//! The stream into an output: it stops after a signal, moves the progress bar, and
+//! remembers whether the reader went away.
+
+use std::io::{self, Write};
+
+use tumble::formats::output::Output;
+
+use super::progress::Progress;
+use super::signals;
+
+/// A progress bar, and how far some bytes move it.
+pub(crate) type Measured = (Progress, fn(&[u8]) -> u64);
+
+pub(crate) struct Stream {
+    output: Output,
+    progress: Option<Measured>,
+    /// Kept here because writers wrap the error in one of their own kind.
+    broken_pipe: bool,
+}
+
+impl Stream {
+    pub(crate) fn new(output: Output, progress: Option<Measured>) -> Self {
+        Self {
+            output,
+            progress,
+            broken_pipe: false,
+        }
+    }
+
+    /// The output, and whether its reader went away.
+    pub(crate) fn into_output(self) -> (Output, bool) {
+        (self.output, self.broken_pipe)
+    }
+
+    fn watch<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        self.broken_pipe |= result
+            .as_ref()
+            .is_err_and(|error| error.kind() == io::ErrorKind::BrokenPipe);
+        result
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if signals::stopped().is_some() {
+            // Not `Interrupted`, which would be tried again.
+            return Err(io::Error::other("stopped by a signal"));
+        }
+        let result = self.output.write(bytes);
+        let written = self.watch(result)?;
+        if let Some((progress, measure)) = &mut self.progress {
+            progress.advance(measure(&bytes[..written]));
+        }
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.output.flush();
+        self.watch(result)
+    }
+}

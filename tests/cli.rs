@@ -1,0 +1,314 @@
+//! The program, run as people run it: its results against the library's, bit for
+//! bit, its messages and its exit codes.
+
+#[path = "support/program.rs"]
+mod program;
+mod support;
+
+use std::fs;
+
+use glam::Quat;
+use program::{command, finish, pendulum, sample_folder, succeed};
+use support::vulkan_devices;
+use tumble::{Device, Engine, Frames, Layout, TrackSet, method};
+
+fn set() -> TrackSet {
+    let (times, keys) = pendulum();
+    TrackSet::with_shared_times(&times, &keys).unwrap()
+}
+
+/// What the library gives for the file that [`sample_folder`] has.
+fn expected(frames: &Frames, layout: Layout) -> Vec<Quat> {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    engine
+        .evaluate_as(&set(), method::BESSEL_OVERHAUSER, frames, layout)
+        .unwrap()
+        .as_quats()
+        .to_vec()
+}
+
+fn bits(values: impl IntoIterator<Item = f32>) -> Vec<u32> {
+    values.into_iter().map(f32::to_bits).collect()
+}
+
+fn read_npy(bytes_of_file: &[u8]) -> (Vec<u64>, Vec<u32>) {
+    let file = npyz::NpyFile::new(bytes_of_file).unwrap();
+    let shape = file.shape().to_vec();
+    (shape, bits(file.into_vec::<f32>().unwrap()))
+}
+
+#[test]
+fn npy_holds_the_library_s_bits_in_every_layout_and_order() {
+    let place = sample_folder();
+    for (layout_flag, layout, shape) in [
+        ("track", Layout::TrackMajor, vec![2, 51, 4]),
+        ("frame", Layout::FrameMajor, vec![51, 2, 4]),
+    ] {
+        let quats = expected(&Frames::fps(25), layout);
+        for order in ["xyzw", "wxyz"] {
+            let line = [
+                "eval",
+                "a.dat",
+                "-o",
+                "out.npy",
+                "--overwrite",
+                "--layout",
+                layout_flag,
+                "--order",
+                order,
+            ];
+            let run = succeed(place.path(), &line);
+            assert!(
+                run.words
+                    .contains("2 tracks × 51 frames, bessel-overhauser, on "),
+                "{}",
+                run.words
+            );
+            let found = read_npy(&fs::read(place.path().join("out.npy")).unwrap());
+            let components = quats.iter().flat_map(|q| match order {
+                "xyzw" => [q.x, q.y, q.z, q.w],
+                _ => [q.w, q.x, q.y, q.z],
+            });
+            assert_eq!(
+                found,
+                (shape.clone(), bits(components)),
+                "{layout_flag}, {order}"
+            );
+        }
+    }
+}
+
+#[test]
+fn csv_holds_the_library_s_bits() {
+    let place = sample_folder();
+    succeed(
+        place.path(),
+        &["eval", "a.dat", "-o", "out.csv", "--fps", "10"],
+    );
+    let text = fs::read_to_string(place.path().join("out.csv")).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    assert_eq!(
+        header[..6],
+        ["frame", "time", "box1.w", "box1.x", "box1.y", "box1.z"]
+    );
+    let quats = expected(&Frames::fps(10), Layout::FrameMajor);
+    let components = quats.iter().flat_map(|q| [q.w, q.x, q.y, q.z]);
+    let found = lines.clone().flat_map(|line| {
+        line.split(',')
+            .skip(2)
+            .map(|value| value.parse::<f32>().unwrap())
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(bits(found), bits(components));
+    let last: Vec<&str> = lines.last().unwrap().split(',').take(2).collect();
+    assert_eq!((last[0], last[1].parse()), ("20", Ok(2.0)));
+}
+
+#[test]
+fn standard_input_and_output_carry_data() {
+    let place = sample_folder();
+    let quats = expected(&Frames::fps(25), Layout::TrackMajor);
+    let components = || bits(quats.iter().flat_map(Quat::to_array));
+    for line in [&["eval", "-", "-o", "-"][..], &["eval", "-"]] {
+        let output = command(place.path(), line)
+            .stdin(fs::File::open(place.path().join("a.dat")).unwrap())
+            .output()
+            .unwrap();
+        let run = finish(output);
+        assert_eq!(run.code, 0, "{}", run.words);
+        assert_eq!(read_npy(&run.out), (vec![2, 51, 4], components()));
+    }
+    let run = succeed(
+        place.path(),
+        &["eval", "a.dat", "-o", "-", "--format", "csv"],
+    );
+    assert!(run.out.starts_with(b"frame,time,box1.w,"));
+}
+
+#[test]
+fn explicit_times_are_evaluated() {
+    let place = sample_folder();
+    let times = vec![0.0, 1.75, 0.3, 0.3];
+    fs::write(place.path().join("times.txt"), "0\n1.75\n0.3\n0.3\n").unwrap();
+    succeed(
+        place.path(),
+        &["eval", "a.dat", "--times", "times.txt", "-o", "out.npy"],
+    );
+    let found = read_npy(&fs::read(place.path().join("out.npy")).unwrap());
+    let quats = expected(&Frames::at(times), Layout::TrackMajor);
+    assert_eq!(
+        found,
+        (vec![2, 4, 4], bits(quats.iter().flat_map(Quat::to_array)))
+    );
+}
+
+#[test]
+fn every_device_writes_the_cpu_s_file() {
+    let place = sample_folder();
+    for method in tumble::METHODS {
+        let line = [
+            "eval",
+            "a.dat",
+            "-m",
+            method.name,
+            "-o",
+            "cpu.npy",
+            "--overwrite",
+            "--device",
+            "cpu",
+        ];
+        assert!(succeed(place.path(), &line).words.contains("on CPU in"));
+        let expected = fs::read(place.path().join("cpu.npy")).unwrap();
+        for (index, device) in vulkan_devices().iter().enumerate() {
+            for by in [index.to_string(), device.name().to_uppercase()] {
+                let line = [
+                    "eval",
+                    "a.dat",
+                    "-m",
+                    method.name,
+                    "-o",
+                    "vk.npy",
+                    "--overwrite",
+                    "--device",
+                    &by,
+                ];
+                let run = succeed(place.path(), &line);
+                assert!(
+                    run.words.contains(&format!("on {} in", device.name())),
+                    "{}",
+                    run.words
+                );
+                assert!(
+                    fs::read(place.path().join("vk.npy")).unwrap() == expected,
+                    "{method}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn verify_passes_on_good_data_and_says_what_it_compared() {
+    let place = sample_folder();
+    let run = succeed(place.path(), &["verify", "a.dat", "b.dat", "--json"]);
+    let lines: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    assert_eq!(lines.as_array().unwrap().len(), 2 * tumble::METHODS.len());
+    for line in lines.as_array().unwrap() {
+        assert_eq!(
+            (&line["pass"], &line["differing"]),
+            (&true.into(), &0.into()),
+            "{line}"
+        );
+        assert_eq!(line["rotations"], 102);
+    }
+    let table = String::from_utf8(succeed(place.path(), &["verify", "a.dat"]).out).unwrap();
+    for method in tumble::METHODS {
+        assert!(table.contains(method.name), "{table}");
+    }
+    if let Some(device) = vulkan_devices().first() {
+        assert_eq!(lines[0]["device"], device.name());
+        assert!(table.contains(&format!("between {} and the CPU, 0 differ", device.name())));
+    }
+}
+
+#[test]
+fn devices_and_info_speak_json() {
+    let place = sample_folder();
+    let run = succeed(place.path(), &["devices", "--json"]);
+    let listing: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let found = listing["devices"].as_array().unwrap();
+    for (entry, device) in found.iter().zip(&vulkan_devices()) {
+        assert_eq!(entry["name"], device.name());
+        assert_eq!(entry["exact"], true, "{entry}");
+        assert!(entry["canaries"].as_array().unwrap().len() >= 8);
+    }
+    assert_eq!(found.len(), vulkan_devices().len());
+
+    let run = succeed(place.path(), &["info", "a.dat", "--json"]);
+    let info: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let expected = [
+        ("tracks", 2.0),
+        ("keys", 10.0),
+        ("first_time", 0.0),
+        ("last_time", 2.0),
+    ];
+    for (name, value) in expected
+        .into_iter()
+        .chain([("box_length", 3.0), ("longest_step", 0.5)])
+    {
+        assert_eq!(info[0][name].as_f64(), Some(value), "{name}: {info}");
+    }
+    assert_eq!(info[0]["uniform"], true);
+    let degrees = info[0]["largest_rotation_degrees"].as_f64().unwrap();
+    assert!((degrees - 0.9f64.to_degrees()).abs() < 1e-3, "{degrees}");
+}
+
+#[test]
+fn generate_is_deterministic_and_can_be_read_back() {
+    let place = sample_folder();
+    let line = [
+        "generate",
+        "--boxes",
+        "3",
+        "--keys",
+        "7",
+        "--seconds",
+        "4",
+        "--random",
+        "-o",
+    ];
+    let write = |name: &str, seed: &str| {
+        succeed(place.path(), &[&line[..], &[name, "--seed", seed]].concat());
+        fs::read(place.path().join(name)).unwrap()
+    };
+    let first = write("g1.dat", "5");
+    assert!(
+        first == write("g2.dat", "5"),
+        "the same seed gave another file"
+    );
+    assert!(
+        first != write("g3.dat", "6"),
+        "another seed gave the same file"
+    );
+    assert!(first == succeed(place.path(), &[&line[..], &["-", "--seed", "5"]].concat()).out);
+    let info = succeed(place.path(), &["info", "g1.dat", "--json"]).out;
+    let info: serde_json::Value = serde_json::from_slice(&info).unwrap();
+    assert_eq!(
+        (&info[0]["tracks"], &info[0]["keys"]),
+        (&3.into(), &21.into())
+    );
+    assert_eq!(info[0]["last_time"].as_f64(), Some(4.0));
+    assert_eq!(info[0]["warnings"], serde_json::json!([]));
+}
+
+#[test]
+fn listings_say_what_there_is() {
+    let place = sample_folder();
+    let methods = String::from_utf8(succeed(place.path(), &["methods"]).out).unwrap();
+    for method in tumble::METHODS {
+        assert!(
+            methods.contains(method.name) && methods.contains(method.summary),
+            "{methods}"
+        );
+    }
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = String::from_utf8(succeed(place.path(), &["completions", shell]).out).unwrap();
+        // clap completes values only for these.
+        let values = ["bash", "zsh", "fish"].contains(&shell);
+        assert!(script.contains("method"), "{shell} does not complete flags");
+        assert!(
+            script.contains("bessel-overhauser") || !values,
+            "{shell} does not complete methods"
+        );
+    }
+    let version = String::from_utf8(succeed(place.path(), &["--version"]).out).unwrap();
+    assert_eq!(
+        version.trim(),
+        format!("tumble {}", env!("CARGO_PKG_VERSION"))
+    );
+    for line in [&["--help"][..], &["eval", "--help"], &["verify", "--help"]] {
+        let help = String::from_utf8(succeed(place.path(), line).out).unwrap();
+        assert!(help.contains("Examples:"), "{help}");
+    }
+}

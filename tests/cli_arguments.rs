@@ -1,0 +1,274 @@
+//! The program's edges: every row of the table of arguments, missing devices, closed
+//! pipes, full disks, signals.
+
+#[path = "support/program.rs"]
+mod program;
+mod support;
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use program::{command, finish, no_vulkan, run, sample_folder};
+use support::vulkan_devices;
+
+/// Exit code, command line, a part of the message.
+const ARGUMENTS: &str = "
+2 | eval                                         | required
+2 | evl a.dat                                    | eval
+2 | eval a.dat -o o.npy --fps 0                  | `0` is no frame rate
+2 | eval a.dat -o o.npy --fps -1                 | `-1` is no frame rate
+2 | eval a.dat -o o.npy --fps nan                | `nan` is no frame rate
+2 | eval a.dat -o o.npy --fps inf                | `inf` is no frame rate
+2 | eval a.dat -o o.npy --fps 30fps              | `30fps` is no frame rate
+2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is no frame rate
+2 | eval a.dat -o o.npy --fps 1e13               | at most 1099511627776 frames
+2 | eval a.dat -o o.npy --fps 1e11               | 2 tracks × 200000000001 frames are 6.4 TB
+0 | eval a.dat -o o.npy --fps 1e-9               | 1 frame,
+0 | eval a.dat -o o.npy --fps 29.97              | 30000/1001
+0 | eval a.dat -o o.npy --fps 23.976             | 24000/1001
+0 | eval a.dat -o o.npy --fps 59.94              | 60000/1001
+0 | eval a.dat -o o.npy --fps 30000/1001         | 2 tracks × 60 frames
+2 | eval a.dat -o o.npy --start 2 --end 1        | before it starts at 2 s
+2 | eval a.dat -o o.npy --start 5                | before it starts
+2 | eval a.dat -o o.npy --start nan              | `nan` is no time
+0 | eval a.dat -o o.npy --start -1 --end 1       | keys lie from 0 to 2 s
+4 | eval a.dat -o o.npy --times none.txt         | none.txt
+2 | eval a.dat -o o.npy --times t.txt --fps 9    | cannot be used with
+2 | eval a.dat -o o.npy -m slerb                 | a similar value exists: 'slerp'
+2 | eval a.dat -o o.npy -m slerb                 | bessel-overhauser
+2 | eval a.dat -o o.npy --layot track            | --layout
+2 | eval a.dat -o o.npy --ends lop               | loop
+4 | eval a.dat -o o.npy --ends loop              | repeat the first
+2 | eval a.dat -o o.npy --memory 5parsecs        | 256MiB
+2 | eval a.dat -o o.txt                          | .npy or .csv
+2 | eval a.dat -o a.dat --format npy --overwrite | is the input
+2 | eval a.dat -o old.npy                        | --overwrite
+0 | eval a.dat -o old.npy --overwrite            | old.npy
+2 | eval a.dat -o folder                         | is a directory
+7 | eval a.dat -o none/o.npy                     | none does not exist
+4 | eval none.dat -o o.npy                       | none.dat: error[E001]
+4 | eval folder -o o.npy                         | is a directory
+4 | eval bad.dat -o o.npy                        | bad.dat:2:8: error[E020]
+4 | eval a.dat -o o.npy --max-size 20B           | --max-size
+2 | eval a.dat b.dat -o -                        | -o DIRECTORY
+2 | eval a.dat b.dat -o o.npy                    | need a directory
+2 | eval a.dat b.dat -o old.npy                  | need a directory
+2 | eval a.dat folder/a.dat -o out               | would both write
+0 | eval a.dat a.dat -o o.npy                    | given twice
+0 | eval a.dat b.dat -o out                      | b.npy
+3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
+4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
+2 | eval - --times - -o o.npy                    | standard input cannot be both
+2 | verify a.dat -m none                         | catmull-rom
+4 | verify none.dat                              | none.dat
+3 | info a.dat none.dat                          | none.dat
+2 | generate -o old.npy                          | --overwrite
+2 | generate -o g.dat --boxes 0                  | 1..=65536
+2 | generate -o g.dat --seconds nan              | positive
+2 | generate -o g.dat --keys 1000000000          | 4e-6 s a key
+2 | generate -o g.dat --uniform --random         | cannot be used with
+2 | completions powerbash                        | bash
+2 | explain E099                                 | there is no code
+";
+
+#[test]
+fn each_argument_gets_its_exit_code_and_message() {
+    let mut wrong = Vec::new();
+    for row in ARGUMENTS.trim().lines() {
+        let [code, line, fragment] = *row.split('|').map(str::trim).collect::<Vec<_>>() else {
+            panic!("not a row: {row}");
+        };
+        let code: i32 = code.parse().unwrap();
+        let line: Vec<&str> = line.split_whitespace().collect();
+        let place = sample_folder();
+        let run = run(place.path(), &line);
+        if run.code != code || !run.words.contains(fragment) {
+            wrong.push(format!(
+                "{line:?}: {code}, `{fragment}`; but {}: {}",
+                run.code, run.words
+            ));
+        }
+        let old = fs::read(place.path().join("old.npy")).unwrap();
+        if old != b"old" && !line.contains(&"--overwrite") {
+            wrong.push(format!("{line:?} changed old.npy"));
+        }
+        if code != 0 && place.path().join("o.npy").exists() {
+            wrong.push(format!("{line:?} left an output"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_link_to_the_input_is_not_overwritten() {
+    let place = sample_folder();
+    let input = fs::read(place.path().join("a.dat")).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("a.dat", place.path().join("link.npy")).unwrap();
+    #[cfg(unix)]
+    assert_eq!(
+        run(
+            place.path(),
+            &["eval", "a.dat", "-o", "link.npy", "--overwrite"]
+        )
+        .code,
+        2
+    );
+    fs::hard_link(place.path().join("a.dat"), place.path().join("hard.npy")).unwrap();
+    run(
+        place.path(),
+        &["eval", "a.dat", "-o", "hard.npy", "--overwrite"],
+    );
+    assert_eq!(fs::read(place.path().join("a.dat")).unwrap(), input);
+    fs::copy(
+        place.path().join("a.dat"),
+        place.path().join("folder/c.npy"),
+    )
+    .unwrap();
+    let line = [
+        "eval",
+        "b.dat",
+        "folder/c.npy",
+        "-o",
+        "folder",
+        "--overwrite",
+    ];
+    assert_eq!(run(place.path(), &line).code, 2);
+    assert_eq!(fs::read(place.path().join("folder/c.npy")).unwrap(), input);
+}
+
+#[test]
+fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
+    let place = sample_folder();
+    let without = |line: &[&str]| {
+        finish(
+            no_vulkan(&mut command(place.path(), line))
+                .output()
+                .unwrap(),
+        )
+    };
+    let started = std::time::Instant::now();
+    for device in ["vulkan", "0", "llvmpipe"] {
+        let run = without(&["eval", "a.dat", "-o", "out.npy", "--device", device]);
+        assert_eq!(run.code, 5, "{device}: {}", run.words);
+        assert!(run.words.contains("no Vulkan device"), "{}", run.words);
+        assert!(!place.path().join("out.npy").exists());
+    }
+    assert!(started.elapsed().as_secs() < 10);
+    let run = without(&["eval", "a.dat", "-o", "out.npy"]);
+    assert_eq!(run.code, 0, "{}", run.words);
+    assert!(run.words.contains("on CPU (no Vulkan: "), "{}", run.words);
+    let run = without(&["verify", "a.dat"]);
+    assert_eq!(run.code, 0, "{}", run.words);
+    assert!(String::from_utf8_lossy(&run.out).contains("NOTHING was compared"));
+    let run = without(&["devices"]);
+    assert_eq!(run.code, 0);
+    assert!(String::from_utf8_lossy(&run.out).contains("mesa-vulkan-drivers"));
+}
+
+#[test]
+fn an_unknown_device_is_answered_with_those_there_are() {
+    let Some(device) = vulkan_devices().into_iter().next() else {
+        return;
+    };
+    let place = sample_folder();
+    for name in ["llvmpip3", "99"] {
+        let run = run(
+            place.path(),
+            &["eval", "a.dat", "-o", "out.npy", "--device", name],
+        );
+        assert_eq!(run.code, 2, "{}", run.words);
+        assert!(run.words.contains(device.name()), "{}", run.words);
+    }
+    let run = run(
+        place.path(),
+        &["eval", "a.dat", "-o", "out.npy", "--device", "vulcan"],
+    );
+    assert!(
+        run.words.contains("did you mean `vulkan`?"),
+        "{}",
+        run.words
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_ends_quietly_and_a_full_disk_does_not() {
+    let place = sample_folder();
+    let big = ["eval", "a.dat", "--fps", "100000", "-o", "-"];
+    for (line, code) in [
+        (&big[..], 141),
+        (&["methods"], 0),
+        (&["completions", "bash"], 0),
+    ] {
+        let mut child = command(place.path(), line)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let run = finish(child.wait_with_output().unwrap());
+        assert_eq!((run.code, run.words.as_str()), (code, ""), "{line:?}");
+    }
+    if cfg!(target_os = "linux") {
+        for line in [&big[..], &["methods"]] {
+            let full = fs::File::options().write(true).open("/dev/full").unwrap();
+            let run = finish(command(place.path(), line).stdout(full).output().unwrap());
+            assert_eq!(run.code, 7, "{line:?}: {}", run.words);
+            assert!(run.words.contains("cannot be written"), "{}", run.words);
+        }
+    }
+}
+
+/// Renaming a result over a pipe or a device would replace it.
+#[cfg(unix)]
+#[test]
+fn an_output_that_is_no_file_is_refused() {
+    let place = sample_folder();
+    let pipe = place.path().join("pipe.npy");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let run = run(
+        place.path(),
+        &["eval", "a.dat", "-o", "pipe.npy", "--overwrite"],
+    );
+    assert_eq!(run.code, 2, "{}", run.words);
+    assert!(!pipe.metadata().unwrap().is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_stop_the_program_and_leave_no_file() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let place = sample_folder();
+        fs::create_dir(place.path().join("out")).unwrap();
+        // Some seconds of text.
+        let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
+        let mut child = command(place.path(), &line).spawn().unwrap();
+        let out = place.path().join("out");
+        while fs::read_dir(&out).unwrap().count() == 0 {
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "it ended before it could be stopped"
+            );
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let sent = Command::new("kill")
+            .args([&format!("-{signal}"), &child.id().to_string()])
+            .status();
+        assert!(sent.unwrap().success());
+        let started = std::time::Instant::now();
+        assert_eq!(child.wait().unwrap().code(), Some(code));
+        assert!(started.elapsed().as_secs() < 3, "{:?}", started.elapsed());
+        assert_eq!(
+            fs::read_dir(&out).unwrap().count(),
+            0,
+            "something was left behind"
+        );
+    }
+}
