@@ -191,7 +191,7 @@ pub enum FramesError {
     },
     /// More samples than [`MAX_FRAMES`] or than memory can address.
     #[error(
-        "{tracks} tracks × {frames:.0} frames are {bytes:.3e} bytes; at most {MAX_FRAMES} frames can be asked for"
+        "tracks × frames = {tracks} × {frames:.0}, which is {bytes:.0} bytes; at most {MAX_FRAMES} frames can be asked for"
     )]
     TooMany {
         /// Number of tracks.
@@ -215,12 +215,13 @@ pub enum FramesError {
 }
 
 impl Frames {
-    /// Whole frames per second, from the set's first key to its last.
-    ///
-    /// # Panics
-    /// For 0: a rate is positive. [`Frames::rate`] takes checked rates.
+    /// Whole frames per second, from the set's first key to its last. A rate of 0 is
+    /// refused when the frames are resolved against a set.
     pub fn fps(frames_per_second: u32) -> Self {
-        Self::rate(FrameRate::new(u64::from(frames_per_second), 1).expect("a positive frame rate"))
+        Self::rate(FrameRate {
+            frames: u64::from(frames_per_second),
+            seconds: 1,
+        })
     }
 
     /// Frames at an exact rate, from the set's first key to its last: frame `k` at
@@ -277,6 +278,10 @@ impl Frames {
         let (first, last) = span.unwrap_or((0.0, 0.0));
         let (ticks, count) = match &self.request {
             Request::Rate { rate, start, end } => {
+                if rate.frames == 0 {
+                    let given = rate.to_string();
+                    return Err(FramesError::Rate { given });
+                }
                 let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
                 finite(&[start, end])?;
                 if end < start {

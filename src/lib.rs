@@ -72,3 +72,8 @@ pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanError, VulkanHandles};
 pub use method::{Ends, Form, Interpolation, InterpolationError, METHODS, Method, Path};
 pub use rotations::{Layout, Rotations};
 pub use tracks::{NORM_TOLERANCE, Track, TrackError, TrackSet};
+
+/// The README's example is compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

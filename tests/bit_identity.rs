@@ -296,3 +296,15 @@ fn nothing_to_evaluate_is_no_error() {
         }
     }
 }
+
+/// What callers move into threads and share between them.
+#[test]
+fn engines_clips_and_results_are_send_and_sync() {
+    fn check<T: Send + Sync>() {}
+    check::<Engine>();
+    check::<tumble::Clip>();
+    check::<tumble::Rotations>();
+    check::<Device>();
+    check::<TrackSet>();
+    check::<tumble::Error>();
+}
