@@ -52,14 +52,6 @@ impl Device {
             .collect())
     }
 
-    /// The first Vulkan device, else the CPU.
-    pub fn auto() -> Self {
-        Self::list()
-            .ok()
-            .and_then(|devices| devices.into_iter().next())
-            .unwrap_or(Self::Cpu)
-    }
-
     /// Its name: the driver's, or `CPU`.
     pub fn name(&self) -> &str {
         match self {

@@ -102,6 +102,18 @@ impl Engine {
         Self::with_options(device, &EngineOptions::default())
     }
 
+    /// The first Vulkan device that opens and passes its canaries, else the CPU.
+    ///
+    /// # Errors
+    /// When the system refuses what the CPU needs.
+    pub fn auto() -> Result<Self, Error> {
+        let devices = Device::list().unwrap_or_default();
+        let exact = devices
+            .into_iter()
+            .find_map(|device| Self::new(device).ok());
+        exact.map_or_else(|| Self::new(Device::Cpu), Ok)
+    }
+
     /// Opens a device.
     ///
     /// # Errors

@@ -13,7 +13,7 @@
 //! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;
 //!
 //! // 2. Where to evaluate: the fastest Vulkan device, else the CPU.
-//! let engine = Engine::new(Device::auto())?;
+//! let engine = Engine::auto()?;
 //!
 //! // 3. A clip stays on the device; evaluate it as often as needed.
 //! let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;

@@ -80,11 +80,11 @@ impl Verification {
 /// rotation.
 ///
 /// ```
-/// use tumble::{Device, Engine, Frames, TrackSet, method, verify::verify};
+/// use tumble::{Engine, Frames, TrackSet, method, verify::verify};
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
-/// let engine = Engine::new(Device::auto())?;
+/// let engine = Engine::auto()?;
 /// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
 /// assert!(found.passes());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
