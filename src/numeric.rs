@@ -70,13 +70,10 @@ pub(crate) fn norm3(v: DVec3) -> f64 {
 /// The exponential of a half-rotation vector: `[cos |a|; sin |a| a/|a|]`.
 pub(crate) fn exp(a: DVec3) -> DQuat {
     let angle = norm3(a);
+    let (sine, cosine) = libm::sincos(angle);
     // sin(x)/x is 1 to f64 rounding below 1e-9.
-    let sinc = if angle < 1e-9 {
-        1.0
-    } else {
-        libm::sin(angle) / angle
-    };
-    DQuat::from_xyzw(sinc * a.x, sinc * a.y, sinc * a.z, libm::cos(angle))
+    let sinc = if angle < 1e-9 { 1.0 } else { sine / angle };
+    DQuat::from_xyzw(sinc * a.x, sinc * a.y, sinc * a.z, cosine)
 }
 
 /// The logarithm of a unit quaternion, HALF of the rotation vector, of length at

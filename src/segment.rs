@@ -159,6 +159,13 @@ impl Segments {
         }
     }
 
+    pub(crate) fn reserve(&mut self, more: usize) {
+        match self {
+            Self::Arc(segments) => segments.reserve(more),
+            Self::Cumulative(segments) => segments.reserve(more),
+        }
+    }
+
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self {
             Self::Arc(segments) => bytemuck::cast_slice(segments),

@@ -3,7 +3,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::{Ends, Interpolation, InterpolationError, Path};
+use super::{Ends, Form, Interpolation, InterpolationError, Path};
 use crate::numeric::{dot, log, step, to_f64, unit};
 use crate::tracks::Track;
 
@@ -22,6 +22,9 @@ pub(crate) struct Keys<'a> {
     pub(crate) times: &'a [f64],
     /// What happens in the first and the last interval.
     pub(crate) ends: Ends,
+    /// The half-rotation vector of each interval: most methods need each of them
+    /// several times, and a logarithm costs more than all else. Arcs need none.
+    logs: Vec<DVec3>,
 }
 
 impl<'a> Keys<'a> {
@@ -48,10 +51,18 @@ impl<'a> Keys<'a> {
             }
             rotations[i] = after * sign;
         }
+        let logs = match interpolation.method.form {
+            Form::Arc => Vec::new(),
+            Form::Cumulative => {
+                let pairs = rotations.windows(2);
+                pairs.map(|pair| log(step(pair[0], pair[1]))).collect()
+            }
+        };
         let keys = Self {
             rotations,
             times: track.times,
             ends: interpolation.ends,
+            logs,
         };
         if matches!(keys.ends, Ends::Loop) {
             keys.check_loop(index)?;
@@ -93,8 +104,8 @@ impl<'a> Keys<'a> {
         step(self.rotations[i], self.rotations[i + 1])
     }
 
-    /// The half-rotation vector of interval `i`.
+    /// The half-rotation vector of interval `i`; a loop's continue past both ends.
     pub(crate) fn log_step(&self, i: isize) -> DVec3 {
-        log(self.step(i))
+        self.logs[i.rem_euclid(self.intervals() as isize) as usize]
     }
 }

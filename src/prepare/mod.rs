@@ -158,6 +158,8 @@ impl Prepared {
         let all = 0..keys.intervals();
         let first_span = self.spans.len();
         let first_key = self.constants.len() as u32;
+        self.segments.reserve(intervals.len());
+        self.spans.reserve(intervals.len());
         let stored = |i: usize| track.keys[i].to_array();
 
         // A curve that does not pass through its keys has end values of its own.
@@ -348,7 +350,7 @@ fn end_value(curve: &Curve, held: DQuat, t: f64) -> DQuat {
 fn cumulative_segment(cubic: &Cumulative, piece: usize, pieces: usize) -> CumulativeSegment {
     let width = 1.0 / pieces as f64;
     let middle = (piece as f64 + 0.5) * width;
-    let mut terms = vec![unit(cubic.base)];
+    let mut terms = [unit(cubic.base); 8];
     let mut powers = [[0.0; 4]; 3];
     for (j, &vector) in cubic.vectors.iter().enumerate() {
         let angle = norm3(vector);
@@ -359,11 +361,11 @@ fn cumulative_segment(cubic: &Cumulative, piece: usize, pieces: usize) -> Cumula
         };
         let axis = DQuat::from_xyzw(axis.x, axis.y, axis.z, 0.0);
         let reached = exp(vector * cubic.weight(j, middle));
-        terms = terms
-            .iter()
-            .map(|&term| product(term, reached))
-            .flat_map(|cosine| [cosine, product(cosine, axis)])
-            .collect();
+        // Each rotation doubles the terms: with its cosine, and with its sine.
+        for i in (0..1 << j).rev() {
+            let cosine = product(terms[i], reached);
+            (terms[2 * i], terms[2 * i + 1]) = (cosine, product(cosine, axis));
+        }
         // B_j(middle + s width) - B_j(middle), in powers of s.
         let [_, c1, c2, c3] = cubic.basis[j];
         let slope = (3.0 * c3 * middle + 2.0 * c2) * middle + c1;
@@ -372,12 +374,8 @@ fn cumulative_segment(cubic: &Cumulative, piece: usize, pieces: usize) -> Cumula
         powers[2][j] = angle * c3 * width * width * width;
     }
     let [linear, quadratic, cubic] = powers.map(|power| power.map(round_f32));
-    let mut rounded = [[0.0; 4]; 8];
-    for (term, &exact) in rounded.iter_mut().zip(&terms) {
-        *term = round_quat(exact);
-    }
     CumulativeSegment {
-        terms: rounded,
+        terms: terms.map(round_quat),
         linear,
         quadratic,
         cubic,
