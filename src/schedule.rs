@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-use crate::clock::{FrameRate, FramesError, Ticks, Timeline};
+use crate::clock::{FramesError, Ticks, Timeline};
+use crate::frame_rate::FrameRate;
 use crate::numeric::{round_f32, round_quat, unit};
 use crate::prepare::{NONE, Part, Prepared, Source, Span};
 

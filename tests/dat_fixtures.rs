@@ -152,6 +152,18 @@ fn the_largest_header_costs_nothing() {
     assert_eq!(error.unwrap_err().code, Code::Columns);
 }
 
+/// As many boxes as there may be: a row is read once, not once for each box.
+#[test]
+fn the_widest_file_is_read() {
+    let row = " 0 1 0 0".repeat(65_536);
+    let text = format!("# 65536 3\n0{row}\n1{row}\n");
+    let loaded = read_dat("t", text.as_bytes(), &DatOptions::default()).unwrap();
+    assert_eq!(
+        (loaded.set.track_count(), loaded.set.key_count()),
+        (65_536, 131_072)
+    );
+}
+
 proptest! {
     #[test]
     fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {

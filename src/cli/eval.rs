@@ -12,6 +12,7 @@ use super::exit::{Failure, for_each};
 use super::input::Inputs;
 use super::interpolation::{Manner, method};
 use super::output::{Format, Target};
+use super::progress::busy;
 use super::time::{Samples, Sampling};
 use super::{input, output, room, signals, words};
 
@@ -128,9 +129,11 @@ impl Arguments {
             (LayoutArgument::Frame, _) | (_, Format::Csv | Format::Dat) => Layout::FrameMajor,
         };
         let started = Instant::now();
-        let rotations = device
-            .evaluate(&set, self.manner.with(self.method), &frames, layout)
-            .map_err(|error| Failure::evaluating(&name, &error))?;
+        let interpolation = self.manner.with(self.method);
+        let rotations = busy(&format!("evaluating {name}"), || {
+            device.evaluate(&set, interpolation, &frames, layout)
+        })
+        .map_err(|error| Failure::evaluating(&name, &error))?;
         let elapsed = started.elapsed();
         target.write_rotations(&set, &timeline, &rotations, self.order.into())?;
         words::note(&format!(

@@ -11,6 +11,7 @@ use tumble::formats::times::open_times;
 use tumble::formats::{Code, Diagnostic};
 
 use super::exit::Failure;
+use super::progress::busy;
 use super::words;
 
 /// The inputs of a command, and what they may be.
@@ -79,13 +80,13 @@ impl Inputs {
             file: self.max_size,
             ..Limits::default()
         };
-        let loaded = open_dat(
-            path,
-            &DatOptions {
-                limits,
-                pipes: self.pipes,
-            },
-        );
+        let options = DatOptions {
+            limits,
+            pipes: self.pipes,
+        };
+        let loaded = busy(&format!("reading {}", name(path)), || {
+            open_dat(path, &options)
+        });
         let loaded = loaded.map_err(|diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",

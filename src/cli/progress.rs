@@ -1,6 +1,9 @@
-//! A progress bar, once work has taken a second and someone is watching.
+//! A progress bar, once work has taken a second and someone is watching; a line
+//! that moves where nobody knows how far the work is.
 
 use std::io::IsTerminal;
+use std::sync::mpsc;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -62,4 +65,28 @@ impl Drop for Progress {
             bar.finish_and_clear();
         }
     }
+}
+
+/// Runs work that is one call, and shows that it is alive.
+pub(crate) fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
+    if !std::io::stderr().is_terminal() {
+        return work();
+    }
+    let (done, finished) = mpsc::channel::<()>();
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            // A sender that is dropped ends the wait, also when the work panics.
+            if finished.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
+                let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}")
+                    .unwrap_or_else(|_| ProgressStyle::default_spinner());
+                let spinner = ProgressBar::new_spinner().with_style(style);
+                spinner.set_message(what.to_owned());
+                spinner.enable_steady_tick(Duration::from_millis(100));
+                let _ = finished.recv();
+                spinner.finish_and_clear();
+            }
+        });
+        let _done = done;
+        work()
+    })
 }

@@ -154,6 +154,21 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
     Ok(())
 }
 
+/// The next number of a line, and its column.
+fn read_number<'a, R: BufRead>(
+    lines: &mut Lines<R>,
+    numbers: &mut impl Iterator<Item = (u64, &'a str)>,
+) -> Result<(u64, f64), Diagnostic> {
+    // The columns were counted before.
+    let (place, token) = numbers.next().unwrap_or((1, ""));
+    let number = number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
+    if number.vanished {
+        let message = format!("`{token}` is too small for f32; it becomes 0");
+        lines.warn(place, Code::Tiny, message);
+    }
+    Ok((place, number.value))
+}
+
 /// The keys read so far, one list for each box.
 struct Keys {
     times: Vec<f64>,
@@ -190,29 +205,17 @@ impl Keys {
         }
         self.check_columns(lines, line)?;
         let mut numbers = tokens(line);
-        let mut column = 1;
-        let mut read = |lines: &mut Lines<R>| -> Result<f64, Diagnostic> {
-            let (place, token) = numbers.next().unwrap_or((1, ""));
-            column = place;
-            let number =
-                number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
-            if number.vanished {
-                let message = format!("`{token}` is too small for f32; it becomes 0");
-                lines.warn(place, Code::Tiny, message);
-            }
-            Ok(number.value)
-        };
-        let time = read(lines)?;
+        let (_, time) = read_number(lines, &mut numbers)?;
         self.check_time(lines, time)?;
         if self.boxes.is_empty() {
             // Only now: this many numbers were there.
             self.boxes = vec![Vec::new(); self.count];
         }
         for index in 0..self.count {
-            let [w, x, y, z] = [read(lines)?, read(lines)?, read(lines)?, read(lines)?];
-            let place = tokens(line)
-                .nth(1 + 4 * index)
-                .map_or(1, |(place, _)| place);
+            let (place, w) = read_number(lines, &mut numbers)?;
+            let (_, x) = read_number(lines, &mut numbers)?;
+            let (_, y) = read_number(lines, &mut numbers)?;
+            let (_, z) = read_number(lines, &mut numbers)?;
             self.push(lines, place, index, DQuat::from_xyzw(x, y, z, w))?;
         }
         self.times.push(time);
