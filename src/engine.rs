@@ -9,9 +9,7 @@ use crate::clip::Clip;
 use crate::clock::{Frames, FramesError};
 use crate::cpu::{CpuEngine, VectorWidth};
 use crate::device::{Device, EngineOptions, VulkanDevice};
-use crate::gpu::{
-    CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError, VulkanHandles,
-};
+use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Rotations};
@@ -138,27 +136,8 @@ impl Engine {
         }
     }
 
-    /// Evaluates on an application's own Vulkan device.
-    ///
-    /// # Errors
-    /// As [`Engine::with_options`].
-    ///
-    /// # Safety
-    /// The handles must be valid and belong together, must outlive the engine and
-    /// all of its clips and results, and nobody else may use the queue while the
-    /// engine does.
-    #[allow(unsafe_code)] // the promise is the caller's to make
-    pub unsafe fn from_vulkan(
-        handles: VulkanHandles,
-        options: &EngineOptions,
-    ) -> Result<Self, Error> {
-        // SAFETY: promised by the caller.
-        let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
-        let info = engine.info().clone();
-        Self::trusted(engine, info, options)
-    }
-
-    fn trusted(
+    /// Runs the canaries; refuses a device that fails one, unless told otherwise.
+    pub(crate) fn trusted(
         engine: VulkanEngine,
         info: DeviceInfo,
         options: &EngineOptions,

@@ -1,7 +1,5 @@
 //! Vulkan objects of an application's own.
 
-use std::sync::Arc;
-
 use ash::vk;
 
 use super::device::LogicalDevice;
@@ -10,6 +8,7 @@ use super::error::VulkanError;
 use super::instance::Instance;
 use super::physical::PhysicalDevice;
 use crate::device::EngineOptions;
+use crate::engine::{Engine, Error};
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).
@@ -31,12 +30,33 @@ pub struct VulkanHandles {
     pub queue_family: u32,
 }
 
+impl Engine {
+    /// Evaluates on an application's own Vulkan device.
+    ///
+    /// # Errors
+    /// As [`Engine::with_options`].
+    ///
+    /// # Safety
+    /// The handles must be valid and belong together, must outlive the engine and
+    /// all of its clips and results, and nobody else may use the queue while the
+    /// engine does.
+    pub unsafe fn from_vulkan(
+        handles: VulkanHandles,
+        options: &EngineOptions,
+    ) -> Result<Self, Error> {
+        // SAFETY: promised by the caller.
+        let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
+        let info = engine.info().clone();
+        Self::trusted(engine, info, options)
+    }
+}
+
 impl VulkanEngine {
     /// # Safety
     /// The handles must be valid and belong together, must outlive the engine and
     /// all of its clips and results, and nobody else may use the queue while the
     /// engine does.
-    pub(crate) unsafe fn from_handles(
+    unsafe fn from_handles(
         handles: VulkanHandles,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
@@ -45,7 +65,6 @@ impl VulkanEngine {
             .ok_or(VulkanError::NoDevice)?;
         physical.queue_family = handles.queue_family;
         let device = LogicalDevice::borrowed(physical, handles.device, handles.queue);
-        let device: Arc<LogicalDevice> = device;
         Self::with_device(device, options)
     }
 }
