@@ -58,6 +58,7 @@ impl FrameRate {
     }
 
     /// How many frames fit into `seconds`, not rounded to a whole number.
+    #[inline(always)]
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
         let frames = seconds * self.frames as f64;
         // Most rates are whole, and a division takes longer than all else here.

@@ -11,11 +11,13 @@ use glam::{DQuat, DVec3, Quat};
 const TINY: f32 = f32::from_bits(0x1f80_0000); // 2^-64
 
 /// The value with every magnitude below 2^-64 replaced by +0.
+#[inline(always)]
 pub(crate) fn canonical(value: f32) -> f32 {
     if value.abs() < TINY { 0.0 } else { value }
 }
 
 /// Rounds to f32 and makes the result canonical.
+#[inline(always)]
 pub(crate) fn round_f32(value: f64) -> f32 {
     canonical(value as f32)
 }

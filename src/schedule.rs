@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::frame_rate::FrameRate;
 use crate::numeric::{round_f32, round_quat, unit};
-use crate::prepare::{NONE, Part, Prepared, Source, Span};
+use crate::prepare::{NONE, Part, Prepared, Source};
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]
@@ -52,14 +52,28 @@ pub(crate) enum Parameter {
     Seconds { start: f64, seconds: f64 },
 }
 
+/// Takes runs. A trait rather than a closure: a closure's body is not compiled for
+/// the vector width of the function that it is inlined into.
+pub(crate) trait Emit {
+    fn run(&mut self, run: Run);
+}
+
+impl<F: FnMut(Run)> Emit for F {
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        self(run);
+    }
+}
+
 impl Prepared {
     /// The runs of one part within a range of samples, in order.
+    #[inline(always)]
     pub(crate) fn runs(
         &self,
         part: &Part,
         timeline: &Timeline,
         samples: Range<usize>,
-        emit: impl FnMut(Run),
+        emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
@@ -93,124 +107,139 @@ impl Prepared {
         round_quat(unit(self.exact[index as usize].rotation(t)))
     }
 
+    #[inline(always)]
     fn frame_runs(
         &self,
         part: &Part,
         clock: FrameClock,
         samples: Range<usize>,
-        mut emit: impl FnMut(Run),
+        emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        let spans = &self.spans[part.spans.clone()];
-        let begin = clock.boundary(spans.first().map_or(part.end, |span| span.start));
-        let end = clock.boundary(part.end);
-        let mut emit = |from: usize, to: usize, source| {
-            let (sample, to) = (from.max(samples.start), to.min(samples.end));
-            if sample < to {
-                emit(Run {
-                    sample,
-                    count: to - sample,
-                    source,
-                });
-            }
-        };
+        let starts = &self.spans.starts[part.spans.clone()];
+        let extents = &self.spans.extents[part.spans.clone()];
+        let sources = &self.spans.sources[part.spans.clone()];
+        let keys = &self.spans.keys[part.spans.clone()];
         if part.before != NONE {
-            emit(0, begin.first, RunSource::Constant(part.before));
+            let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
+            clip(0, begin.first as usize, &samples, part.before, emit);
         }
         // The span that holds the first sample; a time's own rounding may put it one
         // further.
-        let first_time = clock.time(samples.start);
-        let skipped = spans
-            .partition_point(|span| span.start <= first_time)
-            .saturating_sub(2);
-        let mut to = spans
-            .get(skipped)
-            .map_or(end, |span| clock.boundary(span.start));
-        for (i, span) in spans.iter().enumerate().skip(skipped) {
-            let from = to;
-            to = spans
-                .get(i + 1)
-                .map_or(end, |next| clock.boundary(next.start));
-            if from.first >= samples.end {
-                break;
-            }
-            let mut first = from.first;
-            if first == to.first {
-                continue;
-            }
-            if span.key != NONE && first as f64 == from.frame {
-                emit(first, first + 1, RunSource::Constant(span.key));
-                first += 1;
-            }
-            let (first, last) = (first.max(samples.start), to.first.min(samples.end));
-            if first < last {
-                let frames = to.frame - from.frame;
-                let source = frame_source(span, from.frame, to.frame, first, last).ok_or(
-                    FramesError::GapTooLong {
-                        track: part.track,
-                        key: i,
-                        frames,
+        let mut skipped = 0;
+        if samples.start > 0 {
+            let first_time = clock.time(samples.start);
+            let found = starts.partition_point(|&start| start <= first_time);
+            skipped = found.saturating_sub(2);
+        }
+        let mut spans = SpanBlock::new();
+        'blocks: for block in (skipped..starts.len()).step_by(SpanBlock::LEN) {
+            let end = (block + SpanBlock::LEN).min(starts.len());
+            let next = starts.get(end).copied().unwrap_or(part.end);
+            spans.fill(clock, &starts[block..end], next, &extents[block..end]);
+            let (sources, keys) = (&sources[block..end], &keys[block..end]);
+            for (j, (&source, &key)) in sources.iter().zip(keys).enumerate() {
+                let mut first = spans.first[j] as usize; // saturates at 0
+                let to = spans.first[j + 1] as usize;
+                if first >= samples.end {
+                    break 'blocks;
+                }
+                if first == to {
+                    continue;
+                }
+                let from_frame = spans.frame[j];
+                if key != NONE && first as f64 == from_frame {
+                    clip(first, first + 1, &samples, key, emit);
+                    first += 1;
+                }
+                let (first, last) = (first.max(samples.start), to.min(samples.end));
+                if first >= last {
+                    continue;
+                }
+                let source = match source {
+                    Source::Segment(index) => {
+                        let whole = spans.whole[j];
+                        // Distances fit 32 bits if that of the last sample does.
+                        if (last as f64 - whole).abs() >= COUNTABLE
+                            || (first as f64 - whole).abs() >= COUNTABLE
+                        {
+                            return Err(FramesError::GapTooLong {
+                                track: part.track,
+                                key: block + j,
+                                frames: spans.frame[j + 1] - from_frame,
+                            });
+                        }
+                        RunSource::Segment {
+                            index,
+                            distance: Distance::Frames {
+                                first: (first as i64 - whole as i64) as i32,
+                            },
+                            scale: spans.scale[j],
+                            offset: spans.offset[j],
+                        }
+                    }
+                    Source::Constant(constant) => RunSource::Constant(constant),
+                    Source::Exact(index) => RunSource::Exact {
+                        index,
+                        parameter: Parameter::Frames {
+                            start: from_frame,
+                            frames: spans.frame[j + 1] - from_frame,
+                        },
                     },
-                )?;
-                emit(first, last, source);
+                };
+                emit.run(Run {
+                    sample: first,
+                    count: last - first,
+                    source,
+                });
             }
         }
         if part.after != NONE {
-            emit(end.first, usize::MAX, RunSource::Constant(part.after));
+            let end = clock.boundary(part.end);
+            clip(end.first as usize, usize::MAX, &samples, part.after, emit);
         }
         Ok(())
     }
 
-    fn time_runs(
-        &self,
-        part: &Part,
-        times: &[f64],
-        samples: Range<usize>,
-        mut emit: impl FnMut(Run),
-    ) {
-        let spans = &self.spans[part.spans.clone()];
+    #[inline(always)]
+    fn time_runs(&self, part: &Part, times: &[f64], samples: Range<usize>, emit: &mut impl Emit) {
+        let starts = &self.spans.starts[part.spans.clone()];
         let mut sample = samples.start;
         let mut i = 0;
         while sample < samples.end {
             let time = times[sample];
+            let end_of = |i: usize| starts.get(i + 1).copied().unwrap_or(part.end);
             // Times mostly increase: look here and next before searching.
-            let holds = |i: usize| {
-                spans.get(i).is_some_and(|span| span.start <= time)
-                    && time < spans.get(i + 1).map_or(part.end, |next| next.start)
-            };
+            let holds =
+                |i: usize| starts.get(i).is_some_and(|&start| start <= time) && time < end_of(i);
             if !holds(i) {
-                let found = spans.partition_point(|span| span.start <= time);
                 i = if holds(i + 1) {
                     i + 1
                 } else {
-                    found.saturating_sub(1)
+                    starts
+                        .partition_point(|&start| start <= time)
+                        .saturating_sub(1)
                 };
             }
             let (covered, source) = if holds(i) {
-                let span = &spans[i];
-                let end = spans.get(i + 1).map_or(part.end, |next| next.start);
-                if time == span.start && span.key != NONE {
-                    (
-                        span.start..time.next_up(),
-                        Some(RunSource::Constant(span.key)),
-                    )
+                let (start, end) = (starts[i], end_of(i));
+                let key = self.spans.keys[part.spans.start + i];
+                if time == start && key != NONE {
+                    (start..time.next_up(), Some(RunSource::Constant(key)))
                 } else {
-                    let open = if span.key == NONE {
-                        span.start
-                    } else {
-                        span.start.next_up()
-                    };
-                    (open..end, Some(time_source(span, end)))
+                    let open = if key == NONE { start } else { start.next_up() };
+                    let source = self.time_source(part.spans.start + i, end);
+                    (open..end, Some(source))
                 }
             } else if time >= part.end {
                 (part.end..f64::INFINITY, constant_source(part.after))
             } else {
-                let begin = spans.first().map_or(part.end, |span| span.start);
+                let begin = starts.first().copied().unwrap_or(part.end);
                 (f64::NEG_INFINITY..begin, constant_source(part.before))
             };
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
             if let Some(source) = source {
-                emit(Run {
+                emit.run(Run {
                     sample,
                     count,
                     source,
@@ -219,6 +248,105 @@ impl Prepared {
             sample += count;
         }
     }
+
+    fn time_source(&self, span: usize, end: f64) -> RunSource {
+        let start = self.spans.starts[span];
+        let seconds = end - start;
+        match self.spans.sources[span] {
+            Source::Constant(constant) => RunSource::Constant(constant),
+            Source::Exact(index) => RunSource::Exact {
+                index,
+                parameter: Parameter::Seconds { start, seconds },
+            },
+            Source::Segment(index) => RunSource::Segment {
+                index,
+                distance: Distance::Seconds {
+                    middle: start + seconds * 0.5,
+                },
+                scale: finite_scale(self.spans.extents[span] / seconds),
+                offset: 0.0,
+            },
+        }
+    }
+}
+
+/// Emits the part of a constant's samples that lies within `samples`.
+#[inline(always)]
+fn clip(from: usize, to: usize, samples: &Range<usize>, constant: u32, emit: &mut impl Emit) {
+    let (sample, to) = (from.max(samples.start), to.min(samples.end));
+    if sample < to {
+        emit.run(Run {
+            sample,
+            count: to - sample,
+            source: RunSource::Constant(constant),
+        });
+    }
+}
+
+/// Distances in frames are whole numbers of 32 bits.
+const COUNTABLE: f64 = (1u64 << 31) as f64;
+
+/// The frame coordinates of consecutive spans, and what their samples' parameters
+/// follow from. Worked out in vector lanes: plain loops over arrays, no calls.
+struct SpanBlock {
+    /// Where each span starts, and at the end where the last one ends, in frames.
+    frame: [f64; Self::LEN + 1],
+    /// The first whole frame not before `frame`.
+    first: [f64; Self::LEN + 1],
+    /// The whole frame nearest to each span's middle.
+    whole: [f64; Self::LEN],
+    scale: [f32; Self::LEN],
+    offset: [f32; Self::LEN],
+}
+
+impl SpanBlock {
+    const LEN: usize = 32;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            frame: [0.0; Self::LEN + 1],
+            first: [0.0; Self::LEN + 1],
+            whole: [0.0; Self::LEN],
+            scale: [0.0; Self::LEN],
+            offset: [0.0; Self::LEN],
+        }
+    }
+
+    /// At most [`Self::LEN`] spans; `next` is where the last of them ends.
+    #[inline(always)]
+    fn fill(&mut self, clock: FrameClock, starts: &[f64], next: f64, extents: &[f64]) {
+        let count = starts.len();
+        let frame = &mut self.frame[..count];
+        let first = &mut self.first[..count];
+        for j in 0..count {
+            let boundary = clock.boundary(starts[j]);
+            frame[j] = boundary.frame;
+            first[j] = boundary.first;
+        }
+        let end = clock.boundary(next);
+        (self.frame[count], self.first[count]) = (end.frame, end.first);
+        let from = &self.frame[..count];
+        let to = &self.frame[1..=count];
+        let extents = &extents[..count];
+        let whole = &mut self.whole[..count];
+        let scales = &mut self.scale[..count];
+        let offsets = &mut self.offset[..count];
+        for j in 0..count {
+            let middle = (from[j] + to[j]) * 0.5;
+            let scale = extents[j] / (to[j] - from[j]);
+            whole[j] = nearest_whole(middle);
+            scales[j] = finite_scale(scale);
+            offsets[j] = round_f32((whole[j] - middle) * scale);
+        }
+    }
+}
+
+/// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
+#[inline(always)]
+fn finite_scale(scale: f64) -> f32 {
+    let largest = f64::from(f32::MAX);
+    round_f32(if scale < largest { scale } else { largest })
 }
 
 /// Key times as frames: exact ratios in f64.
@@ -235,8 +363,8 @@ struct FrameClock {
 struct Boundary {
     /// Its frame coordinate.
     frame: f64,
-    /// The first whole frame not before it, and not before 0.
-    first: usize,
+    /// The first whole frame not before it.
+    first: f64,
 }
 
 impl FrameClock {
@@ -252,6 +380,7 @@ impl FrameClock {
 
     /// A time within its own rounding of a whole frame is that frame, so a sample on
     /// a key returns the key at hour 24 too.
+    #[inline(always)]
     fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.start);
         let whole = nearest_whole(exact);
@@ -261,10 +390,7 @@ impl FrameClock {
             exact
         };
         let first = if whole < frame { whole + 1.0 } else { whole };
-        Boundary {
-            frame,
-            first: first as usize,
-        } // the cast saturates at 0
+        Boundary { frame, first }
     }
 
     fn time(self, frame: usize) -> f64 {
@@ -274,65 +400,10 @@ impl FrameClock {
 
 /// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
 /// rounded away in the sum. A call to `round` costs more than all else here.
+#[inline(always)]
 fn nearest_whole(x: f64) -> f64 {
     const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
     (x + SHIFT) - SHIFT
-}
-
-/// The source of the frames `first` to `last` (not included) of a span that covers
-/// the frame coordinates `from` to `to`; `None` when they cannot be counted in 32
-/// bits.
-fn frame_source(span: &Span, from: f64, to: f64, first: usize, last: usize) -> Option<RunSource> {
-    match span.source {
-        Source::Constant(constant) => Some(RunSource::Constant(constant)),
-        Source::Exact(index) => {
-            let parameter = Parameter::Frames {
-                start: from,
-                frames: to - from,
-            };
-            Some(RunSource::Exact { index, parameter })
-        }
-        Source::Segment(index) => {
-            let middle = (from + to) * 0.5;
-            let whole = nearest_whole(middle);
-            let scale = span.extent / (to - from);
-            let count =
-                |frame: usize| -> Option<i32> { i32::try_from(frame as i64 - whole as i64).ok() };
-            count(last)?;
-            Some(RunSource::Segment {
-                index,
-                distance: Distance::Frames {
-                    first: count(first)?,
-                },
-                // Finite: a segment far shorter than a frame holds at most the
-                // frame at distance 0.
-                scale: round_f32(scale.min(f64::from(f32::MAX))),
-                offset: round_f32((whole - middle) * scale),
-            })
-        }
-    }
-}
-
-fn time_source(span: &Span, end: f64) -> RunSource {
-    let seconds = end - span.start;
-    match span.source {
-        Source::Constant(constant) => RunSource::Constant(constant),
-        Source::Exact(index) => RunSource::Exact {
-            index,
-            parameter: Parameter::Seconds {
-                start: span.start,
-                seconds,
-            },
-        },
-        Source::Segment(index) => RunSource::Segment {
-            index,
-            distance: Distance::Seconds {
-                middle: span.start + seconds * 0.5,
-            },
-            scale: round_f32((span.extent / seconds).min(f64::from(f32::MAX))),
-            offset: 0.0,
-        },
-    }
 }
 
 fn constant_source(constant: u32) -> Option<RunSource> {

@@ -3,7 +3,12 @@
 //! subtraction and multiplication are used, never a fused one.
 #![allow(unsafe_code)]
 
-use super::evaluate::{Affine, Evaluate, Scratch, distances, frames};
+use std::ops::Range;
+
+use super::evaluate::Evaluate;
+use super::row::row;
+use crate::clock::{FramesError, Timeline};
+use crate::prepare::PartRef;
 use crate::segment::{ArcSegment, CumulativeSegment};
 
 /// Vector instructions that the twins can be compiled for.
@@ -44,43 +49,33 @@ impl VectorWidth {
     }
 }
 
-type FramesFn<S> = unsafe fn(&S, Affine, i32, usize, &mut Scratch, &mut [[f32; 4]]);
-type DistancesFn<S> = unsafe fn(&S, Affine, &[f32], &mut Scratch, &mut [[f32; 4]]);
+type RowFn<S> = unsafe fn(
+    PartRef<'_>,
+    &[S],
+    &Timeline,
+    Range<usize>,
+    &mut [[f32; 4]],
+) -> Result<(), FramesError>;
 
 /// The evaluation of one form, compiled for one width.
 #[derive(Clone, Copy)]
 pub(crate) struct Kernel<S> {
-    frames: FramesFn<S>,
-    distances: DistancesFn<S>,
+    row: RowFn<S>,
 }
 
 impl<S> Kernel<S> {
-    /// See [`frames`].
-    pub(crate) fn frames(
+    /// See [`row`].
+    pub(crate) fn row(
         &self,
-        segment: &S,
-        affine: Affine,
-        first: i32,
-        count: usize,
-        scratch: &mut Scratch,
+        part: PartRef<'_>,
+        segments: &[S],
+        timeline: &Timeline,
+        samples: Range<usize>,
         output: &mut [[f32; 4]],
-    ) {
+    ) -> Result<(), FramesError> {
         // SAFETY: a kernel exists only for a width that the processor has
-        // (`Kernels::new`); otherwise these are safe functions.
-        unsafe { (self.frames)(segment, affine, first, count, scratch, output) }
-    }
-
-    /// See [`distances`].
-    pub(crate) fn distances(
-        &self,
-        segment: &S,
-        affine: Affine,
-        from_middle: &[f32],
-        scratch: &mut Scratch,
-        output: &mut [[f32; 4]],
-    ) {
-        // SAFETY: as above.
-        unsafe { (self.distances)(segment, affine, from_middle, scratch, output) }
+        // (`Kernels::new`); otherwise this is a safe function.
+        unsafe { (self.row)(part, segments, timeline, samples, output) }
     }
 }
 
@@ -117,46 +112,28 @@ impl Kernels {
 }
 
 fn baseline<S: Evaluate>() -> Kernel<S> {
-    Kernel {
-        frames: frames::<S>,
-        distances: distances::<S>,
-    }
+    Kernel { row: row::<S> }
 }
 
 #[cfg(target_arch = "x86_64")]
 macro_rules! compiled_for {
     ($width:ident, $features:literal) => {
         mod $width {
-            use super::{Affine, Evaluate, Kernel, Scratch};
+            use super::{Evaluate, FramesError, Kernel, PartRef, Range, Timeline};
 
             #[target_feature(enable = $features)]
-            fn frames<S: Evaluate>(
-                segment: &S,
-                affine: Affine,
-                first: i32,
-                count: usize,
-                scratch: &mut Scratch,
+            fn row<S: Evaluate>(
+                part: PartRef<'_>,
+                segments: &[S],
+                timeline: &Timeline,
+                samples: Range<usize>,
                 output: &mut [[f32; 4]],
-            ) {
-                super::frames(segment, affine, first, count, scratch, output);
-            }
-
-            #[target_feature(enable = $features)]
-            fn distances<S: Evaluate>(
-                segment: &S,
-                affine: Affine,
-                from_middle: &[f32],
-                scratch: &mut Scratch,
-                output: &mut [[f32; 4]],
-            ) {
-                super::distances(segment, affine, from_middle, scratch, output);
+            ) -> Result<(), FramesError> {
+                super::row(part, segments, timeline, samples, output)
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {
-                Kernel {
-                    frames: frames::<S>,
-                    distances: distances::<S>,
-                }
+                Kernel { row: row::<S> }
             }
         }
     };

@@ -3,13 +3,10 @@
 use glam::Quat;
 use rayon::prelude::*;
 
-use super::dispatch::{Kernel, Kernels, VectorWidth};
-use super::evaluate::{Affine, Evaluate, Scratch};
+use super::dispatch::{Kernels, VectorWidth};
 use crate::clock::{FramesError, Timeline};
-use crate::numeric::round_f32;
-use crate::prepare::{ClipData, PartRef};
+use crate::prepare::ClipData;
 use crate::rotations::Layout;
-use crate::schedule::{Distance, Run, RunSource};
 use crate::segment::Segments;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
@@ -49,6 +46,10 @@ impl CpuEngine {
         if output.is_empty() {
             return Ok(());
         }
+        // Waking a thread costs more than a task's worth of work.
+        if output.len() <= TASK {
+            return self.on_this_thread(clip, timeline, layout, output);
+        }
         let mut work = || match layout {
             Layout::TrackMajor => self.track_major(clip, timeline, output),
             Layout::FrameMajor => self.frame_major(clip, timeline, output),
@@ -56,6 +57,22 @@ impl CpuEngine {
         match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
+        }
+    }
+
+    fn on_this_thread(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        match layout {
+            Layout::TrackMajor => output
+                .chunks_mut(timeline.len())
+                .enumerate()
+                .try_for_each(|(track, row)| self.row(clip, track, timeline, 0, row)),
+            Layout::FrameMajor => self.frames(clip, timeline, 0, output),
         }
     }
 
@@ -99,16 +116,26 @@ impl CpuEngine {
         output
             .par_chunks_mut(tracks * frames_each)
             .enumerate()
-            .try_for_each(|(task, frames)| {
-                let mut row = vec![[0.0; 4]; frames.len() / tracks];
-                for track in 0..tracks {
-                    self.row(clip, track, timeline, task * frames_each, &mut row)?;
-                    for (frame, &rotation) in frames.chunks_mut(tracks).zip(&row) {
-                        frame[track] = rotation;
-                    }
-                }
-                Ok(())
-            })
+            .try_for_each(|(task, frames)| self.frames(clip, timeline, task * frames_each, frames))
+    }
+
+    /// Whole frames from `first` on, `[frame][track]`.
+    fn frames(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        first: usize,
+        frames: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        let tracks = clip.track_count();
+        let mut row = vec![[0.0; 4]; frames.len() / tracks];
+        for track in 0..tracks {
+            self.row(clip, track, timeline, first, &mut row)?;
+            for (frame, &rotation) in frames.chunks_mut(tracks).zip(&row) {
+                frame[track] = rotation;
+            }
+        }
+        Ok(())
     }
 
     /// The samples of one track from `first` on.
@@ -120,88 +147,17 @@ impl CpuEngine {
         first: usize,
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
-        let mut scratch = Scratch::new();
-        for PartRef { prepared, part } in clip.parts_of(track) {
-            prepared.runs(part, timeline, first..first + row.len(), |run| {
-                let output = &mut row[run.sample - first..];
-                match run.source {
-                    RunSource::Constant(index) => {
-                        output[..run.count].fill(prepared.constants[index as usize]);
-                    }
-                    RunSource::Exact { index, parameter } => {
-                        for (sample, rotation) in (run.sample..).zip(&mut output[..run.count]) {
-                            *rotation = prepared.exact(index, parameter, timeline, track, sample);
-                        }
-                    }
-                    RunSource::Segment {
-                        index,
-                        distance,
-                        scale,
-                        offset,
-                    } => {
-                        let affine = Affine { scale, offset };
-                        let i = index as usize;
-                        let place = Place {
-                            timeline,
-                            track,
-                            run: &run,
-                            distance,
-                        };
-                        match &prepared.segments {
-                            Segments::Arc(all) => {
-                                place.evaluate(
-                                    &self.kernels.arc,
-                                    &all[i],
-                                    affine,
-                                    &mut scratch,
-                                    output,
-                                );
-                            }
-                            Segments::Cumulative(all) => {
-                                place.evaluate(
-                                    &self.kernels.cumulative,
-                                    &all[i],
-                                    affine,
-                                    &mut scratch,
-                                    output,
-                                );
-                            }
-                        }
-                    }
+        let samples = first..first + row.len();
+        for part in clip.parts_of(track) {
+            let samples = samples.clone();
+            match &part.prepared.segments {
+                Segments::Arc(all) => self.kernels.arc.row(part, all, timeline, samples, row)?,
+                Segments::Cumulative(all) => {
+                    let kernel = &self.kernels.cumulative;
+                    kernel.row(part, all, timeline, samples, row)?;
                 }
-            })?;
+            }
         }
         Ok(())
-    }
-}
-
-/// Which samples of a segment are wanted.
-struct Place<'a> {
-    timeline: &'a Timeline,
-    track: usize,
-    run: &'a Run,
-    distance: Distance,
-}
-
-impl Place<'_> {
-    fn evaluate<S: Evaluate>(
-        &self,
-        kernel: &Kernel<S>,
-        segment: &S,
-        affine: Affine,
-        scratch: &mut Scratch,
-        output: &mut [[f32; 4]],
-    ) {
-        match self.distance {
-            Distance::Frames { first } => {
-                kernel.frames(segment, affine, first, self.run.count, scratch, output);
-            }
-            Distance::Seconds { middle } => {
-                let distances: Vec<f32> = (self.run.sample..self.run.sample + self.run.count)
-                    .map(|sample| round_f32(self.timeline.time(self.track, sample) - middle))
-                    .collect();
-                kernel.distances(segment, affine, &distances, scratch, output);
-            }
-        }
     }
 }

@@ -6,7 +6,7 @@ use crate::segment::shader::TINY_BITS;
 const BLOCK: usize = 16;
 
 /// Samples whose components are kept before they are stored.
-const CHUNK: usize = 4 * BLOCK;
+pub(super) const CHUNK: usize = 4 * BLOCK;
 
 /// Room for the components of some samples, before they are put together.
 pub(crate) struct Scratch {

@@ -7,6 +7,7 @@ mod engine;
 mod evaluate;
 mod evaluate_arc;
 mod evaluate_cumulative;
+mod row;
 mod sine_cosine;
 
 pub use dispatch::VectorWidth;

@@ -128,9 +128,10 @@ pub(super) fn work(
             .map(|parts| {
                 let mut chunk = WorkChunk::default();
                 for part in parts {
-                    prepared.runs(part, timeline, window.samples.clone(), |run| {
+                    let mut push = |run| {
                         chunk.push(prepared, timeline, window, part.track, shift, &run);
-                    })?;
+                    };
+                    prepared.runs(part, timeline, window.samples.clone(), &mut push)?;
                 }
                 Ok(chunk)
             })

@@ -38,20 +38,21 @@ pub(crate) struct Prepared {
     pub(crate) constants: Vec<[f32; 4]>,
     /// Cubics too wild for the kernels.
     pub(crate) exact: Vec<Cumulative>,
-    pub(crate) spans: Vec<Span>,
+    pub(crate) spans: Spans,
     pub(crate) parts: Vec<Part>,
 }
 
-/// A stretch of one track's time, from `start` to the start of the next span.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
+/// Stretches of tracks' time, each from its start to the start of the next one.
+/// Side by side, because the schedule is worked out for many at a time.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spans {
     /// Seconds.
-    pub(crate) start: f64,
+    pub(crate) starts: Vec<f64>,
     /// What the kernel's parameter runs over, centred on zero: the arc's angle, or 1.
-    pub(crate) extent: f64,
-    pub(crate) source: Source,
-    /// The constant to store at exactly `start`, or [`NONE`].
-    pub(crate) key: u32,
+    pub(crate) extents: Vec<f64>,
+    pub(crate) sources: Vec<Source>,
+    /// The constant to store at exactly the start, or [`NONE`].
+    pub(crate) keys: Vec<u32>,
 }
 
 /// What gives the rotations of a span: places in the lists of [`Prepared`].
@@ -135,13 +136,26 @@ fn prepare_long(
     Ok((0..parts).into_par_iter().map(part).collect())
 }
 
+impl Spans {
+    pub(crate) fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    fn reserve(&mut self, more: usize) {
+        self.starts.reserve(more);
+        self.extents.reserve(more);
+        self.sources.reserve(more);
+        self.keys.reserve(more);
+    }
+}
+
 impl Prepared {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
             segments: Segments::new(interpolation.method.form),
             constants: Vec::new(),
             exact: Vec::new(),
-            spans: Vec::new(),
+            spans: Spans::default(),
             parts: Vec::new(),
         }
     }
@@ -253,15 +267,16 @@ impl Prepared {
                 constant + constants
             }
         };
-        self.spans.extend(other.spans.iter().map(|span| Span {
-            source: match span.source {
+        let own = &mut self.spans;
+        own.starts.extend(other.spans.starts);
+        own.extents.extend(other.spans.extents);
+        own.sources
+            .extend(other.spans.sources.iter().map(|source| match source {
                 Source::Segment(i) => Source::Segment(i + segments),
                 Source::Constant(i) => Source::Constant(i + constants),
                 Source::Exact(i) => Source::Exact(i + exact),
-            },
-            key: shift(span.key),
-            ..*span
-        }));
+            }));
+        own.keys.extend(other.spans.keys.into_iter().map(shift));
         self.parts.extend(other.parts.into_iter().map(|part| Part {
             spans: part.spans.start + spans..part.spans.end + spans,
             before: shift(part.before),
@@ -279,12 +294,10 @@ impl Prepared {
     }
 
     fn push_span(&mut self, start: f64, extent: f64, source: Source, key: u32) {
-        self.spans.push(Span {
-            start,
-            extent,
-            source,
-            key,
-        });
+        self.spans.starts.push(start);
+        self.spans.extents.push(extent);
+        self.spans.sources.push(source);
+        self.spans.keys.push(key);
     }
 
     fn push_arc(&mut self, start: f64, from: DQuat, to: DQuat, key: u32) {

@@ -1,0 +1,92 @@
+//! The samples of one track: its runs, evaluated one behind the other. Compiled as
+//! one function for each vector width, so that nothing is called for a run.
+
+use std::ops::Range;
+
+use super::evaluate::{Affine, CHUNK, Evaluate, Scratch, distances, frames};
+use crate::clock::{FramesError, Timeline};
+use crate::numeric::round_f32;
+use crate::prepare::PartRef;
+use crate::schedule::{Distance, Emit, Run, RunSource};
+
+/// The samples of one part of a track that lie in `samples`, into `output`, which
+/// starts with the first of them.
+#[inline(always)]
+pub(super) fn row<S: Evaluate>(
+    PartRef { prepared, part }: PartRef<'_>,
+    segments: &[S],
+    timeline: &Timeline,
+    samples: Range<usize>,
+    output: &mut [[f32; 4]],
+) -> Result<(), FramesError> {
+    let first = samples.start;
+    let mut row = Row {
+        part: PartRef { prepared, part },
+        segments,
+        timeline,
+        first,
+        output,
+        scratch: Scratch::new(),
+    };
+    prepared.runs(part, timeline, samples, &mut row)
+}
+
+struct Row<'a, S> {
+    part: PartRef<'a>,
+    segments: &'a [S],
+    timeline: &'a Timeline,
+    /// The sample that `output` starts with.
+    first: usize,
+    output: &'a mut [[f32; 4]],
+    scratch: Scratch,
+}
+
+impl<S: Evaluate> Emit for Row<'_, S> {
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        let prepared = self.part.prepared;
+        let output = &mut self.output[run.sample - self.first..];
+        match run.source {
+            RunSource::Constant(index) => {
+                output[..run.count].fill(prepared.constants[index as usize]);
+            }
+            RunSource::Segment {
+                index,
+                distance: Distance::Frames { first },
+                scale,
+                offset,
+            } => {
+                let segment = &self.segments[index as usize];
+                let affine = Affine { scale, offset };
+                frames(segment, affine, first, run.count, &mut self.scratch, output);
+            }
+            RunSource::Segment {
+                index,
+                distance: Distance::Seconds { middle },
+                scale,
+                offset,
+            } => {
+                let segment = &self.segments[index as usize];
+                let affine = Affine { scale, offset };
+                let mut from_middle = [0.0; CHUNK];
+                for start in (0..run.count).step_by(CHUNK) {
+                    let count = (run.count - start).min(CHUNK);
+                    let from_middle = &mut from_middle[..count];
+                    for (j, distance) in from_middle.iter_mut().enumerate() {
+                        let sample = run.sample + start + j;
+                        let time = self.timeline.time(self.part.part.track, sample);
+                        *distance = round_f32(time - middle);
+                    }
+                    let output = &mut output[start..];
+                    distances(segment, affine, from_middle, &mut self.scratch, output);
+                }
+            }
+            RunSource::Exact { index, parameter } => {
+                let track = self.part.part.track;
+                for (sample, rotation) in (run.sample..).zip(&mut output[..run.count]) {
+                    *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
+                }
+            }
+        }
+    }
+}
