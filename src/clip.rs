@@ -18,6 +18,11 @@ pub struct Clip {
 }
 
 impl Clip {
+    /// The engine that it was uploaded to.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
         self.data.track_count()

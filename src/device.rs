@@ -1,5 +1,8 @@
 //! Where to evaluate, and how: a device is a value, never a global.
 
+use std::ops::AddAssign;
+use std::time::Duration;
+
 use crate::cpu::VectorWidth;
 use crate::gpu::{self, DeviceInfo, PhysicalDevice, VulkanError};
 
@@ -93,4 +96,29 @@ pub struct EngineOptions {
     pub transfer: Transfer,
     /// Use a device although its canaries fail: its bits may differ.
     pub allow_inexact: bool,
+}
+
+/// Where the time of a Vulkan device's evaluations went
+/// ([`Engine::take_timings`](crate::Engine::take_timings)).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Timings {
+    /// The host made work lists and recorded commands; the device may have worked on
+    /// another window meanwhile.
+    pub work_lists: Duration,
+    /// From handing work over to seeing its fence; windows in flight together are
+    /// counted once.
+    pub submit_to_fence: Duration,
+    /// By the device's own clock; zero where it has none.
+    pub on_device: Duration,
+    /// The host copied results to where they were asked for.
+    pub read_back: Duration,
+}
+
+impl AddAssign for Timings {
+    fn add_assign(&mut self, more: Self) {
+        self.work_lists += more.work_lists;
+        self.submit_to_fence += more.submit_to_fence;
+        self.on_device += more.on_device;
+        self.read_back += more.read_back;
+    }
 }

@@ -8,7 +8,7 @@ use glam::Quat;
 use crate::clip::Clip;
 use crate::clock::{Frames, FramesError};
 use crate::cpu::{CpuEngine, VectorWidth};
-use crate::device::{Device, EngineOptions, VulkanDevice};
+use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
 use crate::prepare::ClipData;
@@ -189,6 +189,15 @@ impl Engine {
         match &*self.backend {
             Backend::Cpu(_) => Vec::new(),
             Backend::Vulkan(opened) => opened.engine.validation_messages(),
+        }
+    }
+
+    /// Where the time of this engine's evaluations went since this was last asked,
+    /// or since it was opened; nothing on the CPU.
+    pub fn take_timings(&self) -> Timings {
+        match &*self.backend {
+            Backend::Cpu(_) => Timings::default(),
+            Backend::Vulkan(opened) => opened.engine.take_timings(),
         }
     }
 

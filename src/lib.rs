@@ -67,7 +67,7 @@ pub mod verify;
 pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
 pub use cpu::VectorWidth;
-pub use device::{Device, EngineOptions, Transfer, VulkanDevice};
+pub use device::{Device, EngineOptions, Timings, Transfer, VulkanDevice};
 pub use engine::{Engine, Error};
 pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanError, VulkanHandles};

@@ -312,3 +312,40 @@ fn listings_say_what_there_is() {
         assert!(help.contains("Examples:"), "{help}");
     }
 }
+
+/// That everything is measured and told; not how fast it is.
+#[test]
+fn bench_measures_every_workload_in_one_run() {
+    let place = sample_folder();
+    let workloads = ["sparse", "dense", "small", "crowd", "long"];
+    let mut line = vec!["bench", "--json", "--rounds", "2", "--shrink", "2000"];
+    line.extend(workloads);
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    assert_eq!(sections.len(), 2 * workloads.len());
+    for section in sections {
+        let rows = section["rows"].as_array().unwrap();
+        let names: Vec<&str> = rows.iter().map(|r| r["name"].as_str().unwrap()).collect();
+        assert_eq!(
+            names[..3],
+            [
+                "memory write rate",
+                "naive (glam, rayon)",
+                "CPU, evaluation alone"
+            ]
+        );
+        assert!(names.contains(&"CPU, from keys"), "{names:?}");
+        for row in rows {
+            assert!(row["milliseconds"].as_f64().unwrap() > 0.0, "{row}");
+            assert!(row["ratio_to_naive"].as_f64().unwrap() > 0.0, "{row}");
+        }
+        // The segments of dense keys are not kept on a device.
+        if std::env::var_os("CI").is_some() && section["workload"] != "dense" {
+            let device = rows
+                .iter()
+                .find(|row| row["parts"][1][0] == "submit to fence");
+            assert!(device.unwrap()["parts"][1][1].as_f64().unwrap() > 0.0);
+        }
+    }
+}

@@ -211,7 +211,7 @@ fn no_vulkan(error: &VulkanError) -> Failure {
 }
 
 /// A demanded device could not be opened.
-fn refused(error: &Error) -> Failure {
+pub(crate) fn refused(error: &Error) -> Failure {
     match error {
         Error::Vulkan(error) if is_absence(error) => no_vulkan(error),
         Error::Vulkan(error @ VulkanError::Inexact { .. }) => {

@@ -3,6 +3,7 @@
 //! Data goes to standard output and words to standard error; [`exit`] says what
 //! the exit codes mean.
 
+mod bench;
 mod completions;
 mod device;
 mod devices;
@@ -41,6 +42,7 @@ Examples:
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
   tumble verify chain.dat                      device = CPU, and both against f64
   tumble devices                               what Vulkan offers here
+  tumble bench                                 how fast this machine is
 
 Exit codes:
   0 done                           5 a Vulkan device was demanded, there is none
@@ -66,6 +68,7 @@ pub(crate) enum Command {
     Info(info::Arguments),
     Generate(generate::Arguments),
     Methods(methods::Arguments),
+    Bench(bench::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -79,6 +82,7 @@ impl Command {
             Self::Info(arguments) => info::run(&arguments),
             Self::Generate(arguments) => generate::run(&arguments),
             Self::Methods(arguments) => methods::run(&arguments),
+            Self::Bench(arguments) => bench::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),
         }

@@ -1,6 +1,7 @@
 //! Evaluation on a Vulkan device.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use glam::Quat;
 
@@ -10,11 +11,11 @@ use super::error::VulkanError;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
 use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
-use super::slot::{Finish, Slot, Target};
+use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding, Submission};
 use super::window::{Window, windows, work};
 use crate::clock::{FramesError, Ticks, Timeline};
-use crate::device::{EngineOptions, Transfer};
+use crate::device::{EngineOptions, Timings, Transfer};
 use crate::method::Form;
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Storage};
@@ -44,6 +45,7 @@ pub(crate) struct VulkanEngine {
     /// Bytes that the segments of one clip may take; no limit unless one was asked.
     clip_bytes: Option<u64>,
     free: FreeBuffers,
+    timings: Mutex<Timings>,
 }
 
 /// The segments and constants of a clip, on the device.
@@ -122,6 +124,7 @@ impl VulkanEngine {
             group_bytes,
             clip_bytes: options.memory.map(|budget| budget / 2),
             free: Arc::default(),
+            timings: Mutex::default(),
             device,
         })
     }
@@ -138,6 +141,11 @@ impl VulkanEngine {
     /// Runs every canary.
     pub(crate) fn canaries(&self) -> Result<Vec<super::CanaryReport>, VulkanError> {
         super::canary::run(self)
+    }
+
+    /// Where the time went since this was last asked.
+    pub(crate) fn take_timings(&self) -> Timings {
+        std::mem::take(&mut *self.timings.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// What the validation layer has said so far.
@@ -258,13 +266,19 @@ impl VulkanEngine {
         }
         let mut next = 0;
         let mut result = Ok(());
+        let mut stopwatch = Stopwatch::default();
         for window in windows {
             next = (next + 1) % slots.len();
             let slot = &mut slots[next];
             result = slot
-                .finish(&mut target)
+                .finish(&mut target, &mut stopwatch)
                 .map_err(EvaluateError::from)
-                .and_then(|()| self.start(slot, clip, buffers, timeline, window, &target));
+                .and_then(|()| {
+                    let listing = Instant::now();
+                    let started = self.start(slot, clip, buffers, timeline, window, &target);
+                    stopwatch.timings.work_lists += listing.elapsed();
+                    started
+                });
             if result.is_err() {
                 break;
             }
@@ -272,9 +286,10 @@ impl VulkanEngine {
         // Also after an error: what was submitted uses the caller's buffers.
         let oldest_first = slots.len();
         for i in 1..=oldest_first {
-            let finished = slots[(next + i) % oldest_first].finish(&mut target);
+            let finished = slots[(next + i) % oldest_first].finish(&mut target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
         }
+        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
     }
 

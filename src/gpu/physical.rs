@@ -1,6 +1,7 @@
 //! What a Vulkan device is and what it can do.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use ash::{khr, vk};
 use serde::Serialize;
@@ -65,6 +66,10 @@ pub(crate) struct PhysicalDevice {
     pub(super) instance: Arc<Instance>,
     pub(super) raw: vk::PhysicalDevice,
     pub(super) queue_family: u32,
+    /// Valid bits of a time stamp, for each queue family; 0 where there are none.
+    timestamp_bits: Vec<u32>,
+    /// Nanoseconds of one tick of a time stamp.
+    timestamp_period: f64,
     pub(super) float_controls: FloatControls,
     /// The extension must be enabled: the device is older than Vulkan 1.2.
     pub(super) float_controls_extension: bool,
@@ -164,11 +169,25 @@ impl PhysicalDevice {
             instance: Arc::clone(instance),
             raw,
             queue_family: queue_family as u32,
+            timestamp_bits: families.iter().map(|f| f.timestamp_valid_bits).collect(),
+            timestamp_period: f64::from(limits.timestamp_period),
             float_controls,
             float_controls_extension: reports_controls && !core_1_2,
             memory,
             info,
         }))
+    }
+
+    /// Whether its queue can take time stamps.
+    pub(super) fn has_timestamps(&self) -> bool {
+        self.timestamp_bits[self.queue_family as usize] > 0
+    }
+
+    /// The time between two stamps.
+    pub(super) fn between(&self, start: u64, end: u64) -> Duration {
+        let bits = self.timestamp_bits[self.queue_family as usize];
+        let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.clamp(1, 64)));
+        Duration::from_nanos((ticks as f64 * self.timestamp_period) as u64)
     }
 
     /// The first memory type allowed by `allowed` with all of `required`; one that

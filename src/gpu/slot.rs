@@ -1,14 +1,16 @@
 //! What one window in flight needs, and what is done when it has been computed.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::Quat;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
-use super::submission::Submission;
+use super::submission::{Spent, Submission};
 use super::window::{GroupWork, Window};
+use crate::device::Timings;
 use crate::segment::Item;
 
 /// What one window needs; the submission comes first, so that it is waited for
@@ -31,6 +33,26 @@ pub(super) struct Slot {
 pub(super) struct Finish {
     pub(super) window: Window,
     pub(super) patches: Vec<(usize, [f32; 4])>,
+}
+
+/// Adds up where the time of an evaluation goes.
+#[derive(Default)]
+pub(super) struct Stopwatch {
+    pub(super) timings: Timings,
+    /// When the last window was seen to have ended: windows overlap, their times
+    /// must not count twice.
+    last: Option<Instant>,
+}
+
+impl Stopwatch {
+    fn ran(&mut self, spent: Spent) {
+        let start = self
+            .last
+            .map_or(spent.submitted, |l| l.max(spent.submitted));
+        self.timings.submit_to_fence += spent.finished - start;
+        self.timings.on_device += spent.on_device;
+        self.last = Some(spent.finished);
+    }
 }
 
 /// Where results go.
@@ -110,8 +132,15 @@ impl Slot {
     }
 
     /// Waits for the window in flight, if any, and brings its results home.
-    pub(super) fn finish(&mut self, target: &mut Target<'_>) -> Result<(), VulkanError> {
-        self.submission.wait()?;
+    pub(super) fn finish(
+        &mut self,
+        target: &mut Target<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError> {
+        if let Some(spent) = self.submission.wait()? {
+            stopwatch.ran(spent);
+        }
+        let copying = Instant::now();
         let Some(Finish { window, patches }) = self.done.take() else {
             return Ok(());
         };
@@ -132,6 +161,7 @@ impl Slot {
         for (place, rotation) in patches {
             output[place] = rotation;
         }
+        stopwatch.timings.read_back += copying.elapsed();
         Ok(())
     }
 }

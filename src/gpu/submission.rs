@@ -1,6 +1,7 @@
 //! One submission at a time: a command buffer, its fence and its descriptor sets.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use ash::vk;
 
@@ -21,7 +22,22 @@ pub(super) struct Submission {
     descriptors: vk::DescriptorPool,
     /// Sets that the descriptor pool can hold.
     capacity: u32,
-    pending: bool,
+    /// Two time stamps, around all that a submission does; null where the queue
+    /// takes none.
+    stamps: vk::QueryPool,
+    /// When the pending work was handed over.
+    submitted: Option<Instant>,
+}
+
+/// When a submission ran.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spent {
+    /// When it was handed over.
+    pub(super) submitted: Instant,
+    /// When its fence was seen.
+    pub(super) finished: Instant,
+    /// On the device, by its own clock; zero where it has none.
+    pub(super) on_device: Duration,
 }
 
 /// A stretch of a buffer that a kernel sees.
@@ -52,7 +68,8 @@ impl Submission {
             fence: vk::Fence::null(),
             descriptors: vk::DescriptorPool::null(),
             capacity: 0,
-            pending: false,
+            stamps: vk::QueryPool::null(),
+            submitted: None,
         };
         let raw = &device.raw;
         let info =
@@ -70,6 +87,14 @@ impl Submission {
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
+        if device.physical.has_timestamps() {
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(2);
+            // SAFETY: as above.
+            submission.stamps =
+                unsafe { raw.create_query_pool(&info, None) }.named("vkCreateQueryPool")?;
+        }
         device.name(submission.commands, "tumble window");
         Ok(submission)
     }
@@ -78,7 +103,7 @@ impl Submission {
     ///
     /// Must not be called while work is pending.
     pub(super) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
-        debug_assert!(!self.pending);
+        debug_assert!(self.submitted.is_none());
         let raw = &self.device.raw;
         if sets > self.capacity {
             let sizes = [vk::DescriptorPoolSize::default()
@@ -106,7 +131,16 @@ impl Submission {
         let info = vk::CommandBufferBeginInfo::default()
             .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: as above.
-        unsafe { raw.begin_command_buffer(self.commands, &info) }.named("vkBeginCommandBuffer")
+        unsafe { raw.begin_command_buffer(self.commands, &info) }.named("vkBeginCommandBuffer")?;
+        if self.stamps != vk::QueryPool::null() {
+            let start = vk::PipelineStageFlags::TOP_OF_PIPE;
+            // SAFETY: recording is on, and the pool has two queries of this device.
+            unsafe {
+                raw.cmd_reset_query_pool(self.commands, self.stamps, 0, 2);
+                raw.cmd_write_timestamp(self.commands, start, self.stamps, 0);
+            }
+        }
+        Ok(())
     }
 
     /// Records a dispatch with one buffer for each binding.
@@ -196,6 +230,11 @@ impl Submission {
     /// Ends recording and hands the work to the queue.
     pub(super) fn submit(&mut self) -> Result<(), VulkanError> {
         let raw = &self.device.raw;
+        if self.stamps != vk::QueryPool::null() {
+            let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+            // SAFETY: as in `begin`.
+            unsafe { raw.cmd_write_timestamp(self.commands, end, self.stamps, 1) };
+        }
         // SAFETY: recording is on.
         unsafe { raw.end_command_buffer(self.commands) }.named("vkEndCommandBuffer")?;
         let commands = [self.commands];
@@ -203,15 +242,15 @@ impl Submission {
         let queue = self.device.queue();
         // SAFETY: the fence is unsignalled and the queue is locked.
         unsafe { raw.queue_submit(*queue, &info, self.fence) }.named("vkQueueSubmit")?;
-        self.pending = true;
+        self.submitted = Some(Instant::now());
         Ok(())
     }
 
     /// Waits until submitted work has finished; at once when there is none.
-    pub(super) fn wait(&mut self) -> Result<(), VulkanError> {
-        if !self.pending {
-            return Ok(());
-        }
+    pub(super) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
+        let Some(submitted) = self.submitted else {
+            return Ok(None);
+        };
         let raw = &self.device.raw;
         let fences = [self.fence];
         let timeout = TIMEOUT_SECONDS * 1_000_000_000;
@@ -225,9 +264,25 @@ impl Submission {
             }
             waited => waited.named("vkWaitForFences")?,
         }
-        self.pending = false;
+        self.submitted = None;
+        let finished = Instant::now();
         // SAFETY: the fence is signalled and not in use.
-        unsafe { raw.reset_fences(&fences) }.named("vkResetFences")
+        unsafe { raw.reset_fences(&fences) }.named("vkResetFences")?;
+        let mut spent = Spent {
+            submitted,
+            finished,
+            on_device: Duration::ZERO,
+        };
+        if self.stamps != vk::QueryPool::null() {
+            let mut stamps = [0u64; 2];
+            let flags = vk::QueryResultFlags::TYPE_64;
+            // SAFETY: the pool has two queries of this device, and the work that
+            // writes them has ended. A stamp that is not there is no reason to stop.
+            if unsafe { raw.get_query_pool_results(self.stamps, 0, &mut stamps, flags) }.is_ok() {
+                spent.on_device = self.device.physical.between(stamps[0], stamps[1]);
+            }
+        }
+        Ok(Some(spent))
     }
 }
 
@@ -261,6 +316,7 @@ impl Drop for Submission {
             let raw = &self.device.raw;
             // SAFETY: created from this device, not in use; null is allowed.
             unsafe {
+                raw.destroy_query_pool(self.stamps, None);
                 raw.destroy_descriptor_pool(self.descriptors, None);
                 raw.destroy_fence(self.fence, None);
                 raw.destroy_command_pool(self.pool, None);

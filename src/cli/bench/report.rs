@@ -1,0 +1,140 @@
+//! What was measured, as a table and as JSON.
+
+use std::fmt::Write;
+use std::time::Duration;
+
+use serde::Serialize;
+use tumble::{Method, VectorWidth};
+
+use super::workload::Kind;
+
+/// A whole run; also the form of the JSON.
+#[derive(Serialize)]
+pub(super) struct Report {
+    version: &'static str,
+    threads: usize,
+    /// Vector instructions of the CPU, the widest of which is used.
+    vector_widths: Vec<String>,
+    rounds: u32,
+    sections: Vec<Section>,
+}
+
+/// One workload and method.
+#[derive(Serialize)]
+pub(super) struct Section {
+    workload: Kind,
+    method: &'static str,
+    rotations: usize,
+    rows: Vec<Row>,
+}
+
+/// One contestant. Times are medians.
+#[derive(Serialize)]
+pub(super) struct Row {
+    name: String,
+    milliseconds: f64,
+    million_rotations_per_second: f64,
+    nanoseconds_per_rotation: f64,
+    /// 1 is as fast as memory can be written.
+    share_of_write_rate: f64,
+    ratio_to_naive: f64,
+    /// Where the time went, milliseconds.
+    parts: Vec<(&'static str, f64)>,
+}
+
+impl Report {
+    pub(super) fn new(rounds: u32, sections: Vec<Section>) -> Self {
+        let widths = VectorWidth::available();
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            threads: rayon::current_num_threads(),
+            vector_widths: widths.iter().map(|width| format!("{width:?}")).collect(),
+            rounds,
+            sections,
+        }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let mut text = format!(
+            "tumble {}, {} threads, {}; medians of {}, measured in turns\n",
+            self.version,
+            self.threads,
+            self.vector_widths.join(", "),
+            self.rounds
+        );
+        for section in &self.sections {
+            section.tell(&mut text);
+        }
+        text
+    }
+}
+
+impl Section {
+    /// `rows`: the write rate first, then the naive peer.
+    pub(super) fn new(
+        workload: Kind,
+        method: Method,
+        rotations: usize,
+        mut rows: Vec<Row>,
+    ) -> Self {
+        let (write, naive) = (rows[0].milliseconds, rows[1].milliseconds);
+        for row in &mut rows {
+            row.million_rotations_per_second = rotations as f64 / row.milliseconds / 1e3;
+            row.nanoseconds_per_rotation = row.milliseconds * 1e6 / rotations as f64;
+            row.share_of_write_rate = write / row.milliseconds;
+            row.ratio_to_naive = naive / row.milliseconds;
+        }
+        Self {
+            workload,
+            method: method.name,
+            rotations,
+            rows,
+        }
+    }
+
+    fn tell(&self, text: &mut String) {
+        let workload = format!("{:?}", self.workload).to_lowercase();
+        let (method, rotations) = (self.method, self.rotations);
+        let width = self.rows.iter().map(|row| row.name.chars().count()).max();
+        let width = width.unwrap_or(0);
+        let _ = writeln!(
+            text,
+            "\n\x1b[1m{workload}, {method}\x1b[0m: {rotations} rotations\n\
+             {:width$}  {:>10}  {:>8}  {:>8}  {:>7}  {:>7}",
+            "", "ms", "M/s", "ns each", "writing", "naive"
+        );
+        for row in &self.rows {
+            let _ = writeln!(
+                text,
+                "{:width$}  {:>10.3}  {:>8.1}  {:>8.2}  {:>6.2}x  {:>6.2}x",
+                row.name,
+                row.milliseconds,
+                row.million_rotations_per_second,
+                row.nanoseconds_per_rotation,
+                row.share_of_write_rate,
+                row.ratio_to_naive
+            );
+            for (name, milliseconds) in &row.parts {
+                let _ = writeln!(text, "{:width$}  {milliseconds:>10.3}", format!("  {name}"));
+            }
+        }
+    }
+}
+
+impl Row {
+    pub(super) fn new(name: String, time: Duration, parts: Vec<(&'static str, Duration)>) -> Self {
+        let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+        Self {
+            name,
+            milliseconds: milliseconds(time),
+            million_rotations_per_second: 0.0,
+            nanoseconds_per_rotation: 0.0,
+            share_of_write_rate: 0.0,
+            ratio_to_naive: 0.0,
+            parts: parts
+                .into_iter()
+                .map(|(name, time)| (name, milliseconds(time)))
+                .collect(),
+        }
+    }
+}

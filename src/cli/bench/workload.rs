@@ -1,0 +1,139 @@
+//! What is measured: sets of keys and the samples asked of them, the same in every
+//! run.
+
+use glam::{DQuat, DVec3, Quat};
+use tumble::{Frames, TrackSet};
+
+/// A set, and the samples to evaluate.
+pub(super) struct Workload {
+    pub(super) set: TrackSet,
+    pub(super) frames: Frames,
+    /// The time of each sample, seconds; of each track's only sample where
+    /// `per_track`.
+    pub(super) times: Vec<f64>,
+    pub(super) per_track: bool,
+}
+
+/// The workloads that there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Kind {
+    /// 4096 tracks of 26 uneven keys, 1200 frames
+    Sparse,
+    /// 4096 tracks of 2400 keys at 120 Hz, 1200 frames between them
+    Dense,
+    /// 4 tracks of 26 keys, 500 frames: the time of one call
+    Small,
+    /// 1 000 000 tracks of 2 keys, one sample each
+    Crowd,
+    /// 1 track of 10 000 000 keys at 120 Hz, 60 frames a second
+    Long,
+}
+
+/// Frames per second, in every workload.
+const RATE: f64 = 60.0;
+
+impl Kind {
+    /// Makes the workload with one `shrink`th of its tracks, or of its keys where
+    /// there is one track.
+    pub(super) fn workload(self, shrink: usize) -> Workload {
+        let few = |count: usize| (count / shrink).max(1);
+        match self {
+            Self::Sparse => frames(uneven(few(4096), 26, 1200.0 / RATE), 0.0, 1200),
+            Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
+            // Half way between keys: on them there would be nothing to evaluate.
+            Self::Dense => frames(even(few(4096), 2400), 1.0 / 240.0, 1199),
+            Self::Long => {
+                let keys = few(10_000_000).max(4);
+                frames(even(1, keys), 1.0 / 240.0, keys / 2 - 1)
+            }
+            Self::Crowd => crowd(few(1_000_000)),
+        }
+    }
+}
+
+fn frames(set: TrackSet, start: f64, count: usize) -> Workload {
+    let end = start + (count - 1) as f64 / RATE;
+    Workload {
+        set,
+        frames: Frames::fps(RATE as u32).between(start, end),
+        times: (0..count).map(|k| start + k as f64 / RATE).collect(),
+        per_track: false,
+    }
+}
+
+/// Keys at steps of 1/4 to 7/4 of the mean, each up to a radian from the last.
+fn uneven(tracks: usize, keys: usize, seconds: f64) -> TrackSet {
+    let mut random = Random(1);
+    let mut set = TrackSet::new();
+    for _ in 0..tracks {
+        let mut times = vec![0.0];
+        for key in 1..keys {
+            times.push(times[key - 1] + random.between(0.25, 1.75));
+        }
+        let scale = seconds / times[keys - 1];
+        times.iter_mut().for_each(|time| *time *= scale);
+        push(&mut set, &times, random.walk(keys, 1.0));
+    }
+    set
+}
+
+/// Keys at 120 Hz, as motion capture gives them: up to 3 degrees a step.
+fn even(tracks: usize, keys: usize) -> TrackSet {
+    let mut random = Random(2);
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..keys).map(|k| k as f64 / 120.0).collect();
+    for _ in 0..tracks {
+        push(&mut set, &times, random.walk(keys, 0.05));
+    }
+    set
+}
+
+/// Two poses and one moment for each track.
+fn crowd(tracks: usize) -> Workload {
+    let mut random = Random(3);
+    let mut set = TrackSet::new();
+    for _ in 0..tracks {
+        push(&mut set, &[0.0, 1.0], random.walk(2, 1.0));
+    }
+    let times: Vec<f64> = (0..tracks).map(|_| random.between(0.0, 1.0)).collect();
+    Workload {
+        set,
+        frames: Frames::at_each(times.clone()),
+        times,
+        per_track: true,
+    }
+}
+
+fn push(set: &mut TrackSet, times: &[f64], keys: Vec<Quat>) {
+    set.push("", times, &keys).expect("unit keys in order");
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * ((self.next() >> 11) as f64 / (1u64 << 53) as f64)
+    }
+
+    /// Rotations, each up to `step` radians from the one before.
+    fn walk(&mut self, keys: usize, step: f64) -> Vec<Quat> {
+        let mut rotation = DQuat::IDENTITY;
+        let mut next = || {
+            let axis = DVec3::from_array([(); 3].map(|()| self.between(-1.0, 1.0)));
+            let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::X), self.between(0.0, step));
+            rotation = (rotation * turn).normalize();
+            rotation.as_quat()
+        };
+        (0..keys).map(|_| next()).collect()
+    }
+}
