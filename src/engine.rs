@@ -54,6 +54,9 @@ impl From<EvaluateError> for Error {
     }
 }
 
+/// Keys a track of a set that is prepared as a whole, before it is evaluated.
+const LONG_TRACK: usize = 16 * 1024;
+
 /// Evaluates sets on one device.
 ///
 /// ```
@@ -255,33 +258,71 @@ impl Engine {
         layout: Layout,
     ) -> Result<Rotations, Error> {
         let interpolation = interpolation.into();
-        let pieces = self.pieces(set, &interpolation);
-        if let [_] | [] = &*pieces {
+        if self.pieces(set, &interpolation).len() == 1 && !self.is_fused(set, layout) {
             return self.upload(set, interpolation)?.evaluate_as(frames, layout);
         }
         let (tracks, span) = (set.track_count(), set.time_span());
+        let samples = frames.resolve(tracks, span)?.len();
+        let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+        self.evaluate_into(set, interpolation, frames, layout, &mut quats)?;
+        Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
+    }
+
+    /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
+    /// is used again: the first touch of fresh memory costs more than evaluating.
+    ///
+    /// # Errors
+    /// Also when `output` is not exactly as long as the result.
+    pub fn evaluate_into(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let interpolation = interpolation.into();
+        let pieces = self.pieces(set, &interpolation);
+        let (tracks, span) = (set.track_count(), set.time_span());
         let timeline = frames.resolve(tracks, span)?;
         let samples = timeline.len();
-        let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+        let (given, needed) = (output.len(), tracks * samples);
+        if given != needed {
+            return Err(Error::OutputLength { given, needed });
+        }
+        if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
+            return engine.evaluate_set(set, &interpolation, &timeline, output);
+        }
+        if let [_] = &*pieces {
+            let clip = self.upload(set, interpolation)?;
+            return clip.evaluate_timeline_into(&timeline, layout, output);
+        }
         for piece in pieces {
             let clip = self.upload(&set.select(piece.clone()), interpolation)?;
             let timeline = timeline.of_tracks(piece.clone());
             match layout {
                 Layout::TrackMajor => {
-                    let rows = &mut quats[piece.start * samples..piece.end * samples];
+                    let rows = &mut output[piece.start * samples..piece.end * samples];
                     clip.evaluate_timeline_into(&timeline, layout, rows)?;
                 }
                 Layout::FrameMajor => {
                     let mut columns: Vec<Quat> = bytemuck::zeroed_vec(piece.len() * samples);
                     clip.evaluate_timeline_into(&timeline, layout, &mut columns)?;
-                    let frames = quats.chunks_mut(tracks).zip(columns.chunks(piece.len()));
+                    let frames = output.chunks_mut(tracks).zip(columns.chunks(piece.len()));
                     for (frame, part) in frames {
                         frame[piece.clone()].copy_from_slice(part);
                     }
                 }
             }
         }
-        Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
+        Ok(())
+    }
+
+    /// Whether preparing and evaluating go hand in hand, track by track: on the CPU,
+    /// unless a few long tracks must be shared among the threads.
+    fn is_fused(&self, set: &TrackSet, layout: Layout) -> bool {
+        let short = set.key_count() <= LONG_TRACK * set.track_count();
+        matches!(*self.backend, Backend::Cpu(_)) && layout == Layout::TrackMajor && short
     }
 
     /// Ranges of tracks whose segments fit the device's budget.

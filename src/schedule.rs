@@ -131,6 +131,7 @@ impl Prepared {
             let found = starts.partition_point(|&start| start <= first_time);
             skipped = found.saturating_sub(2);
         }
+        // Its own, and not borrowed: the compiler must see that nothing else is in it.
         let mut spans = SpanBlock::new();
         'blocks: for block in (skipped..starts.len()).step_by(SpanBlock::LEN) {
             let end = (block + SpanBlock::LEN).min(starts.len());

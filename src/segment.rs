@@ -159,6 +159,13 @@ impl Segments {
         }
     }
 
+    pub(crate) fn clear(&mut self) {
+        match self {
+            Self::Arc(segments) => segments.clear(),
+            Self::Cumulative(segments) => segments.clear(),
+        }
+    }
+
     pub(crate) fn reserve(&mut self, more: usize) {
         match self {
             Self::Arc(segments) => segments.reserve(more),

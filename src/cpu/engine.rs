@@ -1,17 +1,25 @@
 //! The walk over tracks and samples: every thread takes a stretch of the output.
 
+use std::ops::Range;
+
 use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
 use crate::clock::{FramesError, Timeline};
-use crate::prepare::ClipData;
+use crate::engine::Error;
+use crate::method::Interpolation;
+use crate::prepare::{ClipData, PartRef, Prepared};
 use crate::rotations::Layout;
 use crate::segment::Segments;
+use crate::tracks::TrackSet;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
 /// share a short result among all threads.
 const TASK: usize = 16 * 1024;
+
+/// Keys that one turn of a task prepares: their segments stay in the cache.
+pub(crate) const TASK_KEYS: usize = 1024;
 
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
@@ -68,10 +76,7 @@ impl CpuEngine {
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         match layout {
-            Layout::TrackMajor => output
-                .chunks_mut(timeline.len())
-                .enumerate()
-                .try_for_each(|(track, row)| self.row(clip, track, timeline, 0, row)),
+            Layout::TrackMajor => self.rows(clip, timeline, 0, output),
             Layout::FrameMajor => self.frames(clip, timeline, 0, output),
         }
     }
@@ -98,11 +103,20 @@ impl CpuEngine {
         output
             .par_chunks_mut(samples * tracks_each)
             .enumerate()
-            .try_for_each(|(task, rows)| {
-                rows.chunks_mut(samples)
-                    .zip(task * tracks_each..)
-                    .try_for_each(|(row, track)| self.row(clip, track, timeline, 0, row))
-            })
+            .try_for_each(|(task, rows)| self.rows(clip, timeline, task * tracks_each, rows))
+    }
+
+    /// Whole tracks from `first` on, `[track][frame]`.
+    fn rows(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        first: usize,
+        rows: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        rows.chunks_mut(timeline.len())
+            .zip(first..)
+            .try_for_each(|(row, track)| self.row(clip, track, timeline, 0, row))
     }
 
     fn frame_major(
@@ -148,16 +162,81 @@ impl CpuEngine {
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         let samples = first..first + row.len();
-        for part in clip.parts_of(track) {
-            let samples = samples.clone();
-            match &part.prepared.segments {
-                Segments::Arc(all) => self.kernels.arc.row(part, all, timeline, samples, row)?,
-                Segments::Cumulative(all) => {
-                    let kernel = &self.kernels.cumulative;
-                    kernel.row(part, all, timeline, samples, row)?;
-                }
+        clip.parts_of(track)
+            .try_for_each(|part| self.part(part, timeline, samples.clone(), row))
+    }
+
+    /// The samples of one part of a track.
+    fn part(
+        &self,
+        part: PartRef<'_>,
+        timeline: &Timeline,
+        samples: Range<usize>,
+        row: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        match &part.prepared.segments {
+            Segments::Arc(all) => {
+                let kernel = &self.kernels.arc;
+                kernel.row(part, all, timeline, samples, row)
+            }
+            Segments::Cumulative(all) => {
+                let kernel = &self.kernels.cumulative;
+                kernel.row(part, all, timeline, samples, row)
             }
         }
-        Ok(())
+    }
+
+    /// Prepares and evaluates in one go, `[track][frame]`: the segments of some tracks
+    /// are used while they are still in the cache, and never kept. For sets of many
+    /// tracks.
+    pub(crate) fn evaluate_set(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        if output.is_empty() {
+            // Also with nothing to evaluate a track may be refused.
+            return Ok(ClipData::new(set, *interpolation, None).map(drop)?);
+        }
+        let samples = timeline.len();
+        let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
+        let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
+        let new = || Prepared::new(interpolation);
+        let task = |prepared: &mut Prepared, first, rows: &mut [_]| {
+            for (rows, first) in rows
+                .chunks_mut(samples * tracks_each)
+                .zip((first..).step_by(tracks_each))
+            {
+                prepared.clear();
+                for track in first..first + rows.len() / samples {
+                    prepared.push_track(set.track(track), track, interpolation)?;
+                }
+                for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
+                    let part = PartRef { prepared, part };
+                    self.part(part, timeline, 0..samples, row)?;
+                }
+            }
+            Ok(())
+        };
+        if output.len() <= TASK && set.key_count() <= TASK_KEYS {
+            return task(&mut new(), 0, output);
+        }
+        let mut work = || {
+            // Several turns for each task, whose memory serves them all.
+            let tasks = 8 * rayon::current_num_threads();
+            let turns = set.track_count().div_ceil(tracks_each).div_ceil(tasks);
+            let tracks = turns * tracks_each;
+            output
+                .par_chunks_mut(samples * tracks)
+                .enumerate()
+                .try_for_each(|(i, rows)| task(&mut new(), i * tracks, rows))
+        };
+        match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
     }
 }

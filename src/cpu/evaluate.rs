@@ -5,6 +5,9 @@ use crate::segment::shader::TINY_BITS;
 /// Samples are evaluated in multiples of this many: the lanes of the widest vector.
 const BLOCK: usize = 16;
 
+/// So few samples are evaluated one by one: a block would be mostly waste.
+const FEW: usize = 3;
+
 /// Samples whose components are kept before they are stored.
 pub(super) const CHUNK: usize = 4 * BLOCK;
 
@@ -77,6 +80,19 @@ fn run<S: Evaluate>(
     scratch: &mut Scratch,
     output: &mut [[f32; 4]],
 ) {
+    if count <= FEW {
+        for (j, rotation) in output[..count].iter_mut().enumerate() {
+            let parameter = distance(j as u32) * affine.scale + affine.offset;
+            let q = segment.evaluate(parameter);
+            *rotation = [
+                canonical(q[0]),
+                canonical(q[1]),
+                canonical(q[2]),
+                canonical(q[3]),
+            ];
+        }
+        return;
+    }
     for start in (0..count).step_by(CHUNK) {
         let wanted = (count - start).min(CHUNK);
         let whole = wanted.next_multiple_of(BLOCK);

@@ -26,6 +26,7 @@ pub(super) fn row<S: Evaluate>(
         timeline,
         first,
         output,
+        // Its own, and not borrowed: the compiler must see that it is not the output.
         scratch: Scratch::new(),
     };
     prepared.runs(part, timeline, samples, &mut row)

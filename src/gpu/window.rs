@@ -131,7 +131,8 @@ pub(super) fn work(
                     let mut push = |run| {
                         chunk.push(prepared, timeline, window, part.track, shift, &run);
                     };
-                    prepared.runs(part, timeline, window.samples.clone(), &mut push)?;
+                    let samples = window.samples.clone();
+                    prepared.runs(part, timeline, samples, &mut push)?;
                 }
                 Ok(chunk)
             })

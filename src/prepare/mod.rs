@@ -95,9 +95,7 @@ pub(crate) fn prepare(
                 return prepare_long(set, long, interpolation);
             }
             for index in tracks {
-                let track = set.track(index);
-                let keys = Keys::new(track, index, interpolation)?;
-                prepared.push(track, index, &keys, 0..keys.intervals(), interpolation);
+                prepared.push_track(set.track(index), index, interpolation)?;
             }
             Ok(vec![prepared])
         })
@@ -141,6 +139,13 @@ impl Spans {
         self.starts.len()
     }
 
+    fn clear(&mut self) {
+        self.starts.clear();
+        self.extents.clear();
+        self.sources.clear();
+        self.keys.clear();
+    }
+
     fn reserve(&mut self, more: usize) {
         self.starts.reserve(more);
         self.extents.reserve(more);
@@ -160,8 +165,29 @@ impl Prepared {
         }
     }
 
+    /// Forgets everything and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.segments.clear();
+        self.constants.clear();
+        self.exact.clear();
+        self.spans.clear();
+        self.parts.clear();
+    }
+
+    /// Prepares a track, the `index`th of its set, as one part.
+    pub(crate) fn push_track(
+        &mut self,
+        track: Track,
+        index: usize,
+        interpolation: &Interpolation,
+    ) -> Result<(), InterpolationError> {
+        let keys = Keys::new(track, index, interpolation)?;
+        self.push(track, index, &keys, 0..keys.intervals(), interpolation);
+        Ok(())
+    }
+
     /// Prepares some intervals of a track, the `index`th of its set.
-    pub(crate) fn push(
+    fn push(
         &mut self,
         track: Track,
         index: usize,
