@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::evaluate::Evaluate;
 use super::row::row;
 use crate::clock::{FramesError, Timeline};
-use crate::prepare::PartRef;
+use crate::prepare::{ArcBlock, PartRef};
 use crate::segment::{ArcSegment, CumulativeSegment};
 
 /// Vector instructions that the twins can be compiled for.
@@ -111,6 +111,23 @@ impl Kernels {
     }
 }
 
+/// Works out a block of arcs with the widest vectors there are; see
+/// [`ArcBlock::fill`].
+pub(crate) fn arc_block(block: &mut ArcBlock, noise: f64) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if VectorWidth::Avx512.is_available() {
+            // SAFETY: the processor has it.
+            return unsafe { avx512::arc_block(block, noise) };
+        }
+        if VectorWidth::Avx2.is_available() {
+            // SAFETY: the processor has it.
+            return unsafe { avx2::arc_block(block, noise) };
+        }
+    }
+    block.fill(noise);
+}
+
 fn baseline<S: Evaluate>() -> Kernel<S> {
     Kernel { row: row::<S> }
 }
@@ -119,7 +136,7 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 macro_rules! compiled_for {
     ($width:ident, $features:literal) => {
         mod $width {
-            use super::{Evaluate, FramesError, Kernel, PartRef, Range, Timeline};
+            use super::{ArcBlock, Evaluate, FramesError, Kernel, PartRef, Range, Timeline};
 
             #[target_feature(enable = $features)]
             fn row<S: Evaluate>(
@@ -130,6 +147,11 @@ macro_rules! compiled_for {
                 output: &mut [[f32; 4]],
             ) -> Result<(), FramesError> {
                 super::row(part, segments, timeline, samples, output)
+            }
+
+            #[target_feature(enable = $features)]
+            pub(super) fn arc_block(block: &mut ArcBlock, noise: f64) {
+                block.fill(noise);
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {

@@ -9,7 +9,7 @@ use super::dispatch::{Kernels, VectorWidth};
 use crate::clock::{FramesError, Timeline};
 use crate::engine::Error;
 use crate::method::Interpolation;
-use crate::prepare::{ClipData, PartRef, Prepared};
+use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
 use crate::rotations::Layout;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
@@ -204,23 +204,28 @@ impl CpuEngine {
         let samples = timeline.len();
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
-        let new = || Prepared::new(interpolation);
-        let task = |prepared: &mut Prepared, first, rows: &mut [_]| {
-            for (rows, first) in rows
-                .chunks_mut(samples * tracks_each)
-                .zip((first..).step_by(tracks_each))
-            {
-                prepared.clear();
-                for track in first..first + rows.len() / samples {
-                    prepared.push_track(set.track(track), track, interpolation)?;
-                }
-                for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
-                    let part = PartRef { prepared, part };
-                    self.part(part, timeline, 0..samples, row)?;
-                }
-            }
-            Ok(())
+        let new = || {
+            (
+                Prepared::new(interpolation),
+                Preparation::new(interpolation),
+            )
         };
+        let task =
+            |(prepared, preparation): &mut (Prepared, Preparation), first, rows: &mut [_]| {
+                for (rows, first) in rows
+                    .chunks_mut(samples * tracks_each)
+                    .zip((first..).step_by(tracks_each))
+                {
+                    prepared.clear();
+                    let tracks = first..first + rows.len() / samples;
+                    preparation.push(prepared, set, tracks)?;
+                    for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
+                        let part = PartRef { prepared, part };
+                        self.part(part, timeline, 0..samples, row)?;
+                    }
+                }
+                Ok(())
+            };
         if output.len() <= TASK && set.key_count() <= TASK_KEYS {
             return task(&mut new(), 0, output);
         }

@@ -11,4 +11,5 @@ mod row;
 mod sine_cosine;
 
 pub use dispatch::VectorWidth;
+pub(crate) use dispatch::arc_block;
 pub(crate) use engine::CpuEngine;

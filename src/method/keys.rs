@@ -9,7 +9,7 @@ use crate::tracks::Track;
 
 /// Dot products nearer to zero than this are rounding noise of f32 keys: the signs
 /// given decide, never the noise.
-const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
+pub(crate) const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
 
 /// How far the last key of a loop may be from the first (half-angle, radians).
 const LOOP_TOLERANCE: f64 = 1e-3;

@@ -16,7 +16,7 @@ pub use b_spline::B_SPLINE;
 pub use bessel_overhauser::BESSEL_OVERHAUSER;
 pub use catmull_rom::CATMULL_ROM;
 pub(crate) use curve::Curve;
-pub(crate) use keys::Keys;
+pub(crate) use keys::{DOT_NOISE, Keys};
 pub use slerp::SLERP;
 
 use std::fmt;

@@ -1,6 +1,7 @@
 //! A whole set, prepared: the groups of its tracks, and where each track is.
 
-use super::{Part, Prepared, prepare};
+use super::set::prepare;
+use super::{Part, Prepared};
 use crate::method::{Interpolation, InterpolationError};
 use crate::tracks::TrackSet;
 

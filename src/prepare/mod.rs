@@ -2,21 +2,24 @@
 //! clip and rounded once. Independent of frame rate and device, so the CPU and
 //! every Vulkan device evaluate the same segments.
 
+mod arcs;
 mod clip_data;
+mod set;
 
+pub(crate) use arcs::ArcBlock;
 pub(crate) use clip_data::{ClipData, PartRef};
+pub(crate) use set::Preparation;
 
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use glam::{DQuat, DVec3};
-use rayon::prelude::*;
 
 use crate::method::curve::Cumulative;
-use crate::method::{Curve, Interpolation, InterpolationError, Keys};
+use crate::method::{Curve, Interpolation, Keys};
 use crate::numeric::{dot, exp, norm3, product, round_f32, round_quat, unit};
 use crate::segment::{ArcSegment, CumulativeSegment, Segments};
-use crate::tracks::{Track, TrackSet};
+use crate::tracks::Track;
 
 /// No constant.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -78,62 +81,6 @@ pub(crate) struct Part {
     pub(crate) after: u32,
 }
 
-/// Key intervals prepared as one piece of work.
-const BATCH: usize = 4096;
-
-/// Prepares every track of a set, in parallel: one [`Prepared`] for each batch of
-/// tracks, or of intervals where a track is long, in order.
-pub(crate) fn prepare(
-    set: &TrackSet,
-    interpolation: &Interpolation,
-) -> Result<Vec<Prepared>, InterpolationError> {
-    let batches: Vec<Vec<Prepared>> = batches(set)
-        .into_par_iter()
-        .map(|tracks| {
-            let mut prepared = Prepared::new(interpolation);
-            if let Some(long) = tracks.clone().next().filter(|_| tracks.len() == 1) {
-                return prepare_long(set, long, interpolation);
-            }
-            for index in tracks {
-                prepared.push_track(set.track(index), index, interpolation)?;
-            }
-            Ok(vec![prepared])
-        })
-        .collect::<Result<_, _>>()?;
-    Ok(batches.into_iter().flatten().collect())
-}
-
-/// Ranges of tracks with about [`BATCH`] intervals each.
-fn batches(set: &TrackSet) -> Vec<Range<usize>> {
-    let mut batches = Vec::new();
-    let (mut start, mut intervals) = (0, 0);
-    for (index, track) in set.tracks().enumerate() {
-        intervals += track.keys.len();
-        if intervals >= BATCH || index + 1 == set.track_count() {
-            batches.push(start..index + 1);
-            (start, intervals) = (index + 1, 0);
-        }
-    }
-    batches
-}
-
-fn prepare_long(
-    set: &TrackSet,
-    index: usize,
-    interpolation: &Interpolation,
-) -> Result<Vec<Prepared>, InterpolationError> {
-    let track = set.track(index);
-    let keys = Keys::new(track, index, interpolation)?;
-    let parts = keys.intervals().div_ceil(BATCH).max(1);
-    let part = |i: usize| {
-        let intervals = i * BATCH..((i + 1) * BATCH).min(keys.intervals());
-        let mut prepared = Prepared::new(interpolation);
-        prepared.push(track, index, &keys, intervals, interpolation);
-        prepared
-    };
-    Ok((0..parts).into_par_iter().map(part).collect())
-}
-
 impl Spans {
     pub(crate) fn len(&self) -> usize {
         self.starts.len()
@@ -172,18 +119,6 @@ impl Prepared {
         self.exact.clear();
         self.spans.clear();
         self.parts.clear();
-    }
-
-    /// Prepares a track, the `index`th of its set, as one part.
-    pub(crate) fn push_track(
-        &mut self,
-        track: Track,
-        index: usize,
-        interpolation: &Interpolation,
-    ) -> Result<(), InterpolationError> {
-        let keys = Keys::new(track, index, interpolation)?;
-        self.push(track, index, &keys, 0..keys.intervals(), interpolation);
-        Ok(())
     }
 
     /// Prepares some intervals of a track, the `index`th of its set.

@@ -1,0 +1,302 @@
+//! Arcs from keys, in vector lanes: one key interval to a lane, of as many tracks as
+//! it takes to fill them.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use super::{NONE, Part, Prepared, Source};
+use crate::cpu::arc_block;
+use crate::method::{DOT_NOISE, Interpolation, InterpolationError, Path};
+use crate::numeric::{canonical, round_f32};
+use crate::segment::{ArcSegment, Segments};
+use crate::tracks::{Track, TrackSet};
+
+/// Intervals worked out together.
+const LANES: usize = 64;
+
+/// Coefficients of `(atan(t)/t - 1) / t²` in powers of t², for 0 <= t <= 1; from
+/// Chebyshev nodes, within 2.9e-14 of the arc tangent, relative.
+const ARC_TANGENT: [f64; 16] = [
+    -0.33333333333329,
+    0.19999999997779172,
+    -0.1428571409522137,
+    0.11111104602822058,
+    -0.09090791339508106,
+    0.07691006729583115,
+    -0.06657116451458922,
+    0.05833142255809476,
+    -0.05078238405735279,
+    0.04240573497965025,
+    -0.03218975296582265,
+    0.02078811760821038,
+    -0.010605869455534812,
+    0.003912875889690956,
+    -0.0009141195416721525,
+    0.00010057727553740323,
+];
+
+/// Intervals that wait for their block, and what has become of them.
+pub(crate) struct ArcBlock {
+    /// Plain numbers: a vector type would keep the loop from being vectorised.
+    from: [[f32; 4]; LANES],
+    to: [[f32; 4]; LANES],
+    /// The track and the key that each interval starts with.
+    places: [(usize, usize); LANES],
+    count: usize,
+    /// Inner products of the two keys.
+    dots: [f64; LANES],
+    /// -1 where the second key counts with the other sign.
+    flips: [f32; LANES],
+    angles: [f64; LANES],
+    middles: [[f32; LANES]; 4],
+    partners: [[f32; LANES]; 4],
+}
+
+impl ArcBlock {
+    fn new() -> Self {
+        Self {
+            from: [[0.0; 4]; LANES],
+            to: [[0.0; 4]; LANES],
+            places: [(0, 0); LANES],
+            count: 0,
+            dots: [0.0; LANES],
+            flips: [0.0; LANES],
+            angles: [0.0; LANES],
+            middles: [[0.0; LANES]; 4],
+            partners: [[0.0; LANES]; 4],
+        }
+    }
+
+    /// Works out every interval that waits. Plain loops over arrays, no calls: this
+    /// is compiled for each vector width.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, noise: f64) {
+        // Arrays of its own: the compiler must see that they do not overlap.
+        let (from, to) = (self.from, self.to);
+        let (mut dots, mut angles) = ([0.0; LANES], [0.0; LANES]);
+        let mut flips = [0.0; LANES];
+        let [mut mx, mut my, mut mz, mut mw] = [[0.0; LANES]; 4];
+        let [mut px, mut py, mut pz, mut pw] = [[0.0; LANES]; 4];
+        for j in 0..self.count.min(LANES) {
+            let a = unit(from[j]);
+            let b = unit(to[j]);
+            let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+            let flip = if dot < noise { -1.0 } else { 1.0 };
+            let b = [b[0] * flip, b[1] * flip, b[2] * flip, b[3] * flip];
+            let sum = [b[0] + a[0], b[1] + a[1], b[2] + a[2], b[3] + a[3]];
+            let difference = [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]];
+            // 2 cos and 2 sin of half the angle between them: never acos, which
+            // loses half of the digits of a small one.
+            let cosine = norm(sum);
+            let chord = norm(difference);
+            let t = chord / (2.0 + cosine);
+            let z = t * t;
+            let [
+                c0,
+                c1,
+                c2,
+                c3,
+                c4,
+                c5,
+                c6,
+                c7,
+                c8,
+                c9,
+                c10,
+                c11,
+                c12,
+                c13,
+                c14,
+                c15,
+            ] = ARC_TANGENT;
+            let high = (((((c15 * z + c14) * z + c13) * z + c12) * z + c11) * z + c10) * z + c9;
+            let tail =
+                ((((((((high * z + c8) * z + c7) * z + c6) * z + c5) * z + c4) * z + c3) * z + c2)
+                    * z
+                    + c1)
+                    * z
+                    + c0;
+            dots[j] = dot;
+            flips[j] = flip as f32;
+            angles[j] = 4.0 * (t + t * (z * tail));
+            let to_unit = 1.0 / cosine;
+            // Equal keys have no plane; with an angle of 0 any partner will do.
+            let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
+            mx[j] = round_f32(sum[0] * to_unit);
+            my[j] = round_f32(sum[1] * to_unit);
+            mz[j] = round_f32(sum[2] * to_unit);
+            mw[j] = round_f32(sum[3] * to_unit);
+            px[j] = round_f32(difference[0] * to_partner);
+            py[j] = round_f32(difference[1] * to_partner);
+            pz[j] = round_f32(difference[2] * to_partner);
+            pw[j] = round_f32(difference[3] * to_partner);
+        }
+        (self.dots, self.flips, self.angles) = (dots, flips, angles);
+        self.middles = [mx, my, mz, mw];
+        self.partners = [px, py, pz, pw];
+    }
+}
+
+/// A key in f64, normalised: two steps of Newton's, from keys that are unit to f32.
+#[inline(always)]
+fn unit(key: [f32; 4]) -> [f64; 4] {
+    let [x, y, z, w] = [
+        f64::from(key[0]),
+        f64::from(key[1]),
+        f64::from(key[2]),
+        f64::from(key[3]),
+    ];
+    let square = x * x + y * y + z * z + w * w;
+    let first = 1.5 - 0.5 * square;
+    let scale = first * (1.5 - 0.5 * square * first * first);
+    [x * scale, y * scale, z * scale, w * scale]
+}
+
+#[inline(always)]
+fn norm(q: [f64; 4]) -> f64 {
+    (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt()
+}
+
+/// Prepares arcs; its block is made once for many tracks.
+pub(crate) struct ArcPreparation {
+    block: ArcBlock,
+    path: Path,
+    /// What the signs of the keys so far make of the next.
+    sign: f32,
+}
+
+impl ArcPreparation {
+    pub(crate) fn new(interpolation: &Interpolation) -> Self {
+        Self {
+            block: ArcBlock::new(),
+            path: interpolation.path,
+            sign: 1.0,
+        }
+    }
+
+    /// Prepares whole tracks, one part for each.
+    pub(crate) fn push(
+        &mut self,
+        prepared: &mut Prepared,
+        set: &TrackSet,
+        tracks: Range<usize>,
+    ) -> Result<(), InterpolationError> {
+        for index in tracks {
+            let track = set.track(index);
+            self.intervals(prepared, track, index, 0..track.keys.len() - 1)?;
+        }
+        self.flush(prepared)
+    }
+
+    /// Prepares some intervals of one track as a part, its first key as it is
+    /// stored; what the sign of the key after the last interval is then.
+    pub(crate) fn push_piece(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<f32, InterpolationError> {
+        self.sign = 1.0;
+        self.intervals(prepared, track, index, intervals)?;
+        self.flush(prepared)?;
+        Ok(self.sign)
+    }
+
+    fn intervals(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<(), InterpolationError> {
+        let (start, end) = (intervals.start, intervals.end);
+        let first_key = prepared.constants.len() as u32;
+        let first_span = prepared.spans.len();
+        let last_key = first_key + intervals.len() as u32;
+        let keys = track.keys[start..=end].iter();
+        prepared.constants.extend(keys.map(Quat::to_array));
+        // Every interval has one span and one segment.
+        let segments = (prepared.segments.len() + self.block.count) as u32;
+        let spans = &mut prepared.spans;
+        let count = intervals.len() as u32;
+        spans
+            .starts
+            .extend_from_slice(&track.times[intervals.clone()]);
+        spans.keys.extend(first_key..last_key);
+        let sources = (segments..segments + count).map(Source::Segment);
+        spans.sources.extend(sources);
+        prepared.parts.push(Part {
+            track: index,
+            spans: first_span..first_span + intervals.len(),
+            end: track.times[end],
+            before: if start == 0 { first_key } else { NONE },
+            after: if end + 1 == track.keys.len() {
+                last_key
+            } else {
+                NONE
+            },
+        });
+        for key in intervals {
+            if self.block.count == LANES {
+                self.flush(prepared)?;
+            }
+            let lane = self.block.count;
+            self.block.from[lane] = track.keys[key].to_array();
+            self.block.to[lane] = track.keys[key + 1].to_array();
+            self.block.places[lane] = (index, key);
+            self.block.count += 1;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
+        let noise = match self.path {
+            Path::Shortest => -DOT_NOISE,
+            Path::AsAuthored => f64::NEG_INFINITY,
+        };
+        arc_block(&mut self.block, noise);
+        let block = &self.block;
+        let Segments::Arc(segments) = &mut prepared.segments else {
+            unreachable!("the method's form")
+        };
+        if self.path == Path::AsAuthored {
+            let opposite = |&dot: &f64| dot < -1.0 + f64::from(f32::EPSILON);
+            if let Some(lane) = block.dots[..block.count].iter().position(opposite) {
+                let (track, key) = block.places[lane];
+                return Err(InterpolationError::Antipodal { track, key });
+            }
+        }
+        let mut sign = self.sign;
+        segments.extend((0..block.count).map(|lane| {
+            if block.places[lane].1 == 0 {
+                sign = 1.0;
+            }
+            let signed = |components: &[[f32; LANES]; 4]| {
+                [0, 1, 2, 3].map(|i| canonical(components[i][lane] * sign))
+            };
+            let segment = ArcSegment {
+                middle: signed(&block.middles),
+                partner: signed(&block.partners),
+            };
+            sign *= block.flips[lane];
+            segment
+        }));
+        self.sign = sign;
+        let angles = &block.angles[..block.count];
+        prepared.spans.extents.extend_from_slice(angles);
+        self.block.count = 0;
+        Ok(())
+    }
+}
+
+/// Turns every segment round: the same rotations with the other sign.
+pub(super) fn negate(segments: &mut Segments) {
+    if let Segments::Arc(segments) = segments {
+        for segment in segments {
+            segment.middle = segment.middle.map(|c| canonical(-c));
+            segment.partner = segment.partner.map(|c| canonical(-c));
+        }
+    }
+}
