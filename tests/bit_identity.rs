@@ -232,6 +232,38 @@ fn closed_loops_have_the_same_bits() {
     }
 }
 
+/// A long track lies in many parts; any stretch of it must find the right ones,
+/// also where a part ends on a frame, before its first key and after its last.
+#[test]
+fn stretches_of_a_long_track_have_the_bits_of_the_whole() {
+    let mut random = Random(17);
+    let count = 40_000;
+    let keys: Vec<Quat> = (0..count).map(|_| random.rotation().as_quat()).collect();
+    let times: Vec<f64> = (0..count).map(|i| f64::from(i) * 0.1).collect();
+    let mut set = TrackSet::new();
+    set.push("", &times, &keys).unwrap();
+    for method in METHODS {
+        let clip = cpu().upload(&set, method).unwrap();
+        let from = -500.0;
+        let whole = clip
+            .evaluate(&Frames::fps(10).between(from, 4500.0))
+            .unwrap();
+        for _ in 0..40 {
+            let first = random.next() as usize % 49_000;
+            let last = first + random.next() as usize % 900;
+            let time = |frame: usize| from + frame as f64 / 10.0;
+            let frames = Frames::fps(10).between(time(first), time(last));
+            let found = clip.evaluate(&frames).unwrap();
+            let expected = &whole.as_quats()[first..=last];
+            // A frame is counted from another start here, so only keys are the same
+            // to the bit; every frame lies on one, or is held.
+            if method.interpolates {
+                assert_same_bits(expected, found.as_quats(), &format!("{method}, {first}"));
+            }
+        }
+    }
+}
+
 /// A clip is evaluated again and again, in changing sizes, into memory that other
 /// results have used.
 #[test]

@@ -162,7 +162,7 @@ impl CpuEngine {
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         let samples = first..first + row.len();
-        clip.parts_of(track)
+        clip.parts_of(track, timeline, samples.clone())
             .try_for_each(|part| self.part(part, timeline, samples.clone(), row))
     }
 

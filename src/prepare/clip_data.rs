@@ -1,7 +1,10 @@
 //! A whole set, prepared: the groups of its tracks, and where each track is.
 
+use std::ops::Range;
+
 use super::set::prepare;
 use super::{Part, Prepared};
+use crate::clock::{Ticks, Timeline};
 use crate::method::{Interpolation, InterpolationError};
 use crate::tracks::TrackSet;
 
@@ -63,17 +66,43 @@ impl ClipData {
         self.span
     }
 
-    /// The parts of one track in order of time.
-    pub(crate) fn parts_of(&self, track: usize) -> impl Iterator<Item = PartRef<'_>> {
-        self.parts[self.tracks[track]..self.tracks[track + 1]]
-            .iter()
-            .map(|&(group, part)| {
-                let prepared = &self.groups[group as usize];
-                PartRef {
-                    prepared,
-                    part: &prepared.parts[part as usize],
-                }
-            })
+    /// The parts of one track that may hold any of `samples`, in order of time.
+    pub(crate) fn parts_of(
+        &self,
+        track: usize,
+        timeline: &Timeline,
+        samples: Range<usize>,
+    ) -> impl Iterator<Item = PartRef<'_>> {
+        let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
+        let own = match timeline.ticks {
+            Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
+                let first = timeline.time(track, samples.start);
+                let last = timeline.time(track, samples.end - 1);
+                // One more on either side: a time within its rounding of a boundary
+                // may lie on the other side of it.
+                let from = all.partition_point(|&place| self.part(place).part.end < first);
+                let to = all.partition_point(|&place| self.part(place).start() <= last);
+                &all[from.saturating_sub(1).min(all.len() - 1)..(to + 1).min(all.len())]
+            }
+            _ => all,
+        };
+        own.iter().map(|&place| self.part(place))
+    }
+
+    fn part(&self, (group, part): (u32, u32)) -> PartRef<'_> {
+        let prepared = &self.groups[group as usize];
+        PartRef {
+            prepared,
+            part: &prepared.parts[part as usize],
+        }
+    }
+}
+
+impl PartRef<'_> {
+    /// Where its first span starts, seconds.
+    fn start(self) -> f64 {
+        let starts = &self.prepared.spans.starts[self.part.spans.clone()];
+        starts.first().copied().unwrap_or(self.part.end)
     }
 }
 
