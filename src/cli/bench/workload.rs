@@ -1,6 +1,7 @@
 //! What is measured: sets of keys and the samples asked of them, the same in every
 //! run.
 
+use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Frames, TrackSet};
 
@@ -64,39 +65,41 @@ fn frames(set: TrackSet, start: f64, count: usize) -> Workload {
 
 /// Keys at steps of 1/4 to 7/4 of the mean, each up to a radian from the last.
 fn uneven(tracks: usize, keys: usize, seconds: f64) -> TrackSet {
-    let mut random = Random(1);
+    let mut random = Rng::with_seed(1);
     let mut set = TrackSet::new();
     for _ in 0..tracks {
         let mut times = vec![0.0];
         for key in 1..keys {
-            times.push(times[key - 1] + random.between(0.25, 1.75));
+            times.push(times[key - 1] + between(&mut random, 0.25, 1.75));
         }
         let scale = seconds / times[keys - 1];
         times.iter_mut().for_each(|time| *time *= scale);
-        push(&mut set, &times, random.walk(keys, 1.0));
+        push(&mut set, &times, walk(&mut random, keys, 1.0));
     }
     set
 }
 
 /// Keys at 120 Hz, as motion capture gives them: up to 3 degrees a step.
 fn even(tracks: usize, keys: usize) -> TrackSet {
-    let mut random = Random(2);
+    let mut random = Rng::with_seed(2);
     let mut set = TrackSet::new();
     let times: Vec<f64> = (0..keys).map(|k| k as f64 / 120.0).collect();
     for _ in 0..tracks {
-        push(&mut set, &times, random.walk(keys, 0.05));
+        push(&mut set, &times, walk(&mut random, keys, 0.05));
     }
     set
 }
 
 /// Two poses and one moment for each track.
 fn crowd(tracks: usize) -> Workload {
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     let mut set = TrackSet::new();
     for _ in 0..tracks {
-        push(&mut set, &[0.0, 1.0], random.walk(2, 1.0));
+        push(&mut set, &[0.0, 1.0], walk(&mut random, 2, 1.0));
     }
-    let times: Vec<f64> = (0..tracks).map(|_| random.between(0.0, 1.0)).collect();
+    let times: Vec<f64> = (0..tracks)
+        .map(|_| between(&mut random, 0.0, 1.0))
+        .collect();
     Workload {
         set,
         frames: Frames::at_each(times.clone()),
@@ -109,31 +112,19 @@ fn push(set: &mut TrackSet, times: &[f64], keys: Vec<Quat>) {
     set.push("", times, &keys).expect("unit keys in order");
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
+/// Rotations, each up to `step` radians from the one before.
+fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
+    let mut rotation = DQuat::IDENTITY;
+    let mut next = || {
+        let axis = DVec3::from_array([(); 3].map(|()| between(random, -1.0, 1.0)));
+        let angle = between(random, 0.0, step);
+        rotation *= DQuat::from_axis_angle(axis.normalize_or(DVec3::X), angle);
+        rotation = rotation.normalize();
+        rotation.as_quat()
+    };
+    (0..keys).map(|_| next()).collect()
+}
 
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * ((self.next() >> 11) as f64 / (1u64 << 53) as f64)
-    }
-
-    /// Rotations, each up to `step` radians from the one before.
-    fn walk(&mut self, keys: usize, step: f64) -> Vec<Quat> {
-        let mut rotation = DQuat::IDENTITY;
-        let mut next = || {
-            let axis = DVec3::from_array([(); 3].map(|()| self.between(-1.0, 1.0)));
-            let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::X), self.between(0.0, step));
-            rotation = (rotation * turn).normalize();
-            rotation.as_quat()
-        };
-        (0..keys).map(|_| next()).collect()
-    }
+fn between(random: &mut Rng, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.f64()
 }
