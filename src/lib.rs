@@ -12,7 +12,7 @@
 //! let keys = [0.0, 0.7, 2.0, 1.1].map(Quat::from_rotation_z);
 //! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;
 //!
-//! // 2. Where to evaluate: the fastest Vulkan device, else the CPU.
+//! // 2. Where to evaluate: the first Vulkan device that is exact, else the CPU.
 //! let engine = Engine::auto()?;
 //!
 //! // 3. A clip stays on the device; evaluate it as often as needed.
