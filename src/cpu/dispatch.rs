@@ -114,18 +114,23 @@ impl Kernels {
 /// Works out a block of arcs with the widest vectors there are; see
 /// [`ArcBlock::fill`].
 pub(crate) fn arc_block(block: &mut ArcBlock, noise: f64) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if VectorWidth::Avx512.is_available() {
-            // SAFETY: the processor has it.
-            return unsafe { avx512::arc_block(block, noise) };
+    arc_block_at(VectorWidth::Avx512, block, noise);
+}
+
+/// As [`arc_block`], with vectors no wider than `width`.
+pub(crate) fn arc_block_at(width: VectorWidth, block: &mut ArcBlock, noise: f64) {
+    let fill: unsafe fn(&mut ArcBlock, f64) = match width {
+        #[cfg(target_arch = "x86_64")]
+        VectorWidth::Avx512 if VectorWidth::Avx512.is_available() => avx512::arc_block,
+        #[cfg(target_arch = "x86_64")]
+        VectorWidth::Avx512 | VectorWidth::Avx2 if VectorWidth::Avx2.is_available() => {
+            avx2::arc_block
         }
-        if VectorWidth::Avx2.is_available() {
-            // SAFETY: the processor has it.
-            return unsafe { avx2::arc_block(block, noise) };
-        }
-    }
-    block.fill(noise);
+        _ => ArcBlock::fill,
+    };
+    // SAFETY: each is chosen only where the processor has its vectors; the last is a
+    // safe function.
+    unsafe { fill(block, noise) }
 }
 
 fn baseline<S: Evaluate>() -> Kernel<S> {

@@ -58,10 +58,15 @@ impl CpuEngine {
         if output.len() <= TASK {
             return self.on_this_thread(clip, timeline, layout, output);
         }
-        let mut work = || match layout {
+        let work = || match layout {
             Layout::TrackMajor => self.track_major(clip, timeline, output),
             Layout::FrameMajor => self.frame_major(clip, timeline, output),
         };
+        self.on_threads(work)
+    }
+
+    /// Runs `work` with the engine's own threads, where it has any.
+    fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
@@ -229,7 +234,7 @@ impl CpuEngine {
         if output.len() <= TASK && set.key_count() <= TASK_KEYS {
             return task(&mut new(), 0, output);
         }
-        let mut work = || {
+        let work = || {
             // Several turns for each task, whose memory serves them all.
             let tasks = 8 * rayon::current_num_threads();
             let turns = set.track_count().div_ceil(tracks_each).div_ceil(tasks);
@@ -239,9 +244,6 @@ impl CpuEngine {
                 .enumerate()
                 .try_for_each(|(i, rows)| task(&mut new(), i * tracks, rows))
         };
-        match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
+        self.on_threads(work)
     }
 }

@@ -12,4 +12,6 @@ mod sine_cosine;
 
 pub use dispatch::VectorWidth;
 pub(crate) use dispatch::arc_block;
+#[cfg(test)]
+pub(crate) use dispatch::arc_block_at;
 pub(crate) use engine::CpuEngine;

@@ -300,3 +300,36 @@ pub(super) fn negate(segments: &mut Segments) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::{VectorWidth, arc_block_at};
+
+    /// Catches an instruction set whose code fuses, reorders or divides otherwise:
+    /// segments must not depend on the machine that prepared them.
+    #[test]
+    fn every_vector_width_prepares_the_same_bits() {
+        let filled = |width| {
+            let mut block = ArcBlock::new();
+            for lane in 0..LANES - 3 {
+                let step = 10.0f32.powi(-(lane as i32 % 8)) * 3.0;
+                let key = Quat::from_rotation_y(lane as f32) * Quat::from_rotation_x(0.3);
+                let sign = if lane % 5 == 0 { -1.0 } else { 1.0 };
+                block.from[lane] = key.to_array();
+                block.to[lane] = (key * Quat::from_rotation_z(step) * sign).to_array();
+            }
+            block.to[7] = block.from[7]; // no plane
+            block.count = LANES - 3;
+            arc_block_at(width, &mut block, -DOT_NOISE);
+            let components = [block.middles, block.partners].concat();
+            let bits: Vec<u32> = components.concat().iter().map(|c| c.to_bits()).collect();
+            (bits, block.angles.map(f64::to_bits), block.flips)
+        };
+        let expected = filled(VectorWidth::Baseline);
+        assert!(expected.2.contains(&-1.0) && expected.2.contains(&1.0));
+        for width in VectorWidth::available() {
+            assert!(filled(width) == expected, "{width:?}");
+        }
+    }
+}
