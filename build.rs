@@ -36,21 +36,21 @@ const PIPELINES: [(&str, &[&str]); 5] = [
         ],
     ),
     (
-        "cumulative_frames",
+        "polynomial_frames",
         &[
             "kernel",
             "distance_in_frames",
             "sine_cosine",
-            "evaluate_cumulative",
+            "evaluate_polynomial",
         ],
     ),
     (
-        "cumulative_times",
+        "polynomial_times",
         &[
             "kernel",
             "distance_in_seconds",
             "sine_cosine",
-            "evaluate_cumulative",
+            "evaluate_polynomial",
         ],
     ),
     ("canary", &["sine_cosine", "canary"]),

@@ -16,10 +16,15 @@ const COSINE_10: f32 = -2.620901966565725e-7;
 
 // x: sine, y: cosine.
 fn sine_cosine(angle: f32) -> vec2f {
-    let z = angle * angle;
+    let both = sine_and_fall(angle, angle * angle);
+    return vec2f(both.x, both.y + 1.0);
+}
+
+// x sin(a)/a and cos(a) - 1 for an angle |a| <= pi/2, given by its square z.
+fn sine_and_fall(x: f32, z: f32) -> vec2f {
     let sine_tail = ((SINE_9 * z + SINE_7) * z + SINE_5) * z + SINE_3;
-    let sine = sine_tail * (z * angle) + angle;
+    let sine = sine_tail * (z * x) + x;
     let cosine_tail = (((COSINE_10 * z + COSINE_8) * z + COSINE_6) * z + COSINE_4) * z + COSINE_2;
-    let cosine = cosine_tail * z + 1.0;
-    return vec2f(sine, cosine);
+    let fall = cosine_tail * z;
+    return vec2f(sine, fall);
 }

@@ -90,7 +90,8 @@ pub struct EngineOptions {
     pub memory: Option<u64>,
     /// Worker threads of the CPU; by default the process's shared ones.
     pub threads: Option<usize>,
-    /// The widest vector instructions to use on the CPU; by default all there are.
+    /// The widest vector instructions to evaluate with on the CPU; by default
+    /// [`VectorWidth::widest`].
     pub vector_width: Option<VectorWidth>,
     /// How results come back from a Vulkan device.
     pub transfer: Transfer,

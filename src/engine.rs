@@ -7,7 +7,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{Frames, FramesError};
-use crate::cpu::{CpuEngine, VectorWidth};
+use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth};
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
@@ -37,6 +37,9 @@ pub enum Error {
         /// Rotations of the result.
         needed: usize,
     },
+    /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
+    #[error("TUMBLE_VECTOR_WIDTH: {0}")]
+    VectorWidth(#[from] UnknownWidth),
     /// The system refused worker threads.
     #[error("worker threads could not be started: {reason}")]
     Threads {
@@ -121,9 +124,10 @@ impl Engine {
     /// When the device cannot be opened, or fails a canary and
     /// [`EngineOptions::allow_inexact`] is off.
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
+        VectorWidth::limit()?;
         match device {
             Device::Cpu => {
-                let width = options.vector_width.unwrap_or(VectorWidth::Avx512);
+                let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
                 let engine =
                     CpuEngine::new(width, options.threads).map_err(|error| Error::Threads {
                         reason: error.to_string(),

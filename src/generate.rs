@@ -9,8 +9,8 @@ use std::io::{self, Write};
 
 use glam::{DQuat, DVec3};
 
+use crate::branchless::{exp, length, product};
 use crate::formats::dat::{DatOptions, MAX_BOXES, read_dat};
-use crate::numeric::{exp, norm3};
 use crate::tracks::TrackSet;
 
 /// How key times are spaced.
@@ -237,8 +237,9 @@ impl Pendulum {
             .map(|[amplitude, frequency, phase]| amplitude * libm::sin(frequency * time + phase))
             .sum();
         let axis = self.axis + self.drift * libm::sin(self.drift_rate * time);
-        let axis = axis / norm3(axis).max(0.1);
-        crate::numeric::product(exp(self.rest), exp(axis * (angle / 2.0)))
+        let axis = axis / length(axis.to_array()).max(0.1);
+        let turn = exp((axis * (angle / 2.0)).to_array());
+        DQuat::from_array(product(exp(self.rest.to_array()), turn))
     }
 }
 
@@ -262,14 +263,14 @@ impl Random {
     fn vector(&mut self) -> DVec3 {
         let mut component = || self.between(-1.0, 1.0);
         let v = DVec3::new(component(), component(), component());
-        v / norm3(v).max(0.3)
+        v / length(v.to_array()).max(0.3)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numeric::step;
+    use crate::branchless::step;
 
     #[test]
     fn the_same_seed_gives_the_same_bytes_and_another_another() {
@@ -320,7 +321,8 @@ mod tests {
         let mut largest = 0.0f64;
         for track in set.tracks() {
             for pair in track.keys.windows(2) {
-                let turn = step(pair[0].as_dquat(), pair[1].as_dquat());
+                let [from, to] = [pair[0], pair[1]].map(|key| key.as_dquat().to_array());
+                let turn = DQuat::from_array(step(from, to));
                 largest = largest.max(2.0 * turn.w.abs().min(1.0).acos());
             }
         }

@@ -40,10 +40,11 @@
 //! * **Identical bits** from the CPU, at any vector width and number of threads, and
 //!   from every Vulkan device that passes its canaries, at any memory budget.
 //! * **Accuracy that does not decay**: at hour 24 as in the first second; slerp
-//!   within 6e-7 rad of the f64 reference, cubic methods within 2e-6 rad.
+//!   within 6e-7 rad of the f64 reference, cubic methods within 1e-6 rad.
 //! * **Keys are met exactly**: a sample on a key returns the key's own bits (for
 //!   methods that pass through their keys).
 
+mod branchless;
 mod clip;
 mod clock;
 mod cpu;
@@ -66,7 +67,7 @@ pub mod verify;
 
 pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
-pub use cpu::VectorWidth;
+pub use cpu::{UnknownWidth, VectorWidth};
 pub use device::{Device, EngineOptions, Timings, Transfer, VulkanDevice};
 pub use engine::{Engine, Error};
 pub use frame_rate::FrameRate;

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::frame_rate::FrameRate;
-use crate::numeric::{round_f32, round_quat, unit};
+use crate::numeric::{nearest_whole, round_f32, round_quat};
 use crate::prepare::{NONE, Part, Prepared, Source};
 
 /// Consecutive samples of one track with one source.
@@ -104,7 +104,7 @@ impl Prepared {
                 (timeline.time(track, sample) - start) / seconds
             }
         };
-        round_quat(unit(self.exact[index as usize].rotation(t)))
+        round_quat(self.exact[index as usize].rotation(t))
     }
 
     #[inline(always)]
@@ -352,7 +352,7 @@ fn finite_scale(scale: f64) -> f32 {
 
 /// Key times as frames: exact ratios in f64.
 #[derive(Clone, Copy)]
-struct FrameClock {
+pub(crate) struct FrameClock {
     rate: FrameRate,
     start: f64,
     /// Frames by which the rounding of a key's time may move it.
@@ -370,7 +370,7 @@ struct Boundary {
 
 impl FrameClock {
     /// `latest`: the largest time that will be asked for.
-    fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
+    pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
         let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
         Self {
             rate,
@@ -394,17 +394,15 @@ impl FrameClock {
         Boundary { frame, first }
     }
 
+    /// The first frame not before a time.
+    #[inline(always)]
+    pub(crate) fn first_frame(self, time: f64) -> usize {
+        self.boundary(time).first as usize
+    }
+
     fn time(self, frame: usize) -> f64 {
         self.start + self.rate.time_of(frame as u64)
     }
-}
-
-/// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
-/// rounded away in the sum. A call to `round` costs more than all else here.
-#[inline(always)]
-fn nearest_whole(x: f64) -> f64 {
-    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
-    (x + SHIFT) - SHIFT
 }
 
 fn constant_source(constant: u32) -> Option<RunSource> {

@@ -5,6 +5,7 @@ use std::mem::offset_of;
 use bytemuck::{Pod, Zeroable};
 
 use crate::method::Form;
+use crate::numeric::canonical;
 
 /// Constants and layouts read from the shaders at build time.
 #[allow(dead_code)]
@@ -20,15 +21,11 @@ pub(crate) struct ArcSegment {
     pub(crate) partner: [f32; 4],
 }
 
-/// `Segment` of `evaluate_cumulative.wgsl`. The last component of the coefficient
-/// vectors is padding.
+/// `Segment` of `evaluate_polynomial.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct CumulativeSegment {
-    pub(crate) terms: [[f32; 4]; 8],
-    pub(crate) linear: [f32; 4],
-    pub(crate) quadratic: [f32; 4],
-    pub(crate) cubic: [f32; 4],
+pub(crate) struct PolynomialSegment {
+    pub(crate) coefficients: [[f32; 4]; 11],
 }
 
 /// `Item` of `kernel.wgsl`.
@@ -92,12 +89,9 @@ assert_layout!(
     partner = ARC_SEGMENT_PARTNER
 );
 assert_layout!(
-    CumulativeSegment,
-    CUMULATIVE_SEGMENT_SIZE,
-    terms = CUMULATIVE_SEGMENT_TERMS,
-    linear = CUMULATIVE_SEGMENT_LINEAR,
-    quadratic = CUMULATIVE_SEGMENT_QUADRATIC,
-    cubic = CUMULATIVE_SEGMENT_CUBIC
+    PolynomialSegment,
+    POLYNOMIAL_SEGMENT_SIZE,
+    coefficients = POLYNOMIAL_SEGMENT_COEFFICIENTS
 );
 assert_layout!(
     Item,
@@ -141,42 +135,46 @@ assert_layout!(
 #[derive(Debug, Clone)]
 pub(crate) enum Segments {
     Arc(Vec<ArcSegment>),
-    Cumulative(Vec<CumulativeSegment>),
+    Polynomial(Vec<PolynomialSegment>),
 }
 
 impl Segments {
     pub(crate) fn new(form: Form) -> Self {
         match form {
             Form::Arc => Self::Arc(Vec::new()),
-            Form::Cumulative => Self::Cumulative(Vec::new()),
+            Form::Polynomial => Self::Polynomial(Vec::new()),
         }
     }
 
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Arc(segments) => segments.len(),
-            Self::Cumulative(segments) => segments.len(),
+            Self::Polynomial(segments) => segments.len(),
         }
     }
 
     pub(crate) fn clear(&mut self) {
         match self {
             Self::Arc(segments) => segments.clear(),
-            Self::Cumulative(segments) => segments.clear(),
-        }
-    }
-
-    pub(crate) fn reserve(&mut self, more: usize) {
-        match self {
-            Self::Arc(segments) => segments.reserve(more),
-            Self::Cumulative(segments) => segments.reserve(more),
+            Self::Polynomial(segments) => segments.clear(),
         }
     }
 
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self {
             Self::Arc(segments) => bytemuck::cast_slice(segments),
-            Self::Cumulative(segments) => bytemuck::cast_slice(segments),
+            Self::Polynomial(segments) => bytemuck::cast_slice(segments),
+        }
+    }
+
+    /// The same rotations with the other sign.
+    pub(crate) fn negate(&mut self) {
+        let components: &mut [f32] = match self {
+            Self::Arc(segments) => bytemuck::cast_slice_mut(segments),
+            Self::Polynomial(segments) => bytemuck::cast_slice_mut(segments),
+        };
+        for component in components {
+            *component = canonical(-*component);
         }
     }
 
@@ -184,7 +182,7 @@ impl Segments {
     pub(crate) fn append(&mut self, other: Self) {
         match (self, other) {
             (Self::Arc(own), Self::Arc(other)) => own.extend(other),
-            (Self::Cumulative(own), Self::Cumulative(other)) => own.extend(other),
+            (Self::Polynomial(own), Self::Polynomial(other)) => own.extend(other),
             _ => unreachable!("segments of one clip have one form"),
         }
     }
@@ -194,6 +192,6 @@ impl Segments {
 pub(crate) fn segment_size(form: Form) -> usize {
     match form {
         Form::Arc => size_of::<ArcSegment>(),
-        Form::Cumulative => size_of::<CumulativeSegment>(),
+        Form::Polynomial => size_of::<PolynomialSegment>(),
     }
 }

@@ -23,7 +23,7 @@ pub const NORM_BOUND: f64 = 4e-7;
 pub fn error_bound(form: Form) -> f64 {
     match form {
         Form::Arc => 6e-7,
-        Form::Cumulative => 2e-6,
+        Form::Polynomial => 1e-6,
     }
 }
 

@@ -1,5 +1,5 @@
 //! How far the engine is from the textbook, in radians, with stated bounds: slerp
-//! 6e-7 (largest) and 1e-7 (rms), cubic methods 2e-6 and 2e-7, norms 4e-7.
+//! 6e-7 (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
 
 mod support;
 
@@ -54,7 +54,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
 fn assert_within_bounds(set: &TrackSet, interpolation: Interpolation, frames: &Frames, what: &str) {
     let (largest, rms) = match interpolation.method.form {
         Form::Arc => (6e-7, 1e-7),
-        _ => (2e-6, 2e-7),
+        _ => (1e-6, 1e-7),
     };
     let errors = errors(set, interpolation, frames);
     println!("{}, {what}: {errors:?}", interpolation.method);

@@ -23,8 +23,8 @@ macro_rules! shader {
 const SHADERS: [(&str, &[u8]); 5] = [
     shader!("arc_frames"),
     shader!("arc_times"),
-    shader!("cumulative_frames"),
-    shader!("cumulative_times"),
+    shader!("polynomial_frames"),
+    shader!("polynomial_times"),
     shader!("canary"),
 ];
 

@@ -4,12 +4,14 @@
 #![allow(unsafe_code)]
 
 use std::ops::Range;
+use std::str::FromStr;
+use std::sync::OnceLock;
 
 use super::evaluate::Evaluate;
 use super::row::row;
 use crate::clock::{FramesError, Timeline};
-use crate::prepare::{ArcBlock, PartRef};
-use crate::segment::{ArcSegment, CumulativeSegment};
+use crate::prepare::{InLanes, PartRef};
+use crate::segment::{ArcSegment, PolynomialSegment};
 
 /// Vector instructions that the twins can be compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -31,6 +33,34 @@ impl VectorWidth {
             .collect()
     }
 
+    /// The widest that this process uses where nobody chooses: what the processor has,
+    /// or less where the environment's `TUMBLE_VECTOR_WIDTH` says so.
+    pub fn widest() -> Self {
+        static WIDEST: OnceLock<VectorWidth> = OnceLock::new();
+        #[cfg(test)]
+        if let Some(width) = tests::WIDTH.get() {
+            return width;
+        }
+        *WIDEST.get_or_init(|| {
+            let limit = Self::limit().ok().flatten().unwrap_or(Self::Avx512);
+            limit.narrowed()
+        })
+    }
+
+    /// The limit that the environment sets.
+    pub(crate) fn limit() -> Result<Option<Self>, UnknownWidth> {
+        match std::env::var("TUMBLE_VECTOR_WIDTH") {
+            Ok(name) if !name.is_empty() => name.parse().map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// This width, or the next narrower one that the processor has.
+    fn narrowed(self) -> Self {
+        let narrower = Self::available().into_iter().filter(|&have| have <= self);
+        narrower.max().unwrap_or(Self::Baseline)
+    }
+
     fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,
@@ -45,6 +75,29 @@ impl VectorWidth {
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
+        }
+    }
+}
+
+/// A name that is no vector width's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no vector width `{name}`; there are baseline, avx2 and avx512")]
+pub struct UnknownWidth {
+    /// The name given.
+    pub name: String,
+}
+
+impl FromStr for VectorWidth {
+    type Err = UnknownWidth;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWidth> {
+        match name.to_lowercase().as_str() {
+            "baseline" | "sse2" | "neon" => Ok(Self::Baseline),
+            "avx2" => Ok(Self::Avx2),
+            "avx512" => Ok(Self::Avx512),
+            _ => Err(UnknownWidth {
+                name: name.to_owned(),
+            }),
         }
     }
 }
@@ -83,54 +136,43 @@ impl<S> Kernel<S> {
 #[derive(Clone, Copy)]
 pub(crate) struct Kernels {
     pub(crate) arc: Kernel<ArcSegment>,
-    pub(crate) cumulative: Kernel<CumulativeSegment>,
+    pub(crate) polynomial: Kernel<PolynomialSegment>,
 }
 
 impl Kernels {
     /// The kernels of a width; narrower ones where the processor does not have it.
     pub(crate) fn new(width: VectorWidth) -> Self {
-        let narrower = VectorWidth::available()
-            .into_iter()
-            .filter(|&have| have <= width);
-        match narrower.max() {
+        match width.narrowed() {
             #[cfg(target_arch = "x86_64")]
-            Some(VectorWidth::Avx512) => Self {
+            VectorWidth::Avx512 => Self {
                 arc: avx512::kernel(),
-                cumulative: avx512::kernel(),
+                polynomial: avx512::kernel(),
             },
             #[cfg(target_arch = "x86_64")]
-            Some(VectorWidth::Avx2) => Self {
+            VectorWidth::Avx2 => Self {
                 arc: avx2::kernel(),
-                cumulative: avx2::kernel(),
+                polynomial: avx2::kernel(),
             },
             _ => Self {
                 arc: baseline(),
-                cumulative: baseline(),
+                polynomial: baseline(),
             },
         }
     }
 }
 
-/// Works out a block of arcs with the widest vectors there are; see
-/// [`ArcBlock::fill`].
-pub(crate) fn arc_block(block: &mut ArcBlock, noise: f64) {
-    arc_block_at(VectorWidth::Avx512, block, noise);
-}
-
-/// As [`arc_block`], with vectors no wider than `width`.
-pub(crate) fn arc_block_at(width: VectorWidth, block: &mut ArcBlock, noise: f64) {
-    let fill: unsafe fn(&mut ArcBlock, f64) = match width {
+/// Does work over lanes with the widest vectors there are.
+pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
+    let run: unsafe fn(&mut W) = match VectorWidth::widest() {
         #[cfg(target_arch = "x86_64")]
-        VectorWidth::Avx512 if VectorWidth::Avx512.is_available() => avx512::arc_block,
+        VectorWidth::Avx512 => avx512::in_lanes::<W>,
         #[cfg(target_arch = "x86_64")]
-        VectorWidth::Avx512 | VectorWidth::Avx2 if VectorWidth::Avx2.is_available() => {
-            avx2::arc_block
-        }
-        _ => ArcBlock::fill,
+        VectorWidth::Avx2 => avx2::in_lanes::<W>,
+        _ => W::run,
     };
-    // SAFETY: each is chosen only where the processor has its vectors; the last is a
-    // safe function.
-    unsafe { fill(block, noise) }
+    // SAFETY: the processor has the vectors of the widest width; the last is a safe
+    // function.
+    unsafe { run(work) }
 }
 
 fn baseline<S: Evaluate>() -> Kernel<S> {
@@ -141,7 +183,7 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 macro_rules! compiled_for {
     ($width:ident, $features:literal) => {
         mod $width {
-            use super::{ArcBlock, Evaluate, FramesError, Kernel, PartRef, Range, Timeline};
+            use super::{Evaluate, FramesError, InLanes, Kernel, PartRef, Range, Timeline};
 
             #[target_feature(enable = $features)]
             fn row<S: Evaluate>(
@@ -155,8 +197,8 @@ macro_rules! compiled_for {
             }
 
             #[target_feature(enable = $features)]
-            pub(super) fn arc_block(block: &mut ArcBlock, noise: f64) {
-                block.fill(noise);
+            pub(super) fn in_lanes<W: InLanes>(work: &mut W) {
+                work.run();
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {
@@ -170,3 +212,33 @@ macro_rules! compiled_for {
 compiled_for!(avx2, "avx2");
 #[cfg(target_arch = "x86_64")]
 compiled_for!(avx512, "avx512f,avx512dq,avx512vl,avx512bw");
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::cell::Cell;
+
+    use super::VectorWidth;
+
+    thread_local! {
+        pub(super) static WIDTH: Cell<Option<VectorWidth>> = const { Cell::new(None) };
+    }
+
+    /// What `work` gives on this thread at every width that the processor has.
+    pub(crate) fn at_every_width<R>(work: impl Fn() -> R) -> Vec<(VectorWidth, R)> {
+        let at = |width| {
+            WIDTH.set(Some(width));
+            (width, work())
+        };
+        let results = VectorWidth::available().into_iter().map(at).collect();
+        WIDTH.set(None);
+        results
+    }
+
+    #[test]
+    fn widths_have_names() {
+        assert_eq!("AVX2".parse(), Ok(VectorWidth::Avx2));
+        assert_eq!("sse2".parse(), Ok(VectorWidth::Baseline));
+        let error = "avx".parse::<VectorWidth>().unwrap_err();
+        assert!(error.to_string().contains("baseline, avx2 and avx512"));
+    }
+}

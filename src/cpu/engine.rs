@@ -184,8 +184,8 @@ impl CpuEngine {
                 let kernel = &self.kernels.arc;
                 kernel.row(part, all, timeline, samples, row)
             }
-            Segments::Cumulative(all) => {
-                let kernel = &self.kernels.cumulative;
+            Segments::Polynomial(all) => {
+                let kernel = &self.kernels.polynomial;
                 kernel.row(part, all, timeline, samples, row)
             }
         }
@@ -210,10 +210,9 @@ impl CpuEngine {
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
         let new = || {
-            (
-                Prepared::new(interpolation),
-                Preparation::new(interpolation),
-            )
+            let mut preparation = Preparation::new(interpolation);
+            preparation.only_for(timeline, set);
+            (Prepared::new(interpolation), preparation)
         };
         let task =
             |(prepared, preparation): &mut (Prepared, Preparation), first, rows: &mut [_]| {

@@ -6,12 +6,13 @@ mod dispatch;
 mod engine;
 mod evaluate;
 mod evaluate_arc;
-mod evaluate_cumulative;
+mod evaluate_polynomial;
 mod row;
 mod sine_cosine;
 
-pub use dispatch::VectorWidth;
-pub(crate) use dispatch::arc_block;
+pub(crate) use dispatch::in_lanes;
 #[cfg(test)]
-pub(crate) use dispatch::arc_block_at;
+pub(crate) use dispatch::tests::at_every_width;
+pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
+pub(crate) use sine_cosine::sine_and_fall;

@@ -7,12 +7,19 @@ use crate::segment::shader::{
 /// Sine and cosine for |angle| <= pi/2.
 #[inline(always)]
 pub(super) fn sine_cosine(angle: f32) -> (f32, f32) {
-    let z = angle * angle;
+    let (sine, fall) = sine_and_fall(angle, angle * angle);
+    (sine, fall + 1.0)
+}
+
+/// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2, given by its square `z`:
+/// the sine, for `x = a`.
+#[inline(always)]
+pub(crate) fn sine_and_fall(x: f32, z: f32) -> (f32, f32) {
     let sine_tail = ((SINE_9 * z + SINE_7) * z + SINE_5) * z + SINE_3;
-    let sine = sine_tail * (z * angle) + angle;
+    let sine = sine_tail * (z * x) + x;
     let cosine_tail = (((COSINE_10 * z + COSINE_8) * z + COSINE_6) * z + COSINE_4) * z + COSINE_2;
-    let cosine = cosine_tail * z + 1.0;
-    (sine, cosine)
+    let fall = cosine_tail * z;
+    (sine, fall)
 }
 
 #[cfg(test)]

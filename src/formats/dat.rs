@@ -364,7 +364,7 @@ impl Keys {
 /// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
 /// writing and reading a set is exact; others are normalised in f64.
 fn nearest_unit(key: DQuat) -> Quat {
-    let rounded = DQuat::from_array(round_quat(key).map(f64::from));
+    let rounded = DQuat::from_array(round_quat(key.to_array()).map(f64::from));
     if (dot(rounded, rounded).sqrt() - 1.0).abs() <= ROUNDING {
         return rounded.as_quat();
     }

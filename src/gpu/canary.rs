@@ -12,11 +12,12 @@ use super::engine::VulkanEngine;
 use super::error::VulkanError;
 use super::pipeline::{CANARY, CANARY_BINDINGS, Exactness, Pipeline};
 use super::submission::{Access, Binding, Submission};
+use crate::branchless::exp;
 use crate::clock::Frames;
 use crate::cpu::canary::reply;
 use crate::cpu::{CpuEngine, VectorWidth};
 use crate::method::{BESSEL_OVERHAUSER, SLERP};
-use crate::numeric::{exp, unit_f32};
+use crate::numeric::round_quat;
 use crate::prepare::ClipData;
 use crate::rotations::Layout;
 use crate::segment::shader::WORKGROUP;
@@ -39,7 +40,7 @@ pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
     let mut reports = expressions(engine.device(), Exactness::Demanded)?;
     for (name, method) in [
         ("arc kernel", SLERP),
-        ("cumulative kernel", BESSEL_OVERHAUSER),
+        ("polynomial kernel", BESSEL_OVERHAUSER),
     ] {
         let clip = ClipData::new(&hostile_set(), method.into(), Some(engine.group_bytes()))
             .expect("the set suits every method");
@@ -92,7 +93,7 @@ fn hostile_set() -> TrackSet {
             .map(|i| {
                 let turn = (i * i + track) as f64 * size;
                 let axis = DVec3::new(1.0, track as f64 - 1.5, (i % 3) as f64 * 0.3);
-                unit_f32(exp(axis * (turn / 2.0)))
+                Quat::from_array(round_quat(exp((axis * (turn / 2.0)).to_array())))
             })
             .collect();
         set.push("", &times, &keys).expect("unit keys");

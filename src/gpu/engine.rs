@@ -113,8 +113,8 @@ impl VulkanEngine {
         let pipelines = [
             pipeline(Form::Arc, Clock::Frames)?,
             pipeline(Form::Arc, Clock::Times)?,
-            pipeline(Form::Cumulative, Clock::Frames)?,
-            pipeline(Form::Cumulative, Clock::Times)?,
+            pipeline(Form::Polynomial, Clock::Frames)?,
+            pipeline(Form::Polynomial, Clock::Times)?,
         ];
         Ok(Self {
             pipelines,
@@ -416,7 +416,7 @@ impl VulkanEngine {
         let times = matches!(timeline.ticks, Ticks::Times { .. });
         let form = match form {
             Form::Arc => 0,
-            Form::Cumulative => 2,
+            Form::Polynomial => 2,
         };
         &self.pipelines[form + usize::from(times)]
     }

@@ -39,14 +39,14 @@ pub(super) fn kernel(form: Form, clock: Clock) -> &'static Shader {
     static KERNELS: [Shader; 4] = [
         shader!("arc_frames"),
         shader!("arc_times"),
-        shader!("cumulative_frames"),
-        shader!("cumulative_times"),
+        shader!("polynomial_frames"),
+        shader!("polynomial_times"),
     ];
     match (form, clock) {
         (Form::Arc, Clock::Frames) => &KERNELS[0],
         (Form::Arc, Clock::Times) => &KERNELS[1],
-        (Form::Cumulative, Clock::Frames) => &KERNELS[2],
-        (Form::Cumulative, Clock::Times) => &KERNELS[3],
+        (Form::Polynomial, Clock::Frames) => &KERNELS[2],
+        (Form::Polynomial, Clock::Times) => &KERNELS[3],
     }
 }
 

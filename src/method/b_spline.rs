@@ -1,13 +1,10 @@
 //! The cumulative uniform cubic B-spline.
 
-use std::ops::Range;
-
-use glam::{DQuat, DVec3};
-
-use super::curve::{self, Cumulative, Curve};
-use super::keys::Keys;
-use super::{Ends, Form, Method};
-use crate::numeric::{exp, product};
+use super::basis::B_SPLINE as BASIS;
+use super::{Cubics, Curves, Ends, Form, Method};
+use crate::branchless::{Vector, exp, product, scaled, sum};
+use crate::cpu::in_lanes;
+use crate::prepare::{BetweenNeighbours, Intervals, Stretch};
 use crate::reference;
 
 /// The cumulative cubic B-spline: the smoothest, but it only nears its keys. The
@@ -19,30 +16,61 @@ pub const B_SPLINE: Method = Method {
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
     continuity: "C2 (uniform keys)",
     interpolates: false,
-    form: Form::Cumulative,
+    form: Form::Polynomial,
     reference: reference::Kind::BSpline,
-    curves,
+    curves: Curves::Cubics(Cubics {
+        basis: &BASIS,
+        curves,
+    }),
 };
 
-fn curves(keys: &Keys, intervals: Range<usize>, emit: &mut dyn FnMut(Curve)) {
-    let last = keys.intervals() - 1;
-    for i in intervals {
-        if matches!(keys.ends, Ends::Frozen) && last > 0 && (i == 0 || i == last) {
-            emit(Curve::Hold);
-            continue;
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+    for stretch in stretches {
+        if matches!(ends, Ends::Loop) && stretch.all > 1 {
+            continue; // the neighbours are those across the seam
         }
-        let before = step_vector(keys, i as isize - 1);
-        let vectors = [
-            before,
-            step_vector(keys, i as isize),
-            step_vector(keys, i as isize + 1),
-        ];
-        let base = product(keys.rotations[i], exp(-before));
-        emit(Curve::Cumulative(Cumulative {
-            base,
-            vectors,
-            basis: &curve::B_SPLINE,
-        }));
+        let alone = stretch.all == 1;
+        let (first, last) = (stretch.first(), stretch.last());
+        let before = first.map(|lane| (lane - 1, before_first(intervals, lane, ends, alone)));
+        let after = last.map(|lane| (lane + 1, after_last(intervals, lane, ends, alone)));
+        for (lane, log) in [before, after].into_iter().flatten() {
+            intervals.set_log(lane, log);
+        }
+    }
+    in_lanes(&mut BetweenNeighbours(intervals));
+}
+
+/// The logarithm that continues the curve before the first interval.
+fn before_first(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
+    let own = intervals.log(lane);
+    match ends {
+        _ if alone => own, // two keys: constant velocity
+        Ends::Parabolic => sum(scaled(own, 2.0), scaled(intervals.log(lane + 1), -1.0)),
+        Ends::Clamped { start, .. } => {
+            // B₁' = B₂' = 1/2 and B₂ = 1/6 at t = 0.
+            let target = scaled(start.to_array(), intervals.duration(lane));
+            rotate(scaled(own, 1.0 / 6.0), sum(target, scaled(own, -1.0)))
+        }
+        Ends::Natural | Ends::Loop | Ends::Frozen => own,
+    }
+}
+
+/// The logarithm that continues the curve behind the last interval.
+fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
+    let own = intervals.log(lane);
+    match ends {
+        _ if alone => own,
+        Ends::Parabolic => sum(scaled(own, 2.0), scaled(intervals.log(lane - 1), -1.0)),
+        Ends::Clamped { end, .. } => {
+            // B₂' = B₃' = 1/2 and B₃ = 1/6 at t = 1: the unknown also turns the frame.
+            let target = scaled(end.to_array(), intervals.duration(lane));
+            let start = sum(target, scaled(own, -1.0));
+            (0..END_ITERATIONS).fold(start, |step, _| {
+                let turned = rotate(scaled(step, -1.0 / 6.0), own);
+                sum(target, scaled(turned, -1.0))
+            })
+        }
+        Ends::Natural | Ends::Loop | Ends::Frozen => own,
     }
 }
 
@@ -50,39 +78,8 @@ fn curves(keys: &Keys, intervals: Range<usize>, emit: &mut dyn FnMut(Curve)) {
 const END_ITERATIONS: usize = 48;
 
 /// `exp(a) v exp(-a)`.
-fn rotate(a: DVec3, v: DVec3) -> DVec3 {
-    let turned = product(
-        product(exp(a), DQuat::from_xyzw(v.x, v.y, v.z, 0.0)),
-        exp(-a),
-    );
-    DVec3::new(turned.x, turned.y, turned.z)
-}
-
-/// The half-rotation vector of interval `i`; before the first and after the last
-/// key the ends say what it is.
-fn step_vector(keys: &Keys, i: isize) -> DVec3 {
-    let last = keys.intervals() as isize - 1;
-    let inner = i.clamp(0, last);
-    if i == inner || matches!(keys.ends, Ends::Loop) {
-        return keys.log_step(i);
-    }
-    let at_end = keys.log_step(inner);
-    if last == 0 {
-        return at_end; // two keys: constant velocity
-    }
-    match keys.ends {
-        Ends::Parabolic => at_end * 2.0 - keys.log_step(if i < 0 { 1 } else { last - 1 }),
-        Ends::Clamped { start, .. } if i < 0 => {
-            // B₁' = B₂' = 1/2 and B₂ = 1/6 at t = 0.
-            rotate(at_end / 6.0, start * keys.duration(inner) - at_end)
-        }
-        Ends::Clamped { end, .. } => {
-            // B₂' = B₃' = 1/2 and B₃ = 1/6 at t = 1: the unknown also turns the frame.
-            let target = end * keys.duration(inner);
-            (0..END_ITERATIONS).fold(target - at_end, |step, _| {
-                target - rotate(-step / 6.0, at_end)
-            })
-        }
-        Ends::Natural | Ends::Loop | Ends::Frozen => at_end,
-    }
+fn rotate(a: Vector, v: Vector) -> Vector {
+    let turned = product(exp(a), [v[0], v[1], v[2], 0.0]);
+    let [x, y, z, _] = product(turned, exp(scaled(a, -1.0)));
+    [x, y, z]
 }

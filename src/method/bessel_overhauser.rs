@@ -1,10 +1,10 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use super::ends::{self, Handles};
-use super::keys::Keys;
-use super::{Form, Method};
-use crate::numeric::{exp, log_near, product};
+use super::basis::BERNSTEIN;
+use super::{Cubics, Curves, Form, Method, ends};
+use crate::branchless::{Algebra, product, scaled, sum};
+use crate::prepare::{HandleRule, Handles, Interval};
 use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
@@ -16,23 +16,37 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     source: "Overhauser 1968; on rotations in the form of Kim, Kim, Shin 1995",
     continuity: "C1",
     interpolates: true,
-    form: Form::Cumulative,
+    form: Form::Polynomial,
     reference: reference::Kind::BesselOverhauser,
-    curves: |keys, intervals, emit| ends::curves(keys, intervals, handles, emit),
+    curves: Curves::Cubics(Cubics {
+        basis: &BERNSTEIN,
+        curves: ends::curves::<Rule>,
+    }),
 };
 
-fn handles(keys: &Keys, key: isize) -> Handles {
-    let before = keys.duration(key - 1);
-    let after = keys.duration(key);
-    // The slope of each side, weighted by the other side's step, left one first:
-    // only so does it equal Catmull-Rom on uniform keys.
-    let left = keys.log_step(key - 1) * (after / before);
-    let right = keys.log_step(key) * (before / after);
-    // The product's logarithm wraps: on its principal branch a long tangent would
-    // point backwards.
-    let tangent = log_near(product(exp(left), exp(right)), left + right) / (before + after);
-    Handles {
-        incoming: tangent * (before / 3.0),
-        outgoing: tangent * (after / 3.0),
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        let both = before.duration + after.duration;
+        // The slope of each side, weighted by the other side's step, left one first:
+        // only so does it equal Catmull-Rom on uniform keys.
+        let left = scaled(
+            algebra.log_of_step(before.step, before.log),
+            after.duration / before.duration,
+        );
+        let right = scaled(
+            algebra.log_of_step(after.step, after.log),
+            before.duration / after.duration,
+        );
+        // The product's logarithm wraps: on its principal branch a long tangent would
+        // point backwards.
+        let turn = product(algebra.exp(left), algebra.exp(right));
+        let tangent = scaled(algebra.log_near(turn, sum(left, right)), 1.0 / (3.0 * both));
+        Handles {
+            incoming: scaled(tangent, before.duration),
+            outgoing: scaled(tangent, after.duration),
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use super::ends::{self, Handles};
-use super::keys::Keys;
-use super::{Form, Method};
-use crate::numeric::{log_toward, product};
+use super::basis::BERNSTEIN;
+use super::{Cubics, Curves, Form, Method, ends};
+use crate::branchless::{Algebra, product, scaled, sum};
+use crate::prepare::{HandleRule, Handles, Interval};
 use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps: on
@@ -16,18 +16,27 @@ pub const CATMULL_ROM: Method = Method {
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
     continuity: "C1 (uniform keys)",
     interpolates: true,
-    form: Form::Cumulative,
+    form: Form::Polynomial,
     reference: reference::Kind::CatmullRom,
-    curves: |keys, intervals, emit| ends::curves(keys, intervals, handles, emit),
+    curves: Curves::Cubics(Cubics {
+        basis: &BERNSTEIN,
+        curves: ends::curves::<Rule>,
+    }),
 };
 
-fn handles(keys: &Keys, key: isize) -> Handles {
-    // The two-step's half-angle may truly approach pi: its sign is never re-aligned.
-    let two_step = product(keys.step(key - 1), keys.step(key));
-    let toward = keys.log_step(key - 1) + keys.log_step(key);
-    let handle = log_toward(two_step, toward) / 6.0;
-    Handles {
-        incoming: handle,
-        outgoing: handle,
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        // The two-step's half-angle may truly approach pi: its sign is never
+        // re-aligned.
+        let two_step = product(before.step, after.step);
+        let toward = sum(before.log, after.log);
+        let handle = scaled(algebra.log_toward(two_step, toward), 1.0 / 6.0);
+        Handles {
+            incoming: handle,
+            outgoing: handle,
+        }
     }
 }

@@ -5,25 +5,25 @@
 //! are what the kernels evaluate ([`Form`]). [`METHODS`] lists them all.
 
 mod b_spline;
+mod basis;
 mod bessel_overhauser;
 mod catmull_rom;
-pub(crate) mod curve;
 mod ends;
-mod keys;
 mod slerp;
 
 pub use b_spline::B_SPLINE;
+pub(crate) use basis::Basis;
 pub use bessel_overhauser::BESSEL_OVERHAUSER;
 pub use catmull_rom::CATMULL_ROM;
-pub(crate) use curve::Curve;
-pub(crate) use keys::{DOT_NOISE, Keys};
 pub use slerp::SLERP;
 
 use std::fmt;
-use std::ops::Range;
 use std::str::FromStr;
 
+use crate::branchless::{self, length, log, unit};
+use crate::prepare::{Intervals, Stretch};
 use crate::reference;
+use crate::tracks::Track;
 
 /// Every method, in the order in which help and reports list them.
 pub static METHODS: [Method; 4] = [SLERP, CATMULL_ROM, BESSEL_OVERHAUSER, B_SPLINE];
@@ -54,8 +54,26 @@ pub struct Method {
     pub form: Form,
     /// Its textbook definition in f64.
     pub reference: reference::Kind,
-    /// The curves of a range of key intervals.
-    pub(crate) curves: fn(&Keys, Range<usize>, &mut dyn FnMut(Curve)),
+    /// How its curves follow from the keys.
+    pub(crate) curves: Curves,
+}
+
+/// What lies between two keys.
+#[derive(Clone, Copy)]
+pub(crate) enum Curves {
+    /// The great circle, at constant speed.
+    Arcs,
+    /// Cubics in cumulative form.
+    Cubics(Cubics),
+}
+
+/// A rule for cubics.
+#[derive(Clone, Copy)]
+pub(crate) struct Cubics {
+    pub(crate) basis: &'static Basis,
+    /// Gives every interval of a block its base and its three vectors, with those
+    /// ends where a track ends.
+    pub(crate) curves: fn(&mut Intervals, &[Stretch], Ends),
 }
 
 /// What a kernel evaluates. Many methods share one form.
@@ -63,9 +81,8 @@ pub struct Method {
 pub enum Form {
     /// A great circle at constant angular velocity.
     Arc,
-    /// Three rotations about fixed axes, one after another, by angles that are
-    /// cubic in time.
-    Cumulative,
+    /// A polynomial in time for each component, fitted to the curve.
+    Polynomial,
 }
 
 impl Method {
@@ -150,6 +167,26 @@ pub enum Path {
     AsAuthored,
 }
 
+/// Dot products nearer to zero than this are rounding noise of f32 keys: the signs
+/// given decide, never the noise.
+const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
+
+impl Path {
+    /// A key counts with the other sign where its dot product with its predecessor
+    /// is below this.
+    pub(crate) fn flips_below(self) -> f64 {
+        match self {
+            Self::Shortest => -DOT_NOISE,
+            Self::AsAuthored => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Whether there is no path between keys with that dot product.
+    pub(crate) fn refuses(self, dot: f64) -> bool {
+        self == Self::AsAuthored && dot < -1.0 + f64::from(f32::EPSILON)
+    }
+}
+
 /// What happens in the first and in the last segment, where a neighbour is missing.
 /// Two keys are joined by slerp whatever the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -171,6 +208,28 @@ pub enum Ends {
     Loop,
     /// The first and the last segment stand still, as in the original program.
     Frozen,
+}
+
+/// How far the last key of a loop may be from the first (half-angle, radians).
+const LOOP_TOLERANCE: f64 = 1e-3;
+
+impl Ends {
+    /// Refuses a track, the `index`th of its set, that does not end as it must.
+    pub(crate) fn check(self, track: Track, index: usize) -> Result<(), InterpolationError> {
+        let (Self::Loop, [first, .., last]) = (self, track.keys) else {
+            return Ok(());
+        };
+        let seam = branchless::step(unit(first.to_array()), unit(last.to_array()));
+        let half_angle = length(log([seam[0], seam[1], seam[2], seam[3].abs()]));
+        if half_angle > LOOP_TOLERANCE {
+            let degrees = (2.0 * half_angle).to_degrees();
+            return Err(InterpolationError::OpenLoop {
+                track: index,
+                degrees,
+            });
+        }
+        Ok(())
+    }
 }
 
 /// Why a track cannot be interpolated as asked. Places count from 0.

@@ -1,6 +1,6 @@
 //! Spherical linear interpolation.
 
-use super::{Curve, Form, Method};
+use super::{Curves, Form, Method};
 use crate::reference;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.
@@ -13,12 +13,5 @@ pub const SLERP: Method = Method {
     interpolates: true,
     form: Form::Arc,
     reference: reference::Kind::Slerp,
-    curves: |keys, intervals, emit| {
-        for i in intervals {
-            emit(Curve::Arc {
-                from: keys.rotations[i],
-                to: keys.rotations[i + 1],
-            });
-        }
-    },
+    curves: Curves::Arcs,
 };

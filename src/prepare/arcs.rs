@@ -5,36 +5,16 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use super::{NONE, Part, Prepared, Source};
-use crate::cpu::arc_block;
-use crate::method::{DOT_NOISE, Interpolation, InterpolationError, Path};
+use super::{InLanes, NONE, Part, Prepared, Source};
+use crate::branchless::{arc_tangent, dot, norm, unit};
+use crate::cpu::in_lanes;
+use crate::method::{Ends, Interpolation, InterpolationError, Path};
 use crate::numeric::{canonical, round_f32};
 use crate::segment::{ArcSegment, Segments};
 use crate::tracks::{Track, TrackSet};
 
 /// Intervals worked out together.
 const LANES: usize = 64;
-
-/// Coefficients of `(atan(t)/t - 1) / t²` in powers of t², for 0 <= t <= 1; from
-/// Chebyshev nodes, within 2.9e-14 of the arc tangent, relative.
-const ARC_TANGENT: [f64; 16] = [
-    -0.33333333333329,
-    0.19999999997779172,
-    -0.1428571409522137,
-    0.11111104602822058,
-    -0.09090791339508106,
-    0.07691006729583115,
-    -0.06657116451458922,
-    0.05833142255809476,
-    -0.05078238405735279,
-    0.04240573497965025,
-    -0.03218975296582265,
-    0.02078811760821038,
-    -0.010605869455534812,
-    0.003912875889690956,
-    -0.0009141195416721525,
-    0.00010057727553740323,
-];
 
 /// Intervals that wait for their block, and what has become of them.
 pub(crate) struct ArcBlock {
@@ -44,6 +24,8 @@ pub(crate) struct ArcBlock {
     /// The track and the key that each interval starts with.
     places: [(usize, usize); LANES],
     count: usize,
+    /// Dot products below this turn the second key's sign.
+    noise: f64,
     /// Inner products of the two keys.
     dots: [f64; LANES],
     /// -1 where the second key counts with the other sign.
@@ -54,12 +36,13 @@ pub(crate) struct ArcBlock {
 }
 
 impl ArcBlock {
-    fn new() -> Self {
+    fn new(noise: f64) -> Self {
         Self {
             from: [[0.0; 4]; LANES],
             to: [[0.0; 4]; LANES],
             places: [(0, 0); LANES],
             count: 0,
+            noise,
             dots: [0.0; LANES],
             flips: [0.0; LANES],
             angles: [0.0; LANES],
@@ -67,11 +50,13 @@ impl ArcBlock {
             partners: [[0.0; LANES]; 4],
         }
     }
+}
 
-    /// Works out every interval that waits. Plain loops over arrays, no calls: this
-    /// is compiled for each vector width.
+impl InLanes for ArcBlock {
+    /// Works out every interval that waits.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, noise: f64) {
+    fn run(&mut self) {
+        let noise = self.noise;
         // Arrays of its own: the compiler must see that they do not overlap.
         let (from, to) = (self.from, self.to);
         let (mut dots, mut angles) = ([0.0; LANES], [0.0; LANES]);
@@ -81,7 +66,7 @@ impl ArcBlock {
         for j in 0..self.count.min(LANES) {
             let a = unit(from[j]);
             let b = unit(to[j]);
-            let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+            let dot = dot(a, b);
             let flip = if dot < noise { -1.0 } else { 1.0 };
             let b = [b[0] * flip, b[1] * flip, b[2] * flip, b[3] * flip];
             let sum = [b[0] + a[0], b[1] + a[1], b[2] + a[2], b[3] + a[3]];
@@ -91,35 +76,9 @@ impl ArcBlock {
             let cosine = norm(sum);
             let chord = norm(difference);
             let t = chord / (2.0 + cosine);
-            let z = t * t;
-            let [
-                c0,
-                c1,
-                c2,
-                c3,
-                c4,
-                c5,
-                c6,
-                c7,
-                c8,
-                c9,
-                c10,
-                c11,
-                c12,
-                c13,
-                c14,
-                c15,
-            ] = ARC_TANGENT;
-            let high = (((((c15 * z + c14) * z + c13) * z + c12) * z + c11) * z + c10) * z + c9;
-            let tail =
-                ((((((((high * z + c8) * z + c7) * z + c6) * z + c5) * z + c4) * z + c3) * z + c2)
-                    * z
-                    + c1)
-                    * z
-                    + c0;
             dots[j] = dot;
             flips[j] = flip as f32;
-            angles[j] = 4.0 * (t + t * (z * tail));
+            angles[j] = 4.0 * arc_tangent(t);
             let to_unit = 1.0 / cosine;
             // Equal keys have no plane; with an angle of 0 any partner will do.
             let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
@@ -138,30 +97,11 @@ impl ArcBlock {
     }
 }
 
-/// A key in f64, normalised: two steps of Newton's, from keys that are unit to f32.
-#[inline(always)]
-fn unit(key: [f32; 4]) -> [f64; 4] {
-    let [x, y, z, w] = [
-        f64::from(key[0]),
-        f64::from(key[1]),
-        f64::from(key[2]),
-        f64::from(key[3]),
-    ];
-    let square = x * x + y * y + z * z + w * w;
-    let first = 1.5 - 0.5 * square;
-    let scale = first * (1.5 - 0.5 * square * first * first);
-    [x * scale, y * scale, z * scale, w * scale]
-}
-
-#[inline(always)]
-fn norm(q: [f64; 4]) -> f64 {
-    (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt()
-}
-
 /// Prepares arcs; its block is made once for many tracks.
 pub(crate) struct ArcPreparation {
     block: ArcBlock,
     path: Path,
+    ends: Ends,
     /// What the signs of the keys so far make of the next.
     sign: f32,
 }
@@ -169,8 +109,9 @@ pub(crate) struct ArcPreparation {
 impl ArcPreparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
-            block: ArcBlock::new(),
+            block: ArcBlock::new(interpolation.path.flips_below()),
             path: interpolation.path,
+            ends: interpolation.ends,
             sign: 1.0,
         }
     }
@@ -211,6 +152,7 @@ impl ArcPreparation {
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
+        self.ends.check(track, index)?;
         let (start, end) = (intervals.start, intervals.end);
         let first_key = prepared.constants.len() as u32;
         let first_span = prepared.spans.len();
@@ -252,21 +194,15 @@ impl ArcPreparation {
     }
 
     fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
-        let noise = match self.path {
-            Path::Shortest => -DOT_NOISE,
-            Path::AsAuthored => f64::NEG_INFINITY,
-        };
-        arc_block(&mut self.block, noise);
+        in_lanes(&mut self.block);
         let block = &self.block;
         let Segments::Arc(segments) = &mut prepared.segments else {
             unreachable!("the method's form")
         };
-        if self.path == Path::AsAuthored {
-            let opposite = |&dot: &f64| dot < -1.0 + f64::from(f32::EPSILON);
-            if let Some(lane) = block.dots[..block.count].iter().position(opposite) {
-                let (track, key) = block.places[lane];
-                return Err(InterpolationError::Antipodal { track, key });
-            }
+        let refused = |&dot: &f64| self.path.refuses(dot);
+        if let Some(lane) = block.dots[..block.count].iter().position(refused) {
+            let (track, key) = block.places[lane];
+            return Err(InterpolationError::Antipodal { track, key });
         }
         let mut sign = self.sign;
         segments.extend((0..block.count).map(|lane| {
@@ -291,27 +227,17 @@ impl ArcPreparation {
     }
 }
 
-/// Turns every segment round: the same rotations with the other sign.
-pub(super) fn negate(segments: &mut Segments) {
-    if let Segments::Arc(segments) = segments {
-        for segment in segments {
-            segment.middle = segment.middle.map(|c| canonical(-c));
-            segment.partner = segment.partner.map(|c| canonical(-c));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::{VectorWidth, arc_block_at};
+    use crate::cpu::at_every_width;
 
     /// Catches an instruction set whose code fuses, reorders or divides otherwise:
     /// segments must not depend on the machine that prepared them.
     #[test]
     fn every_vector_width_prepares_the_same_bits() {
-        let filled = |width| {
-            let mut block = ArcBlock::new();
+        let filled = || {
+            let mut block = ArcBlock::new(Path::Shortest.flips_below());
             for lane in 0..LANES - 3 {
                 let step = 10.0f32.powi(-(lane as i32 % 8)) * 3.0;
                 let key = Quat::from_rotation_y(lane as f32) * Quat::from_rotation_x(0.3);
@@ -321,15 +247,16 @@ mod tests {
             }
             block.to[7] = block.from[7]; // no plane
             block.count = LANES - 3;
-            arc_block_at(width, &mut block, -DOT_NOISE);
+            in_lanes(&mut block);
             let components = [block.middles, block.partners].concat();
             let bits: Vec<u32> = components.concat().iter().map(|c| c.to_bits()).collect();
             (bits, block.angles.map(f64::to_bits), block.flips)
         };
-        let expected = filled(VectorWidth::Baseline);
+        let results = at_every_width(filled);
+        let (_, expected) = &results[0];
         assert!(expected.2.contains(&-1.0) && expected.2.contains(&1.0));
-        for width in VectorWidth::available() {
-            assert!(filled(width) == expected, "{width:?}");
+        for (width, found) in &results {
+            assert!(found == expected, "{width:?}");
         }
     }
 }

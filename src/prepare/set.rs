@@ -4,9 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Prepared;
-use super::arcs::{self, ArcPreparation};
-use crate::method::{Ends, Form, Interpolation, InterpolationError, Keys};
+use super::arcs::ArcPreparation;
+use super::cubics::CubicPreparation;
+use super::{NONE, Prepared};
+use crate::clock::{Ticks, Timeline};
+use crate::method::{Curves, Ends, Interpolation, InterpolationError};
+use crate::numeric::canonical;
 use crate::tracks::{Track, TrackSet};
 
 /// Key intervals prepared as one piece of work.
@@ -46,44 +49,21 @@ fn batches(set: &TrackSet) -> Vec<Range<usize>> {
     batches
 }
 
+/// A track in pieces, each prepared as if its first key had the sign it is stored
+/// with, and turned round afterwards where the keys before it say so.
 fn prepare_long(
     set: &TrackSet,
     index: usize,
     interpolation: &Interpolation,
 ) -> Result<Vec<Prepared>, InterpolationError> {
     let track = set.track(index);
-    if has_arc_lanes(interpolation) {
-        return long_arcs(track, index, interpolation);
-    }
-    let keys = Keys::new(track, index, interpolation)?;
-    let parts = keys.intervals().div_ceil(BATCH).max(1);
-    let part = |i: usize| {
-        let intervals = i * BATCH..((i + 1) * BATCH).min(keys.intervals());
-        let mut prepared = Prepared::new(interpolation);
-        prepared.push(track, index, &keys, intervals, interpolation);
-        prepared
-    };
-    Ok((0..parts).into_par_iter().map(part).collect())
-}
-
-/// Whether arcs are prepared in lanes, straight from the keys: the great circles
-/// between neighbours. Loops have their seam checked on the way of the cubics.
-fn has_arc_lanes(interpolation: &Interpolation) -> bool {
-    interpolation.method.form == Form::Arc && !matches!(interpolation.ends, Ends::Loop)
-}
-
-fn long_arcs(
-    track: Track,
-    index: usize,
-    interpolation: &Interpolation,
-) -> Result<Vec<Prepared>, InterpolationError> {
     let intervals = track.keys.len() - 1;
     let pieces = intervals.div_ceil(BATCH).max(1);
     let piece = |i: usize| {
         let own = i * BATCH..((i + 1) * BATCH).min(intervals);
         let mut prepared = Prepared::new(interpolation);
-        let mut arcs = ArcPreparation::new(interpolation);
-        let sign = arcs.push_piece(&mut prepared, track, index, own)?;
+        let mut preparation = Preparation::new(interpolation);
+        let sign = preparation.push_piece(&mut prepared, track, index, own)?;
         Ok((prepared, sign))
     };
     let pieces: Vec<(Prepared, f32)> = (0..pieces)
@@ -93,7 +73,7 @@ fn long_arcs(
     let mut sign = 1.0;
     let with_sign = |(mut prepared, own): (Prepared, f32)| {
         if sign < 0.0 {
-            arcs::negate(&mut prepared.segments);
+            negate(&mut prepared, interpolation);
         }
         sign *= own;
         prepared
@@ -101,18 +81,46 @@ fn long_arcs(
     Ok(pieces.into_iter().map(with_sign).collect())
 }
 
-/// Prepares whole tracks, with memory that serves many.
-pub(crate) struct Preparation<'a> {
-    interpolation: &'a Interpolation,
-    arcs: Option<Box<ArcPreparation>>,
+/// The same rotations with the other sign, but for those that are the keys' own.
+fn negate(prepared: &mut Prepared, interpolation: &Interpolation) {
+    prepared.segments.negate();
+    for cubic in &mut prepared.exact {
+        cubic.negate();
+    }
+    let frozen = matches!(interpolation.ends, Ends::Frozen);
+    if !interpolation.method.interpolates && !frozen {
+        let ends = prepared.parts.iter().map(|part| part.after);
+        for constant in ends.filter(|&constant| constant != NONE) {
+            let value = &mut prepared.constants[constant as usize];
+            *value = value.map(|component| canonical(-component));
+        }
+    }
 }
 
-impl<'a> Preparation<'a> {
-    pub(crate) fn new(interpolation: &'a Interpolation) -> Self {
-        let arcs = || Box::new(ArcPreparation::new(interpolation));
-        Self {
-            interpolation,
-            arcs: has_arc_lanes(interpolation).then(arcs),
+/// Prepares whole tracks, with memory that serves many.
+pub(crate) enum Preparation {
+    Arcs(Box<ArcPreparation>),
+    Cubics(Box<CubicPreparation>),
+}
+
+impl Preparation {
+    pub(crate) fn new(interpolation: &Interpolation) -> Self {
+        match interpolation.method.curves {
+            Curves::Arcs => Self::Arcs(Box::new(ArcPreparation::new(interpolation))),
+            Curves::Cubics(cubics) => {
+                Self::Cubics(Box::new(CubicPreparation::new(interpolation, cubics)))
+            }
+        }
+    }
+
+    /// From now on intervals without a sample of that timeline need not be prepared,
+    /// if that saves anything. What is prepared then serves no other.
+    pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
+        let keys = set.key_count() / set.track_count().max(1);
+        if let (Self::Cubics(cubics), Ticks::Frames { rate, start }) = (self, &timeline.ticks)
+            && timeline.len() < keys
+        {
+            cubics.only_frames(*rate, *start);
         }
     }
 
@@ -123,15 +131,25 @@ impl<'a> Preparation<'a> {
         set: &TrackSet,
         tracks: Range<usize>,
     ) -> Result<(), InterpolationError> {
-        if let Some(arcs) = &mut self.arcs {
-            return arcs.push(prepared, set, tracks);
+        match self {
+            Self::Arcs(arcs) => arcs.push(prepared, set, tracks),
+            Self::Cubics(cubics) => cubics.push(prepared, set, tracks),
         }
-        for index in tracks {
-            let track = set.track(index);
-            let keys = Keys::new(track, index, self.interpolation)?;
-            prepared.push(track, index, &keys, 0..keys.intervals(), self.interpolation);
+    }
+
+    /// Prepares some intervals of one track as a part, its first key as it is
+    /// stored; what the sign of the key after the last interval is then.
+    fn push_piece(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<f32, InterpolationError> {
+        match self {
+            Self::Arcs(arcs) => arcs.push_piece(prepared, track, index, intervals),
+            Self::Cubics(cubics) => cubics.push_piece(prepared, track, index, intervals),
         }
-        Ok(())
     }
 }
 
@@ -139,8 +157,21 @@ impl<'a> Preparation<'a> {
 mod tests {
     use glam::Quat;
 
+    use super::super::Source;
     use super::*;
+    use crate::cpu::at_every_width;
     use crate::method::METHODS;
+
+    /// The bytes of every span's segment; parts of curves may lie in another order.
+    fn curves(prepared: &Prepared) -> Vec<&[u8]> {
+        let bytes = prepared.segments.as_bytes();
+        let size = bytes.len() / prepared.segments.len();
+        let segment = |source: &Source| match *source {
+            Source::Segment(i) => &bytes[i as usize * size..][..size],
+            _ => &[],
+        };
+        prepared.spans.sources.iter().map(segment).collect()
+    }
 
     /// Catches a piece that forgets the signs of the keys before it, or lanes that
     /// mix up tracks.
@@ -168,13 +199,51 @@ mod tests {
             assert!(pieces.len() > 3, "{method}");
             let mut together = Prepared::new(&interpolation);
             pieces.into_iter().for_each(|piece| together.append(piece));
-            assert_eq!(
-                whole.segments.as_bytes(),
-                together.segments.as_bytes(),
-                "{method}"
-            );
+            assert!(curves(&whole) == curves(&together), "{method}");
             assert_eq!(whole.spans.extents, together.spans.extents, "{method}");
             assert_eq!(whole.spans.starts, together.spans.starts, "{method}");
+        }
+    }
+
+    /// Catches an instruction set whose code fuses, reorders or divides otherwise:
+    /// segments must not depend on the machine that prepared them.
+    #[test]
+    fn every_vector_width_prepares_the_same_bits() {
+        let mut set = TrackSet::new();
+        for track in 0..40 {
+            // From a hundredth of a degree to half a turn, evenly and unevenly.
+            let step = 3.1 * 0.5f32.powi(track % 14);
+            let uneven = if track < 20 { 0.0 } else { 0.99 };
+            let times: Vec<f64> = (0..23)
+                .map(|i| f64::from(i) + uneven * f64::from(i % 2))
+                .collect();
+            let keys: Vec<Quat> = (0..23)
+                .map(|i| {
+                    let turn = step * (i as f32 + (i as f32).sin());
+                    Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
+                })
+                .collect();
+            set.push("", &times, &keys).unwrap();
+        }
+        for method in METHODS {
+            let results = at_every_width(|| {
+                let interpolation = method.into();
+                let mut prepared = Prepared::new(&interpolation);
+                Preparation::new(&interpolation)
+                    .push(&mut prepared, &set, 0..set.track_count())
+                    .unwrap();
+                prepared
+            });
+            let (_, expected) = &results[0];
+            for (width, found) in &results {
+                assert!(
+                    found.segments.as_bytes() == expected.segments.as_bytes()
+                        && found.spans.extents == expected.spans.extents
+                        && found.spans.starts == expected.spans.starts
+                        && found.exact.len() == expected.exact.len(),
+                    "{method}, {width:?}"
+                );
+            }
         }
     }
 }

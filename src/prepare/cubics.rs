@@ -1,0 +1,244 @@
+//! Cubics from keys: intervals of as many tracks as it takes to fill the lanes, made
+//! into curves by the method.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use super::fitting::{Fitting, Place};
+use super::intervals::{Intervals, LANES, Steps, Stretch};
+use super::{NONE, Part, Prepared};
+use crate::cpu::in_lanes;
+use crate::frame_rate::FrameRate;
+use crate::method::{Cubics, Ends, Interpolation, InterpolationError};
+use crate::numeric::round_quat;
+use crate::schedule::FrameClock;
+use crate::tracks::{Track, TrackSet};
+
+/// Lanes that a stretch needs beside those of its intervals.
+const CONTEXT: usize = 2;
+
+/// No stretch with fewer intervals than this is begun at the end of a block, unless
+/// it is all that is left of its track.
+const SHORTEST: usize = 8;
+
+/// Prepares cubics; its blocks are made once for many tracks.
+pub(crate) struct CubicPreparation {
+    interpolation: Interpolation,
+    cubics: Cubics,
+    intervals: Intervals,
+    stretches: Vec<Stretch>,
+    fitting: Fitting,
+    /// What the signs of the keys so far make of the next.
+    sign: f64,
+    /// Where only intervals with a frame are wanted: the frames' rate and start.
+    frames: Option<(FrameRate, f64)>,
+}
+
+impl CubicPreparation {
+    pub(crate) fn new(interpolation: &Interpolation, cubics: Cubics) -> Self {
+        Self {
+            interpolation: *interpolation,
+            cubics,
+            intervals: Intervals::new(interpolation.path.flips_below()),
+            stretches: Vec::new(),
+            fitting: Fitting::new(cubics.basis),
+            sign: 1.0,
+            frames: None,
+        }
+    }
+
+    /// From now on only intervals that hold one of these frames are fitted.
+    pub(super) fn only_frames(&mut self, rate: FrameRate, start: f64) {
+        self.frames = Some((rate, start));
+    }
+
+    /// Prepares whole tracks, one part for each.
+    pub(crate) fn push(
+        &mut self,
+        prepared: &mut Prepared,
+        set: &TrackSet,
+        tracks: Range<usize>,
+    ) -> Result<(), InterpolationError> {
+        for index in tracks {
+            let track = set.track(index);
+            self.intervals(prepared, track, index, 0..track.keys.len() - 1)?;
+        }
+        self.flush(prepared)?;
+        self.fitting.finish(prepared);
+        Ok(())
+    }
+
+    /// Prepares some intervals of one track as a part, its first key as it is
+    /// stored; what the sign of the key after the last interval is then.
+    pub(crate) fn push_piece(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<f32, InterpolationError> {
+        self.sign = 1.0;
+        self.intervals(prepared, track, index, intervals)?;
+        self.flush(prepared)?;
+        self.fitting.finish(prepared);
+        Ok(self.sign as f32)
+    }
+
+    fn intervals(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<(), InterpolationError> {
+        self.interpolation.ends.check(track, index)?;
+        let all = track.keys.len() - 1;
+        let first_key = prepared.constants.len() as u32;
+        // A curve that does not pass through its keys has end values of its own.
+        let meets_keys = self.interpolation.method.interpolates || all == 0;
+        if meets_keys {
+            let keys = track.keys[intervals.start..=intervals.end].iter();
+            prepared.constants.extend(keys.map(Quat::to_array));
+        }
+        let last_key = first_key + intervals.len() as u32;
+        let held = |at_end: bool, key: u32| {
+            if meets_keys && at_end { key } else { NONE }
+        };
+        let part = prepared.parts.len();
+        prepared.parts.push(Part {
+            track: index,
+            spans: 0..0,
+            end: track.times[intervals.end],
+            before: held(intervals.start == 0, first_key),
+            after: held(intervals.end == all, last_key),
+        });
+        let looped = matches!(self.interpolation.ends, Ends::Loop);
+        let mut from = intervals.start;
+        while from < intervals.end {
+            let left = intervals.end - from;
+            if self.intervals.count + CONTEXT + left.min(SHORTEST) > LANES {
+                self.flush(prepared)?;
+            }
+            let to = from + left.min(LANES - CONTEXT - self.intervals.count);
+            self.neighbour(track, from.checked_sub(1).or(looped.then_some(all - 1)));
+            self.stretches.push(Stretch {
+                lane: self.intervals.count,
+                intervals: from..to,
+                all,
+                track: index,
+                part,
+                key: if meets_keys {
+                    first_key + (from - intervals.start) as u32
+                } else {
+                    NONE
+                },
+            });
+            for i in from..to {
+                self.intervals.push(track, i);
+            }
+            self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
+            // Where the last interval ends, whatever follows it.
+            self.intervals.starts[self.intervals.count - 1] = track.times[to];
+            from = to;
+        }
+        Ok(())
+    }
+
+    fn neighbour(&mut self, track: Track, interval: Option<usize>) {
+        match interval {
+            Some(i) => self.intervals.push(track, i),
+            None => self.intervals.push_nothing(),
+        }
+    }
+
+    /// Makes the intervals that wait into curves, and has them fitted.
+    fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
+        in_lanes(&mut Steps(&mut self.intervals));
+        for stretch in &self.stretches {
+            if stretch.intervals.start == 0 {
+                self.sign = 1.0;
+            }
+            for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
+                let dot = self.intervals.dots[lane];
+                if self.interpolation.path.refuses(dot) {
+                    let track = stretch.track;
+                    return Err(InterpolationError::Antipodal { track, key });
+                }
+                self.intervals.signs[lane] = self.sign;
+                if dot < self.intervals.noise {
+                    self.sign = -self.sign;
+                }
+            }
+        }
+        let ends = self.interpolation.ends;
+        (self.cubics.curves)(&mut self.intervals, &self.stretches, ends);
+        for stretch in std::mem::take(&mut self.stretches) {
+            self.end_values(prepared, &stretch);
+            let latest = prepared.parts[stretch.part].end;
+            let clock = self
+                .frames
+                .map(|(rate, start)| FrameClock::new(rate, start, latest));
+            for (i, lane) in stretch.lanes().enumerate() {
+                let key = if stretch.key == NONE {
+                    NONE
+                } else {
+                    stretch.key + i as u32
+                };
+                let place = Place {
+                    part: stretch.part,
+                    start: self.intervals.starts[lane],
+                    end: self.intervals.starts[lane + 1],
+                    key,
+                };
+                let is_empty = |clock: FrameClock| {
+                    clock.first_frame(place.start) == clock.first_frame(place.end)
+                };
+                if clock.is_some_and(is_empty) {
+                    self.fitting.push_constant(place, NONE);
+                } else if !self.holds(&stretch, lane) {
+                    self.fitting.push(prepared, place, &self.intervals, lane);
+                } else if key == NONE {
+                    let [stored, _] = self.intervals.keys(lane);
+                    let constant = prepared.constant(stored);
+                    self.fitting.push_constant(place, constant);
+                } else {
+                    self.fitting.push_constant(place, key);
+                }
+            }
+        }
+        self.intervals.count = 0;
+        Ok(())
+    }
+
+    /// Whether an interval stands still.
+    fn holds(&self, stretch: &Stretch, lane: usize) -> bool {
+        let at_end = stretch.first() == Some(lane) || stretch.last() == Some(lane);
+        self.is_frozen() && at_end && stretch.all > 1
+    }
+
+    fn is_frozen(&self) -> bool {
+        matches!(self.interpolation.ends, Ends::Frozen)
+    }
+
+    /// A curve that does not pass through its keys is held at its own ends.
+    fn end_values(&self, prepared: &mut Prepared, stretch: &Stretch) {
+        if stretch.key != NONE {
+            return;
+        }
+        let mut value = |lane: usize, end: usize| {
+            let value = if self.is_frozen() {
+                self.intervals.keys(lane)[end]
+            } else {
+                let cubic = self.intervals.cubic(lane, self.cubics.basis);
+                round_quat(cubic.rotation(end as f64))
+            };
+            prepared.constant(value)
+        };
+        let before = stretch.first().map(|lane| value(lane, 0));
+        let after = stretch.last().map(|lane| value(lane, 1));
+        let part = &mut prepared.parts[stretch.part];
+        part.before = before.unwrap_or(part.before);
+        part.after = after.unwrap_or(part.after);
+    }
+}

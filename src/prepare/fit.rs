@@ -1,0 +1,254 @@
+//! Cubics fitted by polynomials, in vector lanes: what the kernels evaluate.
+//!
+//! A curve is sampled at Chebyshev nodes, and each component of the rotation becomes
+//! the polynomial through the samples. One node is the middle, which the polynomial
+//! meets exactly; the others enter as differences from it, so that f32 serves for
+//! them. Powers come last: a Chebyshev coefficient's rounding error stays small in
+//! their sum, that of a power found directly would not.
+
+use super::cubic::{Cubic, Piece};
+use super::intervals::{InLanes, Intervals, LANES};
+use super::nodes::{EVEN_POWERS, FULL_NODES, GENTLE_NODES, Nodes, ODD_POWERS};
+use super::sample::{Differences, Expanded};
+use crate::method::Basis;
+use crate::numeric::canonical;
+use crate::segment::PolynomialSegment;
+
+/// Powers of the parameter in a segment.
+const COEFFICIENTS: usize = 11;
+
+/// How many powers a curve needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Tier {
+    /// Degree 6, for curves that turn little: keys as dense as motion capture has
+    /// them. Such a fit is always good enough.
+    Gentle,
+    /// Degree 10.
+    Full,
+}
+
+/// Sums of the three half-rotation vectors' squares below this are fitted within 2e-8
+/// by degree 6.
+const GENTLE: f64 = 0.002;
+
+/// Above this hardly any curve is fitted whole.
+const LONGEST_WHOLE: f64 = 0.2;
+
+/// An estimate of twice what a fit leaves out may be this much: from the last two
+/// Chebyshev coefficients.
+const TOLERANCE: f32 = 1.5e-7;
+
+/// How far the angles may go from the middle: the polynomials of sine and cosine
+/// hold to pi/2.
+const REACH: f64 = 1.57;
+
+pub(super) type Lane64 = [f64; LANES];
+pub(super) type Lane32 = [f32; LANES];
+
+/// What to make of a curve with that sum of squares; nothing where it is to be cut
+/// untried.
+pub(super) fn tier(energy: f64) -> Option<Tier> {
+    if energy <= GENTLE {
+        Some(Tier::Gentle)
+    } else {
+        // NaN is cut until nothing is left of it.
+        (energy <= LONGEST_WHOLE).then_some(Tier::Full)
+    }
+}
+
+/// Curves that wait, and their polynomials.
+pub(super) struct FitBlock {
+    pub(super) basis: &'static Basis,
+    tier: Tier,
+    pub(super) bases: [Lane64; 4],
+    pub(super) vectors: [[Lane64; 3]; 3],
+    /// The middle of the piece to fit, and its width.
+    pub(super) middles: Lane64,
+    pub(super) widths: Lane64,
+    count: usize,
+    /// The coefficients of each power, for every lane.
+    coefficients: [[[f32; 4]; LANES]; COEFFICIENTS],
+    /// What the fit leaves out, twice, about; the largest of any component.
+    tails: Lane32,
+    /// The squares of the farthest angles from the middle.
+    pub(super) reaches: Lane64,
+}
+
+impl FitBlock {
+    pub(super) fn new(basis: &'static Basis, tier: Tier) -> Self {
+        let lane = [0.0; LANES];
+        Self {
+            basis,
+            tier,
+            bases: [lane; 4],
+            vectors: [[lane; 3]; 3],
+            middles: lane,
+            widths: lane,
+            count: 0,
+            coefficients: [[[0.0; 4]; LANES]; COEFFICIENTS],
+            tails: [0.0; LANES],
+            reaches: lane,
+        }
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.count == LANES
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds a piece of a cubic; the block is not full.
+    pub(super) fn push(&mut self, cubic: &Cubic) {
+        let lane = self.count;
+        for (lanes, component) in self.bases.iter_mut().zip(cubic.base) {
+            lanes[lane] = component;
+        }
+        let vectors = self.vectors.as_flattened_mut().iter_mut();
+        for (lanes, &component) in vectors.zip(cubic.vectors.as_flattened()) {
+            lanes[lane] = component;
+        }
+        self.push_piece(cubic.piece);
+    }
+
+    /// Adds the curve in a lane of `intervals`; the block is not full.
+    pub(super) fn push_from(&mut self, intervals: &Intervals, from: usize) {
+        let lane = self.count;
+        for (lanes, curves) in self.bases.iter_mut().zip(&intervals.bases) {
+            lanes[lane] = curves[from];
+        }
+        let vectors = self.vectors.as_flattened_mut().iter_mut();
+        for (lanes, curves) in vectors.zip(intervals.vectors.as_flattened()) {
+            lanes[lane] = curves[from];
+        }
+        self.push_piece(Piece::WHOLE);
+    }
+
+    fn push_piece(&mut self, piece: Piece) {
+        let (start, width) = piece.extent();
+        self.widths[self.count] = width;
+        self.middles[self.count] = start + 0.5 * width;
+        self.count += 1;
+    }
+
+    /// The whole curve in a lane.
+    pub(super) fn cubic(&self, lane: usize) -> Cubic {
+        let at = |lanes: &Lane64| lanes[lane];
+        Cubic {
+            base: self.bases.each_ref().map(at),
+            vectors: self
+                .vectors
+                .each_ref()
+                .map(|vector| vector.each_ref().map(at)),
+            basis: self.basis,
+            piece: Piece::WHOLE,
+        }
+    }
+
+    /// Whether the polynomial of a lane is near enough to its curve.
+    pub(super) fn fits(&self, lane: usize) -> bool {
+        // Written so that NaN does not pass.
+        self.tails[lane] <= TOLERANCE && self.reaches[lane] <= REACH * REACH
+    }
+
+    /// Writes the polynomial of a lane.
+    #[inline]
+    pub(super) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
+        for (power, coefficients) in segment.coefficients.iter_mut().enumerate() {
+            *coefficients = self.coefficients[power][lane];
+        }
+    }
+}
+
+impl InLanes for FitBlock {
+    #[inline(always)]
+    fn run(&mut self) {
+        match self.tier {
+            _ if self.count == 0 => {}
+            Tier::Gentle => self.fit(&GENTLE_NODES),
+            Tier::Full => self.fit(&FULL_NODES),
+        }
+    }
+}
+
+impl FitBlock {
+    #[inline(always)]
+    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+        // Whole vectors: lanes left over would be worked out one by one.
+        let count = self.count.next_multiple_of(16).min(LANES);
+        let lane = [0.0; LANES];
+        let mut expanded = Expanded {
+            terms: [[lane; 4]; 8],
+            squares: [lane; 3],
+            powers: [[lane; 3]; 3],
+        };
+        self.expand(count, &mut expanded);
+        let mut differences = Differences {
+            even: [[lane; 4]; PAIRS],
+            odd: [[lane; 4]; PAIRS],
+        };
+        expanded.sample(count, nodes, &mut differences);
+        self.interpolate(count, nodes, &expanded, &differences);
+    }
+
+    /// From the differences at the nodes to the coefficients.
+    #[inline(always)]
+    fn interpolate<const PAIRS: usize>(
+        &mut self,
+        count: usize,
+        nodes: &Nodes<PAIRS>,
+        expanded: &Expanded,
+        Differences { even, odd }: &Differences<PAIRS>,
+    ) {
+        let mut tails = [0.0; LANES];
+        let mut found_even = [[[0.0f32; LANES]; 4]; PAIRS];
+        let mut found_odd = [[[0.0f32; LANES]; 4]; PAIRS];
+        for c in 0..4 {
+            for lane in 0..count {
+                let mut means = [0.0; PAIRS];
+                let mut halves = [0.0; PAIRS];
+                for i in 0..PAIRS {
+                    for k in 0..PAIRS {
+                        means[i] += nodes.even[i][k] * even[k][c][lane];
+                        halves[i] += nodes.odd[i][k] * odd[k][c][lane];
+                    }
+                }
+                for power in 0..PAIRS {
+                    let mut e = 0.0;
+                    let mut o = 0.0;
+                    for i in power..PAIRS {
+                        e += EVEN_POWERS[i][power] * means[i];
+                        o += ODD_POWERS[i][power] * halves[i];
+                    }
+                    found_even[power][c][lane] = canonical(e);
+                    found_odd[power][c][lane] = canonical(o);
+                }
+                let tail = means[PAIRS - 1].abs() + 0.125 * halves[PAIRS - 1].abs();
+                tails[lane] = if tail > tails[lane] {
+                    tail
+                } else {
+                    tails[lane]
+                };
+            }
+        }
+        self.tails = tails;
+        let stored = &mut self.coefficients;
+        let [x, y, z, w] = &expanded.terms[0];
+        for lane in 0..count {
+            stored[0][lane] = [x[lane], y[lane], z[lane], w[lane]].map(canonical);
+        }
+        for power in 0..PAIRS {
+            store(&mut stored[2 * power + 1], &found_odd[power], count);
+            store(&mut stored[2 * power + 2], &found_even[power], count);
+        }
+    }
+}
+
+/// Components side by side to quaternions.
+#[inline(always)]
+fn store(stored: &mut [[f32; 4]; LANES], [x, y, z, w]: &[Lane32; 4], count: usize) {
+    for lane in 0..count {
+        stored[lane] = [x[lane], y[lane], z[lane], w[lane]];
+    }
+}

@@ -1,0 +1,188 @@
+//! Curves to segments: they wait in lanes until a block of them is full, and become
+//! spans in order of time once all of them are fitted.
+
+use bytemuck::Zeroable;
+
+use super::cut::{Cutter, Part as CurvePart};
+use super::fit::{FitBlock, Tier, tier};
+use super::intervals::Intervals;
+use super::{NONE, Prepared, Source};
+use crate::cpu::in_lanes;
+use crate::method::Basis;
+use crate::segment::{PolynomialSegment, Segments};
+
+/// Fits curves; what it needs for that is kept.
+pub(super) struct Fitting {
+    basis: &'static Basis,
+    gentle: Queue,
+    full: Queue,
+    cutter: Cutter,
+    intervals: Vec<Fitted>,
+}
+
+/// Where an interval is, and what it becomes.
+pub(super) struct Place {
+    /// Its part of the prepared tracks.
+    pub(super) part: usize,
+    /// Seconds.
+    pub(super) start: f64,
+    pub(super) end: f64,
+    /// The constant to store at exactly the start, or [`NONE`].
+    pub(super) key: u32,
+}
+
+struct Fitted {
+    place: Place,
+    source: CurveSource,
+}
+
+#[derive(Clone, Copy)]
+enum CurveSource {
+    Constant(u32),
+    Segment(u32),
+    /// Parts, the first of which may have that place among the segments.
+    Parts(Option<u32>),
+}
+
+/// Curves that wait for a block to fill, and which intervals they are of.
+struct Queue {
+    block: FitBlock,
+    intervals: Vec<usize>,
+}
+
+impl Queue {
+    fn new(basis: &'static Basis, tier: Tier) -> Self {
+        Self {
+            block: FitBlock::new(basis, tier),
+            intervals: Vec::new(),
+        }
+    }
+}
+
+impl Fitting {
+    pub(super) fn new(basis: &'static Basis) -> Self {
+        Self {
+            basis,
+            gentle: Queue::new(basis, Tier::Gentle),
+            full: Queue::new(basis, Tier::Full),
+            cutter: Cutter::new(basis),
+            intervals: Vec::new(),
+        }
+    }
+
+    /// Adds an interval that stands still.
+    pub(super) fn push_constant(&mut self, place: Place, constant: u32) {
+        let source = CurveSource::Constant(constant);
+        self.intervals.push(Fitted { place, source });
+    }
+
+    /// Adds an interval with the curve in a lane of `curves`.
+    pub(super) fn push(
+        &mut self,
+        prepared: &mut Prepared,
+        place: Place,
+        curves: &Intervals,
+        lane: usize,
+    ) {
+        let interval = self.intervals.len();
+        let Some(tier) = tier(curves.energies[lane]) else {
+            self.cutter.push(interval, curves.cubic(lane, self.basis));
+            let source = CurveSource::Parts(None);
+            self.intervals.push(Fitted { place, source });
+            return;
+        };
+        let segments = polynomials(prepared);
+        let source = CurveSource::Segment(segments.len() as u32);
+        segments.push(PolynomialSegment::zeroed());
+        self.intervals.push(Fitted { place, source });
+        let queue = match tier {
+            Tier::Gentle => &mut self.gentle,
+            Tier::Full => &mut self.full,
+        };
+        queue.intervals.push(interval);
+        queue.block.push_from(curves, lane);
+        if queue.block.is_full() {
+            self.run(tier, prepared);
+        }
+    }
+
+    /// Fits the curves of a queue.
+    fn run(&mut self, tier: Tier, prepared: &mut Prepared) {
+        let queue = match tier {
+            Tier::Gentle => &mut self.gentle,
+            Tier::Full => &mut self.full,
+        };
+        in_lanes(&mut queue.block);
+        let segments = polynomials(prepared);
+        for (lane, interval) in queue.intervals.drain(..).enumerate() {
+            let source = &mut self.intervals[interval].source;
+            let CurveSource::Segment(segment) = *source else {
+                continue;
+            };
+            if tier == Tier::Gentle || queue.block.fits(lane) {
+                queue.block.write(lane, &mut segments[segment as usize]);
+            } else {
+                *source = CurveSource::Parts(Some(segment));
+                self.cutter.push(interval, queue.block.cubic(lane));
+            }
+        }
+        queue.block.clear();
+    }
+
+    /// Fits what still waits, and appends the spans of all intervals given.
+    pub(super) fn finish(&mut self, prepared: &mut Prepared) {
+        self.run(Tier::Gentle, prepared);
+        self.run(Tier::Full, prepared);
+        let mut parts = self.cutter.cut();
+        for (interval, Fitted { place, source }) in self.intervals.drain(..).enumerate() {
+            let first_span = prepared.spans.len();
+            let Place { start, key, .. } = place;
+            match source {
+                CurveSource::Constant(constant) => {
+                    prepared.push_span(start, 0.0, Source::Constant(constant), NONE);
+                }
+                CurveSource::Segment(segment) => {
+                    prepared.push_span(start, 1.0, Source::Segment(segment), key);
+                }
+                CurveSource::Parts(mut spare) => {
+                    let is_own = |part: &&CurvePart| part.interval == interval;
+                    let own = parts.iter().take_while(is_own).count();
+                    for part in parts.split_off(..own).unwrap_or_default() {
+                        let (from, _) = part.cubic.piece.extent();
+                        let start = start + (place.end - start) * from;
+                        let key = if from == 0.0 { key } else { NONE };
+                        let source = prepared.part_source(part, &mut spare);
+                        prepared.push_span(start, 1.0, source, key);
+                    }
+                }
+            }
+            let spans = &mut prepared.parts[place.part].spans;
+            let is_first = spans.start == spans.end;
+            let start = if is_first { first_span } else { spans.start };
+            *spans = start..prepared.spans.len();
+        }
+    }
+}
+
+impl Prepared {
+    fn part_source(&mut self, part: &CurvePart, spare: &mut Option<u32>) -> Source {
+        let Some(segment) = part.segment else {
+            self.exact.push(part.cubic);
+            return Source::Exact(self.exact.len() as u32 - 1);
+        };
+        let segments = polynomials(self);
+        let place = spare.take().unwrap_or_else(|| {
+            segments.push(segment);
+            segments.len() as u32 - 1
+        });
+        segments[place as usize] = segment;
+        Source::Segment(place)
+    }
+}
+
+fn polynomials(prepared: &mut Prepared) -> &mut Vec<PolynomialSegment> {
+    match &mut prepared.segments {
+        Segments::Polynomial(segments) => segments,
+        Segments::Arc(_) => unreachable!("the method's form"),
+    }
+}
