@@ -7,6 +7,7 @@ use crate::engine::{Backend, Engine, Error};
 use crate::gpu::ClipBuffers;
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Rotations, Storage};
+use crate::window::Window;
 
 /// A set prepared for one method, on its engine's device; evaluate it as often as
 /// needed, at any frames.
@@ -91,11 +92,22 @@ impl Clip {
                 needed,
             });
         }
+        let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
+        self.evaluate_window_into(timeline, &whole, output)
+    }
+
+    /// Evaluates a window of the result, which `output` fits.
+    pub(crate) fn evaluate_window_into(
+        &self,
+        timeline: &Timeline,
+        window: &Window,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
         match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, layout, output)?),
+            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
             (Backend::Vulkan(opened), Some(buffers)) => Ok(opened
                 .engine
-                .evaluate_into(&self.data, buffers, timeline, layout, output)?),
+                .evaluate_into(&self.data, buffers, timeline, window, output)?),
             (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::clock::{Frames, FramesError};
+use crate::clock::{Frames, FramesError, Timeline};
 use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth};
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
@@ -285,21 +285,32 @@ impl Engine {
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), Error> {
-        let interpolation = interpolation.into();
-        let pieces = self.pieces(set, &interpolation);
-        let (tracks, span) = (set.track_count(), set.time_span());
-        let timeline = frames.resolve(tracks, span)?;
-        let samples = timeline.len();
-        let (given, needed) = (output.len(), tracks * samples);
-        if given != needed {
+        let timeline = frames.resolve(set.track_count(), set.time_span())?;
+        let needed = set.track_count() * timeline.len();
+        if output.len() != needed {
+            let given = output.len();
             return Err(Error::OutputLength { given, needed });
         }
+        self.evaluate_timeline_into(set, interpolation.into(), &timeline, layout, output)
+    }
+
+    /// The samples of a timeline of the set's own; `output` fits them.
+    pub(crate) fn evaluate_timeline_into(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let (tracks, samples) = (set.track_count(), timeline.len());
         if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
-            return engine.evaluate_set(set, &interpolation, &timeline, output);
+            return engine.evaluate_set(set, 0..tracks, &interpolation, timeline, output);
         }
+        let pieces = self.pieces(set, &interpolation);
         if let [_] = &*pieces {
             let clip = self.upload(set, interpolation)?;
-            return clip.evaluate_timeline_into(&timeline, layout, output);
+            return clip.evaluate_timeline_into(timeline, layout, output);
         }
         for piece in pieces {
             let clip = self.upload(&set.select(piece.clone()), interpolation)?;
@@ -324,13 +335,17 @@ impl Engine {
 
     /// Whether preparing and evaluating go hand in hand, track by track: on the CPU,
     /// unless a few long tracks must be shared among the threads.
-    fn is_fused(&self, set: &TrackSet, layout: Layout) -> bool {
+    pub(crate) fn is_fused(&self, set: &TrackSet, layout: Layout) -> bool {
         let short = set.key_count() <= LONG_TRACK * set.track_count();
         matches!(*self.backend, Backend::Cpu(_)) && layout == Layout::TrackMajor && short
     }
 
     /// Ranges of tracks whose segments fit the device's budget.
-    fn pieces(&self, set: &TrackSet, interpolation: &Interpolation) -> Vec<Range<usize>> {
+    pub(crate) fn pieces(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+    ) -> Vec<Range<usize>> {
         let budget = match &*self.backend {
             Backend::Vulkan(opened) => opened.engine.clip_bytes(),
             Backend::Cpu(_) => None,

@@ -62,8 +62,10 @@ mod rotations;
 mod schedule;
 mod segment;
 pub mod spirv;
+mod stream;
 mod tracks;
 pub mod verify;
+mod window;
 
 pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
@@ -74,6 +76,7 @@ pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanError, VulkanHandles};
 pub use method::{Ends, Form, Interpolation, InterpolationError, METHODS, Method, Path};
 pub use rotations::{Layout, Rotations};
+pub use stream::Chunk;
 pub use tracks::{NORM_TOLERANCE, Track, TrackError, TrackSet};
 
 /// The README's example is compiled and run as a test.

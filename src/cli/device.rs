@@ -6,12 +6,15 @@ use std::str::FromStr;
 use ash::vk;
 use clap::Args;
 use tumble::{
-    Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, Rotations, TrackSet,
-    VulkanError,
+    Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, TrackSet, VulkanError,
 };
 
 use super::exit::{DEVICE, Failure, NO_VULKAN};
+use super::output::{Ended, Sink};
 use super::words;
+
+/// Rotations evaluated at once: 16 MB.
+const CHUNK: usize = 1 << 20;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviceArguments {
@@ -129,21 +132,42 @@ impl Opened {
         self.engine.device_info().is_some()
     }
 
-    /// Evaluates. A device that nobody named may fail: the CPU gives the same bits.
-    pub(crate) fn evaluate(
+    /// Evaluates into `sink`, chunk by chunk. A device that nobody named may fail: the
+    /// CPU gives the same bits, and goes on where it stopped.
+    pub(crate) fn stream(
         &mut self,
         set: &TrackSet,
         interpolation: Interpolation,
         frames: &Frames,
         layout: Layout,
-    ) -> Result<Rotations, Error> {
-        match self.engine.evaluate_as(set, interpolation, frames, layout) {
-            Err(Error::Vulkan(error)) if self.automatic => {
+        sink: &mut Sink<'_>,
+    ) -> Result<(), Ended> {
+        let row = match layout {
+            Layout::TrackMajor => 1,
+            Layout::FrameMajor => set.track_count(),
+        };
+        let chunk = CHUNK.max(row);
+        let mut done = 0;
+        let result = self
+            .engine
+            .stream(set, interpolation, frames, layout, chunk, |chunk| {
+                done = chunk.start + chunk.rotations.len();
+                sink(chunk)
+            });
+        match result {
+            Err(Ended::Evaluating(Error::Vulkan(error))) if self.automatic => {
                 words::warning(&format!("{}: {error}; going on with the CPU", self.label));
                 self.engine = Engine::new(Device::Cpu)?;
                 self.label = format!("CPU ({} failed)", self.label);
                 self.automatic = false;
-                self.engine.evaluate_as(set, interpolation, frames, layout)
+                self.engine
+                    .stream(set, interpolation, frames, layout, chunk, |chunk| {
+                        if chunk.start < done {
+                            Ok(())
+                        } else {
+                            sink(chunk)
+                        }
+                    })
             }
             result => result,
         }

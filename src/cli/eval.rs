@@ -11,10 +11,9 @@ use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
 use super::input::Inputs;
 use super::interpolation::{Manner, method};
-use super::output::{Format, Target};
-use super::progress::busy;
+use super::output::{Format, ResultShape, Target};
 use super::time::{Samples, Sampling};
-use super::{input, output, room, signals, words};
+use super::{input, output, signals, words};
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -121,28 +120,34 @@ impl Arguments {
         let name = input::name(path);
         let set = self.inputs.load(path)?;
         let frames = samples.of(&set, &name);
-        let timeline = room::in_memory(&name, &set, &frames, 1)?;
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
         target.has_room(&name, set.track_count(), timeline.len())?;
         let layout = match (self.layout, target.format()) {
             (LayoutArgument::Track, Format::Npy) => Layout::TrackMajor,
             // A row of CSV holds one frame.
             (LayoutArgument::Frame, _) | (_, Format::Csv | Format::Dat) => Layout::FrameMajor,
         };
+        let result = ResultShape {
+            name: &name,
+            set: &set,
+            timeline: &timeline,
+            layout,
+            order: self.order.into(),
+        };
         let started = Instant::now();
         let interpolation = self.manner.with(self.method);
-        let rotations = busy(&format!("evaluating {name}"), || {
-            device.evaluate(&set, interpolation, &frames, layout)
-        })
-        .map_err(|error| Failure::evaluating(&name, &error))?;
-        let elapsed = started.elapsed();
-        target.write_rotations(&set, &timeline, &rotations, self.order.into())?;
+        target.write_rotations(&result, |sink| {
+            device.stream(&set, interpolation, &frames, layout, sink)
+        })?;
         words::note(&format!(
             "{name}: {} × {}, {}, on {} in {} → {target}",
             words::count(set.track_count(), "track"),
             words::count(timeline.len(), "frame"),
             self.method,
             device.label,
-            words::duration(elapsed),
+            words::duration(started.elapsed()),
         ));
         Ok(())
     }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use glam::Quat;
-use tumble::formats::csv::write_csv;
+use tumble::formats::csv::CsvWriter;
 use tumble::formats::npy::{ComponentOrder, NpyWriter};
 use tumble::formats::output::{Output, check_target};
-use tumble::{Layout, Rotations, Timeline, TrackSet};
+use tumble::{Chunk, Error, Layout, Timeline, TrackSet};
 
 use super::exit::{BROKEN_PIPE, Failure, OUTPUT};
 use super::progress::Progress;
@@ -30,8 +30,8 @@ pub(crate) enum Format {
     Dat,
 }
 
-/// Rotations handed to a writer at once: 4 MB, so that a signal is noticed soon.
-const CHUNK: usize = 1 << 18;
+/// Rotations handed to a writer at once: 4 MB.
+const PIECE: usize = 1 << 18;
 
 /// Where one result goes.
 #[derive(Debug)]
@@ -258,36 +258,132 @@ impl Target {
         }
     }
 
-    /// Writes one result.
+    /// Writes one result, chunk by chunk, while `evaluate` makes the next.
     pub(crate) fn write_rotations(
         &self,
-        set: &TrackSet,
-        timeline: &Timeline,
-        rotations: &Rotations,
-        order: ComponentOrder,
+        result: &ResultShape<'_>,
+        evaluate: impl FnOnce(&mut Sink<'_>) -> Result<(), Ended>,
     ) -> Result<(), Failure> {
-        let (tracks, samples) = (rotations.tracks(), rotations.samples());
-        if self.format == Format::Csv {
-            let lines: fn(&[u8]) -> u64 =
-                |bytes| bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-            let progress = Progress::new("writing", samples as u64 + 1);
-            return self.write(Some((progress, lines)), |out| {
-                write_csv(out, set, timeline, rotations)
-            });
-        }
-        let (rows, columns) = match rotations.layout() {
-            Layout::TrackMajor => (tracks, samples),
-            Layout::FrameMajor => (samples, tracks),
-        };
-        let bytes: fn(&[u8]) -> u64 = |bytes| bytes.len() as u64;
-        let progress = Progress::new("writing", (rows * columns * size_of::<Quat>()) as u64);
-        self.write(Some((progress, bytes)), |out| {
-            let mut npy = NpyWriter::new(out, rows, columns, order)?;
-            for chunk in rotations.as_quats().chunks(CHUNK) {
-                npy.write(chunk)?;
+        let (tracks, samples) = (result.set.track_count(), result.timeline.len());
+        let (progress, measure): (_, fn(&[u8]) -> u64) = match self.format {
+            Format::Csv => (Progress::new("writing", samples as u64 + 1), lines),
+            Format::Npy | Format::Dat => {
+                let total = (tracks * samples * size_of::<Quat>()) as u64;
+                (Progress::new("writing", total), length)
             }
-            npy.finish().map(drop)
-        })
+        };
+        let mut unevaluated = None;
+        let written = self.write(Some((progress, measure)), |out| {
+            let mut writer = ResultWriter::Waiting(out);
+            let evaluated = evaluate(&mut |chunk| {
+                let taken = writer.write(self.format, result, chunk.rotations);
+                taken.map_err(Ended::Writing)
+            });
+            match evaluated {
+                Ok(()) => writer.finish(self.format, result),
+                Err(Ended::Writing(error)) => Err(error),
+                Err(Ended::Evaluating(error)) => {
+                    unevaluated = Some(error);
+                    Err(io::Error::other("the rest could not be evaluated"))
+                }
+            }
+        });
+        match unevaluated {
+            Some(error) if signals::stopped().is_none() => {
+                Err(Failure::evaluating(result.name, &error))
+            }
+            _ => written,
+        }
+    }
+}
+
+fn lines(bytes: &[u8]) -> u64 {
+    bytes.iter().filter(|&&byte| byte == b'\n').count() as u64
+}
+
+fn length(bytes: &[u8]) -> u64 {
+    bytes.len() as u64
+}
+
+/// What is written: a set's rotations at the samples of a timeline.
+pub(crate) struct ResultShape<'a> {
+    /// The input's, for messages.
+    pub(crate) name: &'a str,
+    pub(crate) set: &'a TrackSet,
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) layout: Layout,
+    pub(crate) order: ComponentOrder,
+}
+
+/// What takes the chunks of a result.
+pub(crate) type Sink<'a> = dyn FnMut(Chunk<'_>) -> Result<(), Ended> + 'a;
+
+/// Why a result did not become whole.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    Writing(io::Error),
+    Evaluating(Error),
+}
+
+impl From<Error> for Ended {
+    fn from(error: Error) -> Self {
+        Self::Evaluating(error)
+    }
+}
+
+/// A writer of one format. Nothing is written before there is a first chunk: what
+/// cannot be evaluated leaves nothing behind, in a pipe neither.
+enum ResultWriter<'a, 'o> {
+    Waiting(&'o mut Stream),
+    Npy(NpyWriter<&'o mut Stream>),
+    Csv(CsvWriter<'a, &'o mut Stream>),
+    Failed,
+}
+
+impl<'a> ResultWriter<'a, '_> {
+    /// Writes the header if that is yet to be done.
+    fn start(&mut self, format: Format, result: &ResultShape<'a>) -> io::Result<()> {
+        let (tracks, samples) = (result.set.track_count(), result.timeline.len());
+        *self = match std::mem::replace(self, Self::Failed) {
+            Self::Waiting(out) if format == Format::Csv => {
+                Self::Csv(CsvWriter::new(out, result.set, result.timeline)?)
+            }
+            Self::Waiting(out) => {
+                let (rows, columns) = match result.layout {
+                    Layout::TrackMajor => (tracks, samples),
+                    Layout::FrameMajor => (samples, tracks),
+                };
+                Self::Npy(NpyWriter::new(out, rows, columns, result.order)?)
+            }
+            started => started,
+        };
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        format: Format,
+        result: &ResultShape<'a>,
+        rotations: &[Quat],
+    ) -> io::Result<()> {
+        self.start(format, result)?;
+        match self {
+            Self::Csv(writer) => writer.write(rotations),
+            // In pieces, so that a signal is noticed soon.
+            Self::Npy(writer) => rotations
+                .chunks(PIECE)
+                .try_for_each(|piece| writer.write(piece)),
+            Self::Waiting(_) | Self::Failed => Err(io::Error::other("an earlier error")),
+        }
+    }
+
+    fn finish(mut self, format: Format, result: &ResultShape<'a>) -> io::Result<()> {
+        self.start(format, result)?;
+        match self {
+            Self::Csv(writer) => writer.finish(),
+            Self::Npy(writer) => writer.finish().map(drop),
+            Self::Waiting(_) | Self::Failed => Err(io::Error::other("an earlier error")),
+        }
     }
 }
 

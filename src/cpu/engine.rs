@@ -13,6 +13,7 @@ use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
 use crate::rotations::Layout;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
+use crate::window::Window;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
 /// share a short result among all threads.
@@ -42,12 +43,12 @@ impl CpuEngine {
         })
     }
 
-    /// Fills `output` with every track of the clip at every sample.
+    /// Fills `output` with a window of the clip's result.
     pub(crate) fn evaluate(
         &self,
         clip: &ClipData,
         timeline: &Timeline,
-        layout: Layout,
+        window: &Window,
         output: &mut [Quat],
     ) -> Result<(), FramesError> {
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
@@ -56,13 +57,20 @@ impl CpuEngine {
         }
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
-            return self.on_this_thread(clip, timeline, layout, output);
+            return self.window(clip, timeline, window, output);
         }
-        let work = || match layout {
-            Layout::TrackMajor => self.track_major(clip, timeline, output),
-            Layout::FrameMajor => self.frame_major(clip, timeline, output),
-        };
-        self.on_threads(work)
+        self.on_threads(|| {
+            let mut tasks = Vec::new();
+            let mut rest = output;
+            for window in window.cut(TASK) {
+                let (own, others) = rest.split_at_mut(window.len());
+                tasks.push((window, own));
+                rest = others;
+            }
+            tasks
+                .into_par_iter()
+                .try_for_each(|(window, own)| self.window(clip, timeline, &window, own))
+        })
     }
 
     /// Runs `work` with the engine's own threads, where it has any.
@@ -73,88 +81,33 @@ impl CpuEngine {
         }
     }
 
-    fn on_this_thread(
+    /// A window, on this thread.
+    fn window(
         &self,
         clip: &ClipData,
         timeline: &Timeline,
-        layout: Layout,
+        window: &Window,
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
-        match layout {
-            Layout::TrackMajor => self.rows(clip, timeline, 0, output),
-            Layout::FrameMajor => self.frames(clip, timeline, 0, output),
-        }
-    }
-
-    fn track_major(
-        &self,
-        clip: &ClipData,
-        timeline: &Timeline,
-        output: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
-        let samples = timeline.len();
-        if samples > TASK {
-            return output
-                .par_chunks_mut(samples)
-                .enumerate()
-                .try_for_each(|(track, row)| {
-                    let pieces = row.par_chunks_mut(TASK).enumerate();
-                    pieces
-                        .into_par_iter()
-                        .try_for_each(|(i, piece)| self.row(clip, track, timeline, i * TASK, piece))
-                });
-        }
-        let tracks_each = TASK / samples;
-        output
-            .par_chunks_mut(samples * tracks_each)
-            .enumerate()
-            .try_for_each(|(task, rows)| self.rows(clip, timeline, task * tracks_each, rows))
-    }
-
-    /// Whole tracks from `first` on, `[track][frame]`.
-    fn rows(
-        &self,
-        clip: &ClipData,
-        timeline: &Timeline,
-        first: usize,
-        rows: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
-        rows.chunks_mut(timeline.len())
-            .zip(first..)
-            .try_for_each(|(row, track)| self.row(clip, track, timeline, 0, row))
-    }
-
-    fn frame_major(
-        &self,
-        clip: &ClipData,
-        timeline: &Timeline,
-        output: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
-        let tracks = clip.track_count();
-        let frames_each = (TASK / tracks).max(1);
-        output
-            .par_chunks_mut(tracks * frames_each)
-            .enumerate()
-            .try_for_each(|(task, frames)| self.frames(clip, timeline, task * frames_each, frames))
-    }
-
-    /// Whole frames from `first` on, `[frame][track]`.
-    fn frames(
-        &self,
-        clip: &ClipData,
-        timeline: &Timeline,
-        first: usize,
-        frames: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
-        let tracks = clip.track_count();
-        let mut row = vec![[0.0; 4]; frames.len() / tracks];
-        for track in 0..tracks {
-            self.row(clip, track, timeline, first, &mut row)?;
-            for (frame, &rotation) in frames.chunks_mut(tracks).zip(&row) {
-                frame[track] = rotation;
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        match window.layout {
+            Layout::TrackMajor => output
+                .chunks_mut(samples)
+                .zip(window.tracks.clone())
+                .try_for_each(|(row, track)| {
+                    self.row(clip, track, timeline, window.samples.start, row)
+                }),
+            Layout::FrameMajor => {
+                let mut row = vec![[0.0; 4]; samples];
+                for (place, track) in window.tracks.clone().enumerate() {
+                    self.row(clip, track, timeline, window.samples.start, &mut row)?;
+                    for (frame, &rotation) in output.chunks_mut(tracks).zip(&row) {
+                        frame[place] = rotation;
+                    }
+                }
+                Ok(())
             }
         }
-        Ok(())
     }
 
     /// The samples of one track from `first` on.
@@ -191,12 +144,12 @@ impl CpuEngine {
         }
     }
 
-    /// Prepares and evaluates in one go, `[track][frame]`: the segments of some tracks
-    /// are used while they are still in the cache, and never kept. For sets of many
-    /// tracks.
+    /// Prepares and evaluates some tracks in one go, `[track][frame]`: the segments of
+    /// a few of them are used while they are still in the cache, and never kept.
     pub(crate) fn evaluate_set(
         &self,
         set: &TrackSet,
+        tracks: Range<usize>,
         interpolation: &Interpolation,
         timeline: &Timeline,
         output: &mut [Quat],
@@ -230,18 +183,18 @@ impl CpuEngine {
                 }
                 Ok(())
             };
-        if output.len() <= TASK && set.key_count() <= TASK_KEYS {
-            return task(&mut new(), 0, output);
+        if output.len() <= TASK && keys_each * tracks.len() <= TASK_KEYS {
+            return task(&mut new(), tracks.start, output);
         }
         let work = || {
             // Several turns for each task, whose memory serves them all.
             let tasks = 8 * rayon::current_num_threads();
-            let turns = set.track_count().div_ceil(tracks_each).div_ceil(tasks);
-            let tracks = turns * tracks_each;
+            let turns = tracks.len().div_ceil(tracks_each).div_ceil(tasks);
+            let each = turns * tracks_each;
             output
-                .par_chunks_mut(samples * tracks)
+                .par_chunks_mut(samples * each)
                 .enumerate()
-                .try_for_each(|(i, rows)| task(&mut new(), i * tracks, rows))
+                .try_for_each(|(i, rows)| task(&mut new(), tracks.start + i * each, rows))
         };
         self.on_threads(work)
     }

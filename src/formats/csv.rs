@@ -3,58 +3,97 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use glam::Quat;
+
 use crate::clock::Timeline;
-use crate::rotations::Rotations;
 use crate::tracks::TrackSet;
 
-/// Writes rotations with as many digits as it takes to read the same bits again;
-/// times are seconds. `set` and `timeline` are those that `rotations` came from.
-///
-/// # Errors
-/// When writing fails.
-pub fn write_csv(
-    writer: impl Write,
-    set: &TrackSet,
-    timeline: &Timeline,
-    rotations: &Rotations,
-) -> io::Result<()> {
-    let csv = ::csv::Writer::from_writer(writer);
-    write_rows(csv, set, timeline, rotations).map_err(|error| match error.into_kind() {
-        // The conversion that the crate offers loses the kind, a broken pipe's too.
-        ::csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
-    })
+/// Writes frames as they come, with as many digits as it takes to read the same bits
+/// again; times are seconds.
+pub struct CsvWriter<'a, W: Write> {
+    csv: ::csv::Writer<W>,
+    timeline: &'a Timeline,
+    tracks: usize,
+    /// The next frame to be written.
+    frame: usize,
+    /// Memory for a number.
+    text: String,
 }
 
-fn write_rows(
-    mut csv: ::csv::Writer<impl Write>,
-    set: &TrackSet,
-    timeline: &Timeline,
-    rotations: &Rotations,
-) -> ::csv::Result<()> {
-    csv.write_field("frame")?;
-    csv.write_field("time")?;
-    for track in 0..set.track_count() {
-        let name = set.track_name(track);
-        for component in ["w", "x", "y", "z"] {
-            csv.write_field(format!("{name}.{component}"))?;
-        }
+impl<'a, W: Write> CsvWriter<'a, W> {
+    /// Writes the header for a set's rotations at the samples of a timeline.
+    ///
+    /// # Errors
+    /// When writing fails.
+    pub fn new(writer: W, set: &TrackSet, timeline: &'a Timeline) -> io::Result<Self> {
+        let mut writer = Self {
+            csv: ::csv::Writer::from_writer(writer),
+            timeline,
+            tracks: set.track_count(),
+            frame: 0,
+            text: String::new(),
+        };
+        writer.header(set).map_err(io_error)?;
+        Ok(writer)
     }
-    csv.write_record(None::<&[u8]>)?;
-    let mut text = String::new();
-    for frame in 0..rotations.samples() {
-        csv.write_field(frame.to_string())?;
-        let time = timeline.time(0, frame);
-        csv.write_field(time.to_string())?;
-        for track in 0..rotations.tracks() {
-            let q = rotations.get(track, frame).unwrap_or_default();
-            for component in [q.w, q.x, q.y, q.z] {
-                text.clear();
-                let _ = write!(text, "{component}"); // a String takes everything
-                csv.write_field(&text)?;
+
+    /// Writes the next frames, `[frame][track]`.
+    ///
+    /// # Errors
+    /// When writing fails, or (`InvalidInput`) the last frame is not whole or there
+    /// are more than the timeline has.
+    pub fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        let frames = rotations.chunks_exact(self.tracks.max(1));
+        if !frames.remainder().is_empty() || self.frame + frames.len() > self.timeline.len() {
+            let message = "not whole frames, or more than there are";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        }
+        for frame in frames {
+            self.row(frame).map_err(io_error)?;
+        }
+        Ok(())
+    }
+
+    /// Flushes what was written.
+    ///
+    /// # Errors
+    /// When that fails.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.csv.flush()
+    }
+
+    fn header(&mut self, set: &TrackSet) -> ::csv::Result<()> {
+        self.csv.write_field("frame")?;
+        self.csv.write_field("time")?;
+        for track in 0..set.track_count() {
+            let name = set.track_name(track);
+            for component in ["w", "x", "y", "z"] {
+                self.csv.write_field(format!("{name}.{component}"))?;
             }
         }
-        csv.write_record(None::<&[u8]>)?;
+        self.csv.write_record(None::<&[u8]>)
     }
-    Ok(csv.flush()?)
+
+    fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
+        self.csv.write_field(self.frame.to_string())?;
+        let time = self.timeline.time(0, self.frame);
+        self.csv.write_field(time.to_string())?;
+        for q in frame {
+            for component in [q.w, q.x, q.y, q.z] {
+                self.text.clear();
+                let _ = write!(self.text, "{component}"); // a String takes everything
+                self.csv.write_field(&self.text)?;
+            }
+        }
+        self.frame += 1;
+        self.csv.write_record(None::<&[u8]>)
+    }
+}
+
+/// The conversion that the crate offers loses the kind, a broken pipe's too.
+fn io_error(error: ::csv::Error) -> io::Error {
+    match error.into_kind() {
+        ::csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
 }

@@ -23,6 +23,7 @@ use crate::rotations::Layout;
 use crate::segment::shader::WORKGROUP;
 use crate::segment::{Launch, Probe, Reply};
 use crate::tracks::TrackSet;
+use crate::window::Window;
 
 /// How a device did on one canary.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -58,19 +59,18 @@ pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
             let timeline = frames
                 .resolve(clip.track_count(), clip.time_span())
                 .expect("a few frames");
-            let count = clip.track_count() * timeline.len();
-            let mut expected = vec![Quat::IDENTITY; count];
+            let whole = Window::whole(clip.track_count(), timeline.len(), Layout::TrackMajor);
+            let mut expected = vec![Quat::IDENTITY; whole.len()];
             let mut found = expected.clone();
-            let layout = Layout::TrackMajor;
-            cpu.evaluate(&clip, &timeline, layout, &mut expected)
+            cpu.evaluate(&clip, &timeline, &whole, &mut expected)
                 .expect("short gaps");
             engine
-                .evaluate_into(&clip, &buffers, &timeline, layout, &mut found)
+                .evaluate_into(&clip, &buffers, &timeline, &whole, &mut found)
                 .map_err(|error| match error {
                     super::EvaluateError::Vulkan(error) => error,
                     super::EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),
                 })?;
-            report.total += count;
+            report.total += whole.len();
             report.differing += differing(&expected, &found);
         }
         reports.push(report);

@@ -13,7 +13,7 @@ use super::physical::{DeviceKind, PhysicalDevice};
 use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding, Submission};
-use super::window::{Window, windows, work};
+use super::work_list::work;
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::device::{EngineOptions, Timings, Transfer};
 use crate::method::Form;
@@ -21,6 +21,7 @@ use crate::prepare::ClipData;
 use crate::rotations::{Layout, Storage};
 use crate::segment::shader::WORKGROUP;
 use crate::segment::{Item, Launch};
+use crate::window::Window;
 
 const ROTATION: u64 = size_of::<[f32; 4]>() as u64;
 
@@ -219,25 +220,27 @@ impl VulkanEngine {
         let bytes = count as u64 * ROTATION;
         if !self.in_place || bytes > self.device.physical.info.max_memory_allocation_size {
             let mut quats: Vec<Quat> = bytemuck::zeroed_vec(count);
-            self.evaluate_into(clip, buffers, timeline, layout, &mut quats)?;
+            let whole = Window::whole(clip.track_count(), timeline.len(), layout);
+            self.evaluate_into(clip, buffers, timeline, &whole, &mut quats)?;
             return Ok(Box::new(quats));
         }
         let mut buffer = self.output_buffer(bytes)?;
-        self.run(clip, buffers, timeline, layout, Target::Buffer(&mut buffer))?;
+        let whole = Window::whole(clip.track_count(), timeline.len(), layout);
+        self.run(clip, buffers, timeline, &whole, Target::Buffer(&mut buffer))?;
         Ok(Box::new(MappedQuats::new(buffer, count, &self.free)))
     }
 
-    /// Evaluates into the caller's memory.
+    /// Evaluates a window into the caller's memory.
     pub(crate) fn evaluate_into(
         &self,
         clip: &ClipData,
         buffers: &ClipBuffers,
         timeline: &Timeline,
-        layout: Layout,
+        window: &Window,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
         let output = Target::Slice(bytemuck::cast_slice_mut(output));
-        self.run(clip, buffers, timeline, layout, output)
+        self.run(clip, buffers, timeline, window, output)
     }
 
     /// A buffer that was given back, when one fits closely, else a new one.
@@ -256,11 +259,11 @@ impl VulkanEngine {
         clip: &ClipData,
         buffers: &ClipBuffers,
         timeline: &Timeline,
-        layout: Layout,
+        window: &Window,
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let windows = windows(clip.track_count(), timeline.len(), layout, self.window);
+        let windows = window.cut(self.window);
         while slots.len() < SLOTS.min(windows.len()) {
             slots.push(Slot::new(&self.device)?);
         }

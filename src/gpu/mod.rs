@@ -14,7 +14,7 @@ mod physical;
 mod pipeline;
 mod slot;
 mod submission;
-mod window;
+mod work_list;
 
 pub use canary::CanaryReport;
 pub(crate) use engine::{ClipBuffers, EvaluateError, VulkanEngine};

@@ -9,9 +9,10 @@ use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
 use super::submission::{Spent, Submission};
-use super::window::{GroupWork, Window};
+use super::work_list::GroupWork;
 use crate::device::Timings;
 use crate::segment::Item;
+use crate::window::Window;
 
 /// What one window needs; the submission comes first, so that it is waited for
 /// before its buffers go.

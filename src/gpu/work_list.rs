@@ -1,6 +1,4 @@
-//! The output cut into windows, and the work list of one window.
-
-use std::ops::Range;
+//! The work list of one window of the output.
 
 use rayon::prelude::*;
 
@@ -8,75 +6,10 @@ use crate::clock::{FramesError, Timeline};
 use crate::numeric::round_f32;
 use crate::prepare::ClipData;
 use crate::prepare::Prepared;
-use crate::rotations::Layout;
 use crate::schedule::{Distance, Run, RunSource};
 use crate::segment::Item;
 use crate::segment::shader::{HOLD, ITEM_SAMPLES};
-
-/// A contiguous stretch of the output: some samples of some tracks.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Window {
-    /// Where it starts in the output, in rotations.
-    pub(super) start: usize,
-    pub(super) tracks: Range<usize>,
-    pub(super) samples: Range<usize>,
-    layout: Layout,
-}
-
-impl Window {
-    /// Number of rotations.
-    pub(super) fn len(&self) -> usize {
-        self.tracks.len() * self.samples.len()
-    }
-
-    /// Distance in the output between neighbouring samples of a track.
-    pub(super) fn stride(&self) -> usize {
-        match self.layout {
-            Layout::TrackMajor => 1,
-            Layout::FrameMajor => self.tracks.len(),
-        }
-    }
-
-    /// Where a rotation lies in the window.
-    fn place(&self, track: usize, sample: usize) -> usize {
-        let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
-        self.layout
-            .index(track, sample, self.tracks.len(), self.samples.len())
-    }
-}
-
-/// Cuts `tracks × samples` rotations into windows of at most `limit`.
-pub(super) fn windows(tracks: usize, samples: usize, layout: Layout, limit: usize) -> Vec<Window> {
-    let (rows, columns) = match layout {
-        Layout::TrackMajor => (tracks, samples),
-        Layout::FrameMajor => (samples, tracks),
-    };
-    if rows == 0 || columns == 0 {
-        return Vec::new();
-    }
-    // Whole rows while they fit, pieces of one row where it does not.
-    let rows_each = (limit / columns).max(1);
-    let columns_each = if columns > limit { limit } else { columns };
-    let mut windows = Vec::new();
-    for first_row in (0..rows).step_by(rows_each) {
-        let row = first_row..(first_row + rows_each).min(rows);
-        for first_column in (0..columns).step_by(columns_each) {
-            let column = first_column..(first_column + columns_each).min(columns);
-            let start = first_row * columns + first_column;
-            let (tracks, samples) = match layout {
-                Layout::TrackMajor => (row.clone(), column),
-                Layout::FrameMajor => (column, row.clone()),
-            };
-            windows.push(Window {
-                start,
-                tracks,
-                samples,
-                layout,
-            });
-        }
-    }
-    windows
-}
+use crate::window::Window;
 
 /// What one group of a clip has to do in a window.
 pub(super) struct GroupWork {
@@ -194,34 +127,6 @@ impl WorkChunk {
                 scale,
                 offset,
             });
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn windows_cover_every_rotation_once_in_order() {
-        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-            for (tracks, samples) in [(0, 5), (1, 1), (3, 7), (7, 3), (1, 100), (100, 1)] {
-                for limit in [1, 2, 5, 64, 1000] {
-                    let mut next = 0;
-                    for window in windows(tracks, samples, layout, limit) {
-                        assert_eq!(window.start, next);
-                        assert!(window.len() <= limit);
-                        for track in window.tracks.clone() {
-                            for sample in window.samples.clone() {
-                                let place = window.start + window.place(track, sample);
-                                assert_eq!(place, layout.index(track, sample, tracks, samples));
-                            }
-                        }
-                        next += window.len();
-                    }
-                    assert_eq!(next, tracks * samples);
-                }
-            }
         }
     }
 }

@@ -1,0 +1,186 @@
+//! Results larger than memory: a chunk at a time, evaluated while the one before it
+//! is used.
+
+use std::ops::Range;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use glam::Quat;
+
+use crate::clip::Clip;
+use crate::clock::{Frames, Timeline};
+use crate::engine::{Backend, Engine, Error};
+use crate::method::Interpolation;
+use crate::rotations::Layout;
+use crate::tracks::TrackSet;
+use crate::window::Window;
+
+/// Some of a result: chunks come in the order in which the whole lies in memory, and
+/// leave nothing out.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Chunk<'a> {
+    /// Where it starts in the whole result, in rotations.
+    pub start: usize,
+    /// Its tracks.
+    pub tracks: Range<usize>,
+    /// Its samples.
+    pub samples: Range<usize>,
+    /// `[track][sample]` or `[sample][track]` of those, as the layout says.
+    pub rotations: &'a [Quat],
+}
+
+/// Buffers on their way round: one is filled, one is used, one waits.
+const BUFFERS: usize = 3;
+
+/// A filled buffer, and what is in it.
+type Filled = Result<(Window, Vec<Quat>), Error>;
+
+impl Clip {
+    /// Evaluates in chunks of about `chunk` rotations (at least one row of the layout
+    /// is best); `sink` uses one while others are evaluated. The rotations are those
+    /// of [`Clip::evaluate_as`]; memory is that of three chunks.
+    ///
+    /// ```
+    /// # use glam::Quat;
+    /// # use tumble::{Device, Engine, Error, Frames, Layout, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
+    /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+    /// let mut largest: f32 = 0.0;
+    /// clip.stream(&Frames::fps(60), Layout::FrameMajor, 1 << 20, |chunk| {
+    ///     largest = chunk.rotations.iter().map(|q| q.x).fold(largest, f32::max);
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// # assert_eq!(largest, (0.5f32).sin());
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The first error of `sink`; or when the frames do not fit the clip, or the
+    /// device fails.
+    pub fn stream<E: From<Error>>(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        chunk: usize,
+        sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let timeline = self.timeline(frames).map_err(Error::from)?;
+        let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let fill = |window: &Window, output: &mut [Quat]| {
+            self.evaluate_window_into(&timeline, window, output)
+        };
+        run(whole.cut(chunk), fill, sink)
+    }
+}
+
+impl Engine {
+    /// As [`Clip::stream`], from a set: with [`Layout::TrackMajor`] only the tracks of
+    /// a chunk are prepared at a time.
+    ///
+    /// # Errors
+    /// As [`Clip::stream`] and [`Engine::upload`].
+    pub fn stream<E: From<Error>>(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        layout: Layout,
+        chunk: usize,
+        sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let interpolation = interpolation.into();
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(Error::from)?;
+        if layout == Layout::FrameMajor || timeline.len() > chunk {
+            // A chunk has some samples of many tracks, or some of one track.
+            let clip = self.upload(set, interpolation)?;
+            return clip.stream(frames, layout, chunk, sink);
+        }
+        let whole = Window::whole(set.track_count(), timeline.len(), layout);
+        let fill = |window: &Window, output: &mut [Quat]| {
+            self.evaluate_tracks(set, window.tracks.clone(), interpolation, &timeline, output)
+        };
+        run(whole.cut(chunk), fill, sink)
+    }
+
+    /// Every sample of some tracks, `[track][frame]`.
+    fn evaluate_tracks(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let layout = Layout::TrackMajor;
+        if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
+            return engine.evaluate_set(set, tracks, &interpolation, timeline, output);
+        }
+        let own = set.select(tracks.clone());
+        let timeline = timeline.of_tracks(tracks);
+        self.evaluate_timeline_into(&own, interpolation, &timeline, layout, output)
+    }
+}
+
+/// Fills windows on a thread of their own; hands them to `sink` on this one.
+fn run<E: From<Error>>(
+    windows: Vec<Window>,
+    fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error> + Send,
+    mut sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    // One chunk has nothing to overlap with.
+    if let [window] = &*windows {
+        let mut rotations: Vec<Quat> = bytemuck::zeroed_vec(window.len());
+        fill(window, &mut rotations)?;
+        return sink(Chunk::new(window.clone(), &rotations));
+    }
+    thread::scope(|scope| {
+        let (give_back, empty) = sync_channel(BUFFERS);
+        let (hand_over, filled) = sync_channel(BUFFERS);
+        for _ in 0..BUFFERS {
+            let _ = give_back.send(Vec::new()); // it has room
+        }
+        scope.spawn(move || fill_all(windows, fill, &empty, &hand_over));
+        for result in filled {
+            let (window, rotations) = result?;
+            sink(Chunk::new(window, &rotations))?;
+            let _ = give_back.send(rotations); // nobody needs it after the last
+        }
+        Ok(())
+    })
+}
+
+/// Stops early when nobody takes what it hands over.
+fn fill_all(
+    windows: Vec<Window>,
+    fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error>,
+    empty: &Receiver<Vec<Quat>>,
+    hand_over: &SyncSender<Filled>,
+) {
+    for window in windows {
+        let Ok(mut rotations) = empty.recv() else {
+            return;
+        };
+        rotations.resize(window.len(), Quat::IDENTITY);
+        let result = fill(&window, &mut rotations);
+        let failed = result.is_err();
+        let taken = hand_over.send(result.map(|()| (window, rotations)));
+        if failed || taken.is_err() {
+            return;
+        }
+    }
+}
+
+impl<'a> Chunk<'a> {
+    fn new(window: Window, rotations: &'a [Quat]) -> Self {
+        Self {
+            start: window.start,
+            tracks: window.tracks,
+            samples: window.samples,
+            rotations,
+        }
+    }
+}
