@@ -15,46 +15,39 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 #[path = "src/spirv.rs"]
 mod spirv;
 
-/// Every pipeline: its name, and the files that are joined into it.
-const PIPELINES: [(&str, &[&str]); 5] = [
-    (
-        "arc_frames",
-        &[
-            "kernel",
-            "distance_in_frames",
-            "sine_cosine",
-            "evaluate_arc",
-        ],
-    ),
-    (
-        "arc_times",
-        &[
-            "kernel",
-            "distance_in_seconds",
-            "sine_cosine",
-            "evaluate_arc",
-        ],
-    ),
-    (
-        "polynomial_frames",
-        &[
-            "kernel",
-            "distance_in_frames",
-            "sine_cosine",
-            "evaluate_polynomial",
-        ],
-    ),
-    (
-        "polynomial_times",
-        &[
-            "kernel",
-            "distance_in_seconds",
-            "sine_cosine",
-            "evaluate_polynomial",
-        ],
-    ),
-    ("canary", &["sine_cosine", "canary"]),
+/// What the kernel is joined with: one of each, and its name is that of all three.
+const FORMS: [&str; 2] = ["arc", "polynomial"];
+const CLOCKS: [(&str, &str); 2] = [
+    ("frames", "distance_in_frames"),
+    ("times", "distance_in_seconds"),
 ];
+const ENCODINGS: [&str; 3] = ["f32", "f16", "snorm16"];
+
+/// Every pipeline: its name, and the files that are joined into it.
+fn pipelines() -> Vec<(String, Vec<String>)> {
+    let mut pipelines = vec![(
+        "canary".to_owned(),
+        ["sine_cosine", "canary"].map(str::to_owned).to_vec(),
+    )];
+    for form in FORMS {
+        for (clock, distance) in CLOCKS {
+            for encoding in ENCODINGS {
+                let files = [
+                    "kernel",
+                    distance,
+                    "sine_cosine",
+                    &format!("evaluate_{form}"),
+                    &format!("store_{encoding}"),
+                ];
+                pipelines.push((
+                    format!("{form}_{clock}_{encoding}"),
+                    files.map(str::to_owned).to_vec(),
+                ));
+            }
+        }
+    }
+    pipelines
+}
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
@@ -62,7 +55,8 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let mut constants = BTreeMap::new();
     let mut layouts = BTreeMap::new();
-    for (name, files) in PIPELINES {
+    for (name, files) in pipelines() {
+        let name = name.as_str();
         let source: String = files.iter().map(|file| read_shader(file)).collect();
         let module = naga::front::wgsl::parse_str(&source)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));

@@ -1,11 +1,11 @@
 // The one entry point of every form. Joined with a form (`Segment`, `evaluate`),
-// a `distance_from_middle` and `sine_cosine` by the build.
+// a `distance_from_middle`, a `store` and `sine_cosine` by the build.
 
 // A run of samples of one track that lie in one segment, or hold one constant.
 struct Item {
     // Which segment; or which constant, when `count` carries HOLD.
     source: u32,
-    // Where the first sample goes in `rotations`.
+    // Where the first sample is stored.
     output: u32,
     // Number of samples, at most ITEM_SAMPLES; with HOLD for a constant.
     count: u32,
@@ -21,7 +21,7 @@ struct Launch {
     // The items of this dispatch: their place in `items`, and how many.
     first_item: u32,
     item_count: u32,
-    // Distance in `rotations` between neighbouring samples of a track.
+    // Distance in the result between neighbouring samples of a track.
     stride: u32,
 }
 
@@ -36,7 +36,6 @@ const TINY_BITS: u32 = 0x1f800000;
 @group(0) @binding(1) var<storage, read> constants: array<vec4f>;
 @group(0) @binding(2) var<storage, read> items: array<Item>;
 @group(0) @binding(3) var<storage, read> distances: array<f32>;
-@group(0) @binding(4) var<storage, read_write> rotations: array<vec4f>;
 
 var<immediate> launch: Launch;
 
@@ -59,13 +58,13 @@ fn main(
         let constant = constants[item.source];
         let count = item.count & ~HOLD;
         for (var j = 0u; j < count; j++) {
-            rotations[item.output + j * launch.stride] = constant;
+            store(item.output + j * launch.stride, constant);
         }
         return;
     }
     let segment = segments[item.source];
     for (var j = 0u; j < item.count; j++) {
         let parameter = distance_from_middle(item.first, j) * item.scale + item.offset;
-        rotations[item.output + j * launch.stride] = canonical(evaluate(segment, parameter));
+        store(item.output + j * launch.stride, canonical(evaluate(segment, parameter)));
     }
 }

@@ -3,8 +3,9 @@
 use glam::Quat;
 
 use crate::clock::{Frames, FramesError, Timeline};
+use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
-use crate::gpu::ClipBuffers;
+use crate::gpu::{ClipBuffers, Job};
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Rotations, Storage};
 use crate::window::Window;
@@ -105,11 +106,74 @@ impl Clip {
     ) -> Result<(), Error> {
         match (&*self.engine.backend, &self.buffers) {
             (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
-            (Backend::Vulkan(opened), Some(buffers)) => Ok(opened
-                .engine
-                .evaluate_into(&self.data, buffers, timeline, window, output)?),
+            (Backend::Vulkan(_), _) => {
+                let bytes = bytemuck::cast_slice_mut(output);
+                self.evaluate_bytes_into(timeline, window, Encoding::F32, bytes)
+            }
+        }
+    }
+
+    fn evaluate_bytes_into(
+        &self,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        match (&*self.engine.backend, &self.buffers) {
+            (Backend::Cpu(engine), _) => {
+                Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
+            }
+            (Backend::Vulkan(opened), Some(buffers)) => {
+                let job = Job {
+                    clip: &self.data,
+                    buffers,
+                    timeline,
+                    encoding,
+                };
+                Ok(opened.engine.evaluate_into(job, window, output)?)
+            }
             (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
         }
+    }
+
+    /// The rotation of every track at every sample in an encoding of half the size:
+    /// what [`Encoding::encode`] makes of [`Clip::evaluate_as`]'s, bit by bit, but
+    /// made where they are evaluated.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn evaluate_encoded(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+    ) -> Result<Vec<u8>, Error> {
+        let timeline = self.timeline(frames)?;
+        let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let mut output = bytemuck::zeroed_vec(whole.len() * encoding.bytes());
+        self.evaluate_bytes_into(&timeline, &whole, encoding, &mut output)?;
+        Ok(output)
+    }
+
+    /// As [`Clip::evaluate_encoded`], into the caller's memory.
+    ///
+    /// # Errors
+    /// Also when `output` has not exactly the bytes of the result.
+    pub fn evaluate_encoded_into(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        let timeline = self.timeline(frames)?;
+        let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let (given, needed) = (output.len(), whole.len() * encoding.bytes());
+        if given != needed {
+            return Err(Error::OutputBytes { given, needed });
+        }
+        self.evaluate_bytes_into(&timeline, &whole, encoding, output)
     }
 }
 

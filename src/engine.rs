@@ -37,6 +37,14 @@ pub enum Error {
         /// Rotations of the result.
         needed: usize,
     },
+    /// The memory given for an encoded result is not as large as it.
+    #[error("the output has {given} bytes; the result has {needed}")]
+    OutputBytes {
+        /// Bytes that it holds.
+        given: usize,
+        /// Bytes of the result.
+        needed: usize,
+    },
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownWidth),

@@ -20,11 +20,19 @@ macro_rules! shader {
     };
 }
 
-const SHADERS: [(&str, &[u8]); 5] = [
-    shader!("arc_frames"),
-    shader!("arc_times"),
-    shader!("polynomial_frames"),
-    shader!("polynomial_times"),
+const SHADERS: [(&str, &[u8]); 13] = [
+    shader!("arc_frames_f32"),
+    shader!("arc_frames_f16"),
+    shader!("arc_frames_snorm16"),
+    shader!("arc_times_f32"),
+    shader!("arc_times_f16"),
+    shader!("arc_times_snorm16"),
+    shader!("polynomial_frames_f32"),
+    shader!("polynomial_frames_f16"),
+    shader!("polynomial_frames_snorm16"),
+    shader!("polynomial_times_f32"),
+    shader!("polynomial_times_f16"),
+    shader!("polynomial_times_snorm16"),
     shader!("canary"),
 ];
 

@@ -3,7 +3,10 @@
 mod support;
 
 use support::{first_difference, hostile_set, vulkan_devices};
-use tumble::{Device, Engine, EngineOptions, Frames, Layout, METHODS, Transfer, VulkanError};
+use tumble::{
+    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Transfer, VulkanBuffer,
+    VulkanError,
+};
 
 #[test]
 fn every_device_passes_every_canary() {
@@ -53,6 +56,9 @@ fn the_validation_layer_has_nothing_to_say() {
                 for frames in &requests {
                     for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                         clip.evaluate_as(frames, layout).unwrap();
+                        for encoding in Encoding::ALL {
+                            clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                        }
                     }
                 }
             }
@@ -65,47 +71,123 @@ fn the_validation_layer_has_nothing_to_say() {
     }
 }
 
+/// A device as an application makes it.
+#[allow(unsafe_code)] // creating a device is the application's part
+mod application {
+    use ash::vk;
+    use tumble::{Engine, EngineOptions, VulkanHandles};
+
+    pub(super) struct Application {
+        pub(super) instance: ash::Instance,
+        pub(super) physical_device: vk::PhysicalDevice,
+        pub(super) device: ash::Device,
+        entry: ash::Entry,
+        queue: vk::Queue,
+    }
+
+    impl Application {
+        pub(super) fn new() -> Self {
+            // SAFETY: plain creation; everything is destroyed in `drop`.
+            unsafe {
+                let entry = ash::Entry::load().unwrap();
+                let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
+                let info = vk::InstanceCreateInfo::default().application_info(&application);
+                let instance = entry.create_instance(&info, None).unwrap();
+                let physical_device = instance.enumerate_physical_devices().unwrap()[0];
+                let queues = [vk::DeviceQueueCreateInfo::default()
+                    .queue_family_index(0)
+                    .queue_priorities(&[1.0])];
+                let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+                let device = instance
+                    .create_device(physical_device, &info, None)
+                    .unwrap();
+                let queue = device.get_device_queue(0, 0);
+                Self {
+                    instance,
+                    physical_device,
+                    device,
+                    entry,
+                    queue,
+                }
+            }
+        }
+
+        /// An engine on it, which must go first.
+        pub(super) fn engine(&self) -> Engine {
+            let handles = VulkanHandles {
+                entry: self.entry.clone(),
+                instance: self.instance.clone(),
+                physical_device: self.physical_device,
+                device: self.device.clone(),
+                queue: self.queue,
+                queue_family: 0,
+            };
+            // SAFETY: the handles belong together and outlive the engine.
+            unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap()
+        }
+
+        /// A buffer in memory that the host can see.
+        pub(super) fn buffer(&self, size: u64) -> (vk::Buffer, vk::DeviceMemory) {
+            // SAFETY: plain creation on a device that is alive.
+            unsafe {
+                let info = vk::BufferCreateInfo::default().size(size).usage(
+                    vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
+                );
+                let buffer = self.device.create_buffer(&info, None).unwrap();
+                let needs = self.device.get_buffer_memory_requirements(buffer);
+                let types = self
+                    .instance
+                    .get_physical_device_memory_properties(self.physical_device);
+                let wanted =
+                    vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+                let index = (0..types.memory_type_count)
+                    .find(|&i| {
+                        let flags = types.memory_types[i as usize].property_flags;
+                        needs.memory_type_bits & 1 << i != 0 && flags.contains(wanted)
+                    })
+                    .unwrap();
+                let info = vk::MemoryAllocateInfo::default()
+                    .allocation_size(needs.size)
+                    .memory_type_index(index);
+                let memory = self.device.allocate_memory(&info, None).unwrap();
+                self.device.bind_buffer_memory(buffer, memory, 0).unwrap();
+                (buffer, memory)
+            }
+        }
+
+        /// What is in that memory.
+        pub(super) fn bytes(&self, memory: vk::DeviceMemory, size: u64) -> Vec<u8> {
+            // SAFETY: nothing else uses the memory now.
+            unsafe {
+                let flags = vk::MemoryMapFlags::empty();
+                let pointer = self.device.map_memory(memory, 0, size, flags).unwrap();
+                let bytes = std::slice::from_raw_parts(pointer.cast::<u8>(), size as usize);
+                let bytes = bytes.to_vec();
+                self.device.unmap_memory(memory);
+                bytes
+            }
+        }
+    }
+
+    impl Drop for Application {
+        fn drop(&mut self) {
+            // SAFETY: the engine and its clips are gone.
+            unsafe {
+                self.device.destroy_device(None);
+                self.instance.destroy_instance(None);
+            }
+        }
+    }
+}
+
 /// A renderer hands in what it has.
 #[test]
-#[allow(unsafe_code)] // creating a device is the application's part
 fn an_applications_own_device_gives_the_same_bits() {
-    use ash::vk;
-    use tumble::VulkanHandles;
-
     if vulkan_devices().is_empty() {
         return;
     }
-    // SAFETY: plain creation; everything is destroyed below, after the engine.
-    let (entry, instance) = unsafe {
-        let entry = ash::Entry::load().unwrap();
-        let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-        let info = vk::InstanceCreateInfo::default().application_info(&application);
-        let instance = entry.create_instance(&info, None).unwrap();
-        (entry, instance)
-    };
-    // SAFETY: as above.
-    let (physical_device, device, queue) = unsafe {
-        let physical_device = instance.enumerate_physical_devices().unwrap()[0];
-        let queues = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(0)
-            .queue_priorities(&[1.0])];
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
-        let device = instance
-            .create_device(physical_device, &info, None)
-            .unwrap();
-        let queue = device.get_device_queue(0, 0);
-        (physical_device, device, queue)
-    };
-    let handles = VulkanHandles {
-        entry,
-        instance: instance.clone(),
-        physical_device,
-        device: device.clone(),
-        queue,
-        queue_family: 0,
-    };
-    // SAFETY: the handles belong together and outlive the engine.
-    let engine = unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap();
+    let application = application::Application::new();
+    let engine = application.engine();
     let set = hostile_set(4, 32);
     let frames = Frames::fps(30).between(0.0, 20.0);
     for method in METHODS {
@@ -118,10 +200,73 @@ fn an_applications_own_device_gives_the_same_bits() {
             "{method}"
         );
     }
-    drop(engine);
-    // SAFETY: the engine and its clips are gone.
-    unsafe {
-        device.destroy_device(None);
-        instance.destroy_instance(None);
+}
+
+/// Results that a renderer draws from: nothing comes back to the host.
+#[test]
+#[allow(unsafe_code)] // the buffer is the application's
+fn results_stay_in_an_applications_own_buffer() {
+    if vulkan_devices().is_empty() {
+        return;
     }
+    let application = application::Application::new();
+    let engine = application.engine();
+    // With intervals so wild that the host computes their samples.
+    let mut set = hostile_set(4, 32);
+    let turn = |angle| glam::Quat::from_rotation_x(angle);
+    let keys = [0.0, 3.0, 0.5, 2.5, 1.0].map(turn);
+    set.push("wild", &[0.0, 0.001, 2.0, 2.001, 5.0], &keys)
+        .unwrap();
+    let frames = Frames::fps(30).between(0.0, 20.0);
+    for method in METHODS {
+        let clip = engine.upload(&set, method).unwrap();
+        for encoding in Encoding::ALL {
+            let expected = clip
+                .evaluate_encoded(&frames, Layout::FrameMajor, encoding)
+                .unwrap();
+            // Not at the start, and not aligned to what devices like.
+            let offset = 5 * encoding.bytes() as u64;
+            let size = expected.len() as u64;
+            let (buffer, memory) = application.buffer(offset + size);
+            let stretch = |offset, size| VulkanBuffer {
+                buffer,
+                offset,
+                size,
+            };
+            let write = |stretch| {
+                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, encoding, stretch) }
+            };
+            write(stretch(offset, size)).unwrap();
+            let found = application.bytes(memory, offset + size);
+            assert!(
+                found[offset as usize..] == expected,
+                "{method}, {encoding:?}"
+            );
+            let refused = [
+                write(stretch(offset + 1, size)),
+                write(stretch(offset, size - 1)),
+            ];
+            for result in refused {
+                let error = result.unwrap_err();
+                assert!(error.to_string().contains("does not fit"), "{error}");
+            }
+            // SAFETY: the device has written all that it will.
+            unsafe {
+                application.device.destroy_buffer(buffer, None);
+                application.device.free_memory(memory, None);
+            }
+        }
+    }
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let clip = cpu.upload(&set, METHODS[0]).unwrap();
+    let nowhere = VulkanBuffer {
+        buffer: ash::vk::Buffer::null(),
+        offset: 0,
+        size: u64::MAX,
+    };
+    // SAFETY: the CPU refuses.
+    let result =
+        unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, Encoding::F32, nowhere) };
+    assert!(result.is_err());
 }

@@ -336,7 +336,7 @@ impl From<Error> for Ended {
 enum ResultWriter<'a, 'o> {
     Waiting(&'o mut Stream),
     Npy(NpyWriter<&'o mut Stream>),
-    Csv(CsvWriter<'a, &'o mut Stream>),
+    Csv(Box<CsvWriter<'a, &'o mut Stream>>),
     Failed,
 }
 
@@ -346,7 +346,7 @@ impl<'a> ResultWriter<'a, '_> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
         *self = match std::mem::replace(self, Self::Failed) {
             Self::Waiting(out) if format == Format::Csv => {
-                Self::Csv(CsvWriter::new(out, result.set, result.timeline)?)
+                Self::Csv(Box::new(CsvWriter::new(out, result.set, result.timeline)?))
             }
             Self::Waiting(out) => {
                 let (rows, columns) = match result.layout {

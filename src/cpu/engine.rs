@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
 use crate::clock::{FramesError, Timeline};
+use crate::encoding::Encoding;
 use crate::engine::Error;
 use crate::method::Interpolation;
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
@@ -60,16 +61,40 @@ impl CpuEngine {
             return self.window(clip, timeline, window, output);
         }
         self.on_threads(|| {
-            let mut tasks = Vec::new();
-            let mut rest = output;
-            for window in window.cut(TASK) {
-                let (own, others) = rest.split_at_mut(window.len());
-                tasks.push((window, own));
-                rest = others;
-            }
-            tasks
+            tasks(window, 1, output)
                 .into_par_iter()
                 .try_for_each(|(window, own)| self.window(clip, timeline, &window, own))
+        })
+    }
+
+    /// As [`CpuEngine::evaluate`], encoded: a task's rotations are converted while they
+    /// are in the cache.
+    pub(crate) fn evaluate_encoded(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), FramesError> {
+        let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
+            rotations.resize(window.len(), [0.0; 4]);
+            self.window(clip, timeline, window, rotations)?;
+            encoding.encode(rotations, output);
+            Ok(())
+        };
+        if window.len() <= TASK {
+            return match output {
+                [] => Ok(()),
+                _ => task(&mut Vec::new(), window, output),
+            };
+        }
+        self.on_threads(|| {
+            tasks(window, encoding.bytes(), output)
+                .into_par_iter()
+                .try_for_each_init(Vec::new, |rotations, (window, own)| {
+                    task(rotations, &window, own)
+                })
         })
     }
 
@@ -198,4 +223,19 @@ impl CpuEngine {
         };
         self.on_threads(work)
     }
+}
+
+/// A window cut into tasks, each with its own part of the output, which has `each`
+/// elements for a rotation.
+fn tasks<'a, T>(
+    window: &Window,
+    each: usize,
+    mut output: &'a mut [T],
+) -> Vec<(Window, &'a mut [T])> {
+    let with_output = |window: Window| {
+        let (own, others) = std::mem::take(&mut output).split_at_mut(window.len() * each);
+        output = others;
+        (window, own)
+    };
+    window.cut(TASK).into_iter().map(with_output).collect()
 }

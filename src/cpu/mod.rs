@@ -9,6 +9,8 @@ mod evaluate_arc;
 mod evaluate_polynomial;
 mod row;
 mod sine_cosine;
+mod store_f16;
+mod store_snorm16;
 
 pub(crate) use dispatch::in_lanes;
 #[cfg(test)]
@@ -16,3 +18,5 @@ pub(crate) use dispatch::tests::at_every_width;
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
 pub(crate) use sine_cosine::sine_and_fall;
+pub(crate) use store_f16::to_half;
+pub(crate) use store_snorm16::to_snorm;

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
-use super::engine::VulkanEngine;
+use super::engine::{Job, VulkanEngine};
 use super::error::VulkanError;
 use super::pipeline::{CANARY, CANARY_BINDINGS, Exactness, Pipeline};
 use super::submission::{Access, Binding, Submission};
@@ -16,6 +16,7 @@ use crate::branchless::exp;
 use crate::clock::Frames;
 use crate::cpu::canary::reply;
 use crate::cpu::{CpuEngine, VectorWidth};
+use crate::encoding::Encoding;
 use crate::method::{BESSEL_OVERHAUSER, SLERP};
 use crate::numeric::round_quat;
 use crate::prepare::ClipData;
@@ -64,8 +65,14 @@ pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
             let mut found = expected.clone();
             cpu.evaluate(&clip, &timeline, &whole, &mut expected)
                 .expect("short gaps");
+            let job = Job {
+                clip: &clip,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding: Encoding::F32,
+            };
             engine
-                .evaluate_into(&clip, &buffers, &timeline, &whole, &mut found)
+                .evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found))
                 .map_err(|error| match error {
                     super::EvaluateError::Vulkan(error) => error,
                     super::EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),

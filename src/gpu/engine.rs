@@ -1,7 +1,6 @@
 //! Evaluation on a Vulkan device.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 use glam::Quat;
 
@@ -10,53 +9,66 @@ use super::device::LogicalDevice;
 use super::error::VulkanError;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
-use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
-use super::slot::{Finish, Slot, Stopwatch, Target};
-use super::submission::{Access, Binding, Submission};
-use super::work_list::work;
-use crate::clock::{FramesError, Ticks, Timeline};
+use super::pipeline::{KERNELS, Pipeline};
+use super::slot::{External, Slot, Target};
+use super::submission::{Access, Submission};
+use crate::clock::{FramesError, Timeline};
 use crate::device::{EngineOptions, Timings, Transfer};
-use crate::method::Form;
+use crate::encoding::Encoding;
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Storage};
-use crate::segment::shader::WORKGROUP;
-use crate::segment::{Item, Launch};
+use crate::segment::Item;
 use crate::window::Window;
-
-const ROTATION: u64 = size_of::<[f32; 4]>() as u64;
 
 /// Rotations of one window, unless limits or the budget say less: 32 MiB, which no
 /// device takes near 100 ms to fill.
 const WINDOW: u64 = 1 << 21;
 
 /// Windows in flight: the host fills one while the device works on another.
-const SLOTS: usize = 2;
+pub(super) const SLOTS: usize = 2;
 
 /// A Vulkan device with its kernels.
 pub(crate) struct VulkanEngine {
-    device: Arc<LogicalDevice>,
-    pipelines: [Pipeline; 4],
-    slots: Mutex<Vec<Slot>>,
+    pub(super) device: Arc<LogicalDevice>,
+    /// Made when they are first needed.
+    pub(super) pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS]>,
+    pub(super) slots: Mutex<Vec<Slot>>,
     /// Results are written in place, or copied out of the device's own memory.
-    in_place: bool,
+    pub(super) in_place: bool,
     /// Rotations of one window.
-    window: usize,
+    pub(super) window: usize,
     /// Bytes that the segments of one buffer may take.
     group_bytes: u64,
     /// Bytes that the segments of one clip may take; no limit unless one was asked.
     clip_bytes: Option<u64>,
     free: FreeBuffers,
-    timings: Mutex<Timings>,
+    pub(super) timings: Mutex<Timings>,
 }
 
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
-    groups: Vec<GroupBuffers>,
+    pub(super) groups: Vec<GroupBuffers>,
 }
 
-struct GroupBuffers {
-    segments: Buffer,
-    constants: Buffer,
+pub(super) struct GroupBuffers {
+    pub(super) segments: Buffer,
+    pub(super) constants: Buffer,
+}
+
+/// What is to be evaluated, and how stored.
+#[derive(Clone, Copy)]
+pub(crate) struct Job<'a> {
+    pub(crate) clip: &'a ClipData,
+    pub(crate) buffers: &'a ClipBuffers,
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) encoding: Encoding,
+}
+
+impl Job<'_> {
+    /// All of the result.
+    fn whole(&self, layout: Layout) -> Window {
+        Window::whole(self.clip.track_count(), self.timeline.len(), layout)
+    }
 }
 
 /// What may fail in an evaluation.
@@ -97,28 +109,14 @@ impl VulkanEngine {
         let mut window = WINDOW.min(largest / size_of::<Item>() as u64 / 2);
         let mut group_bytes = largest;
         if let Some(budget) = options.memory {
-            let each = size_of::<Item>() as u64 + 2 * ROTATION;
+            let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
             window = window.min(budget / 2 / SLOTS as u64 / each);
             group_bytes = group_bytes.min(budget / 2);
         }
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
-        let pipeline = |form, clock| {
-            Pipeline::new(
-                &device,
-                kernel(form, clock),
-                KERNEL_BINDINGS,
-                Exactness::Demanded,
-            )
-        };
-        let pipelines = [
-            pipeline(Form::Arc, Clock::Frames)?,
-            pipeline(Form::Arc, Clock::Times)?,
-            pipeline(Form::Polynomial, Clock::Frames)?,
-            pipeline(Form::Polynomial, Clock::Times)?,
-        ];
         Ok(Self {
-            pipelines,
+            pipelines: Mutex::default(),
             slots: Mutex::default(),
             in_place,
             window,
@@ -216,31 +214,42 @@ impl VulkanEngine {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let count = clip.track_count() * timeline.len();
-        let bytes = count as u64 * ROTATION;
+        let job = Job {
+            clip,
+            buffers,
+            timeline,
+            encoding: Encoding::F32,
+        };
+        let whole = job.whole(layout);
+        let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
         if !self.in_place || bytes > self.device.physical.info.max_memory_allocation_size {
-            let mut quats: Vec<Quat> = bytemuck::zeroed_vec(count);
-            let whole = Window::whole(clip.track_count(), timeline.len(), layout);
-            self.evaluate_into(clip, buffers, timeline, &whole, &mut quats)?;
+            let mut quats: Vec<Quat> = bytemuck::zeroed_vec(whole.len());
+            self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
         }
         let mut buffer = self.output_buffer(bytes)?;
-        let whole = Window::whole(clip.track_count(), timeline.len(), layout);
-        self.run(clip, buffers, timeline, &whole, Target::Buffer(&mut buffer))?;
-        Ok(Box::new(MappedQuats::new(buffer, count, &self.free)))
+        self.run(job, &whole, Target::Buffer(&mut buffer))?;
+        Ok(Box::new(MappedQuats::new(buffer, whole.len(), &self.free)))
     }
 
     /// Evaluates a window into the caller's memory.
     pub(crate) fn evaluate_into(
         &self,
-        clip: &ClipData,
-        buffers: &ClipBuffers,
-        timeline: &Timeline,
+        job: Job<'_>,
         window: &Window,
-        output: &mut [Quat],
+        output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        let output = Target::Slice(bytemuck::cast_slice_mut(output));
-        self.run(clip, buffers, timeline, window, output)
+        self.run(job, window, Target::Slice(output))
+    }
+
+    /// Evaluates into a buffer of the caller's device, where it stays.
+    pub(super) fn evaluate_to(
+        &self,
+        job: Job<'_>,
+        layout: Layout,
+        buffer: External,
+    ) -> Result<(), EvaluateError> {
+        self.run(job, &job.whole(layout), Target::External(buffer))
     }
 
     /// A buffer that was given back, when one fits closely, else a new one.
@@ -252,182 +261,5 @@ impl VulkanEngine {
         }
         drop(free);
         Buffer::new(&self.device, "tumble rotations", bytes, Residence::Readback)
-    }
-
-    fn run(
-        &self,
-        clip: &ClipData,
-        buffers: &ClipBuffers,
-        timeline: &Timeline,
-        window: &Window,
-        mut target: Target<'_>,
-    ) -> Result<(), EvaluateError> {
-        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let windows = window.cut(self.window);
-        while slots.len() < SLOTS.min(windows.len()) {
-            slots.push(Slot::new(&self.device)?);
-        }
-        let mut next = 0;
-        let mut result = Ok(());
-        let mut stopwatch = Stopwatch::default();
-        for window in windows {
-            next = (next + 1) % slots.len();
-            let slot = &mut slots[next];
-            result = slot
-                .finish(&mut target, &mut stopwatch)
-                .map_err(EvaluateError::from)
-                .and_then(|()| {
-                    let listing = Instant::now();
-                    let started = self.start(slot, clip, buffers, timeline, window, &target);
-                    stopwatch.timings.work_lists += listing.elapsed();
-                    started
-                });
-            if result.is_err() {
-                break;
-            }
-        }
-        // Also after an error: what was submitted uses the caller's buffers.
-        let oldest_first = slots.len();
-        for i in 1..=oldest_first {
-            let finished = slots[(next + i) % oldest_first].finish(&mut target, &mut stopwatch);
-            result = result.and(finished.map_err(EvaluateError::from));
-        }
-        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
-        result
-    }
-
-    /// Submits one window.
-    fn start(
-        &self,
-        slot: &mut Slot,
-        clip: &ClipData,
-        buffers: &ClipBuffers,
-        timeline: &Timeline,
-        window: Window,
-        target: &Target<'_>,
-    ) -> Result<(), EvaluateError> {
-        let alignment = self
-            .device
-            .physical
-            .info
-            .min_storage_buffer_offset_alignment
-            .max(1);
-        let start = match target {
-            Target::Buffer(_) => window.start as u64 * ROTATION,
-            Target::Slice(_) => 0,
-        };
-        let aligned = start / alignment * alignment;
-        let shift = (start - aligned) / ROTATION;
-        let size = (window.len() as u64 + shift) * ROTATION;
-        let mut lists = work(clip, timeline, &window, shift as u32)?;
-        slot.write(&self.device, &lists)?;
-
-        let staged_items = !self.in_place;
-        if staged_items {
-            Slot::grow(
-                &self.device,
-                &mut slot.device_items,
-                slot.items.size(),
-                Residence::Device,
-            )?;
-            let size = slot.distances.size();
-            Slot::grow(
-                &self.device,
-                &mut slot.device_distances,
-                size,
-                Residence::Device,
-            )?;
-        }
-        if matches!(target, Target::Slice(_)) {
-            let residence = if self.in_place {
-                Residence::Readback
-            } else {
-                Residence::Device
-            };
-            Slot::grow(&self.device, &mut slot.rotations, size, residence)?;
-            if !self.in_place {
-                Slot::grow(&self.device, &mut slot.readback, size, Residence::Readback)?;
-            }
-        }
-        slot.submission.begin(lists.len() as u32)?;
-        let (mut items, mut distances) = (&slot.items, &slot.distances);
-        if let (Some(own_items), Some(own_distances)) = (&slot.device_items, &slot.device_distances)
-        {
-            slot.submission.copy(items, own_items, 0, items.size());
-            slot.submission
-                .copy(distances, own_distances, 0, distances.size());
-            slot.submission.barrier(Access::Copy, Access::Kernel);
-            (items, distances) = (own_items, own_distances);
-        }
-        let rotations = match (target, &slot.rotations) {
-            (Target::Buffer(buffer), _) => Binding {
-                buffer,
-                offset: aligned,
-                size,
-            },
-            (Target::Slice(_), Some(buffer)) => Binding {
-                buffer,
-                offset: 0,
-                size,
-            },
-            (Target::Slice(_), None) => unreachable!("grown above"),
-        };
-        let pipeline = self.pipeline(clip.interpolation.method.form, timeline);
-        let mut first_item = 0;
-        for list in &lists {
-            let item_count = list.item_count() as u32;
-            if item_count == 0 {
-                continue;
-            }
-            let group = &buffers.groups[list.group];
-            let bindings = [
-                Binding::whole(&group.segments),
-                Binding::whole(&group.constants),
-                Binding::whole(items),
-                Binding::whole(distances),
-                rotations,
-            ];
-            let launch = Launch {
-                first_item,
-                item_count,
-                stride: window.stride() as u32,
-            };
-            let groups = self.workgroups(item_count);
-            slot.submission
-                .dispatch(pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
-            first_item += item_count;
-        }
-        if let (Some(rotations), Some(readback)) = (&slot.rotations, &slot.readback)
-            && matches!(target, Target::Slice(_))
-        {
-            slot.submission.barrier(Access::Kernel, Access::Copy);
-            slot.submission.copy(rotations, readback, 0, size);
-            slot.submission.barrier(Access::Copy, Access::Host);
-        } else {
-            slot.submission.barrier(Access::Kernel, Access::Host);
-        }
-        slot.submission.submit()?;
-        let chunks = lists.iter_mut().flat_map(|list| &mut list.chunks);
-        let patches = chunks
-            .flat_map(|chunk| std::mem::take(&mut chunk.patches))
-            .collect();
-        slot.done = Some(Finish { window, patches });
-        Ok(())
-    }
-
-    fn pipeline(&self, form: Form, timeline: &Timeline) -> &Pipeline {
-        let times = matches!(timeline.ticks, Ticks::Times { .. });
-        let form = match form {
-            Form::Arc => 0,
-            Form::Polynomial => 2,
-        };
-        &self.pipelines[form + usize::from(times)]
-    }
-
-    /// Enough workgroups for `items`, within the limit along x.
-    fn workgroups(&self, items: u32) -> [u32; 2] {
-        let groups = items.div_ceil(WORKGROUP);
-        let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
-        [x, groups.div_ceil(x)]
     }
 }

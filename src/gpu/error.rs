@@ -54,6 +54,20 @@ pub enum VulkanError {
         /// Results compared.
         total: usize,
     },
+    /// A stretch of a buffer given for a result does not fit it.
+    #[error(
+        "the buffer's stretch of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
+    )]
+    OwnBuffer {
+        /// Where the stretch starts.
+        offset: u64,
+        /// Its length.
+        size: u64,
+        /// Bytes of a rotation.
+        rotation: u64,
+        /// Bytes of the result.
+        needed: u64,
+    },
     /// One track alone exceeds the device's limits.
     #[error(
         "{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"

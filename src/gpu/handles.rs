@@ -3,12 +3,17 @@
 use ash::vk;
 
 use super::device::LogicalDevice;
-use super::engine::VulkanEngine;
+use super::engine::{Job, VulkanEngine};
 use super::error::VulkanError;
 use super::instance::Instance;
 use super::physical::PhysicalDevice;
+use super::slot::External;
+use crate::clip::Clip;
+use crate::clock::Frames;
 use crate::device::EngineOptions;
-use crate::engine::{Engine, Error};
+use crate::encoding::Encoding;
+use crate::engine::{Backend, Engine, Error};
+use crate::rotations::Layout;
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).
@@ -48,6 +53,67 @@ impl Engine {
         let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
         let info = engine.info().clone();
         Self::trusted(engine, info, options)
+    }
+}
+
+/// A stretch of a buffer on an application's own device.
+#[derive(Debug, Clone, Copy)]
+pub struct VulkanBuffer {
+    /// The buffer.
+    pub buffer: vk::Buffer,
+    /// Where the stretch starts, bytes: a multiple of a rotation's.
+    pub offset: u64,
+    /// Its length, bytes: at least those of the result.
+    pub size: u64,
+}
+
+impl Clip {
+    /// Evaluates into a buffer of the application's own, on the device that the engine
+    /// was made from ([`Engine::from_vulkan`]): the rotations stay there, for a
+    /// renderer or another kernel. Returns when they are written; what is submitted
+    /// to the queue afterwards sees them.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the frames do not fit the clip, the stretch is not
+    /// aligned or too short, or the device fails.
+    ///
+    /// # Safety
+    /// The buffer must belong to the engine's device, have memory, be made for use as
+    /// `STORAGE_BUFFER` and `TRANSFER_DST`, have the stretch given, and not be used by
+    /// anyone else before this returns.
+    pub unsafe fn evaluate_to_buffer(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+        buffer: VulkanBuffer,
+    ) -> Result<(), Error> {
+        let timeline = self.timeline(frames)?;
+        let rotation = encoding.bytes() as u64;
+        let needed = (self.track_count() * timeline.len()) as u64 * rotation;
+        let (Backend::Vulkan(opened), Some(buffers)) = (&*self.engine.backend, &self.buffers)
+        else {
+            return Err(VulkanError::NoDevice.into());
+        };
+        if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {
+            return Err(Error::Vulkan(VulkanError::OwnBuffer {
+                offset: buffer.offset,
+                size: buffer.size,
+                rotation,
+                needed,
+            }));
+        }
+        let job = Job {
+            clip: &self.data,
+            buffers,
+            timeline: &timeline,
+            encoding,
+        };
+        let external = External {
+            raw: buffer.buffer,
+            offset: buffer.offset,
+        };
+        Ok(opened.engine.evaluate_to(job, layout, external)?)
     }
 }
 

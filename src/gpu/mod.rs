@@ -12,13 +12,14 @@ mod instance;
 mod mapped;
 mod physical;
 mod pipeline;
+mod run;
 mod slot;
 mod submission;
 mod work_list;
 
 pub use canary::CanaryReport;
-pub(crate) use engine::{ClipBuffers, EvaluateError, VulkanEngine};
+pub(crate) use engine::{ClipBuffers, EvaluateError, Job, VulkanEngine};
 pub use error::VulkanError;
-pub use handles::VulkanHandles;
+pub use handles::{VulkanBuffer, VulkanHandles};
 pub use physical::{DeviceInfo, DeviceKind};
 pub(crate) use physical::{PhysicalDevice, list};

@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::device::LogicalDevice;
 use super::error::{Named, VulkanError};
+use crate::encoding::Encoding;
 use crate::method::Form;
 use crate::segment::Launch;
 use crate::spirv;
@@ -34,20 +35,50 @@ pub(super) enum Clock {
     Times,
 }
 
-/// The kernel of a form and a clock.
-pub(super) fn kernel(form: Form, clock: Clock) -> &'static Shader {
-    static KERNELS: [Shader; 4] = [
-        shader!("arc_frames"),
-        shader!("arc_times"),
-        shader!("polynomial_frames"),
-        shader!("polynomial_times"),
-    ];
-    match (form, clock) {
-        (Form::Arc, Clock::Frames) => &KERNELS[0],
-        (Form::Arc, Clock::Times) => &KERNELS[1],
-        (Form::Polynomial, Clock::Frames) => &KERNELS[2],
-        (Form::Polynomial, Clock::Times) => &KERNELS[3],
+/// The kernel of a form, a clock and an encoding.
+pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> &'static Shader {
+    macro_rules! kernels {
+        ($($name:literal),+) => {{
+            static SHADERS: [Shader; 12] = [$(shader!($name)),+];
+            &SHADERS
+        }};
     }
+    let shaders = kernels!(
+        "arc_frames_f32",
+        "arc_frames_f16",
+        "arc_frames_snorm16",
+        "arc_times_f32",
+        "arc_times_f16",
+        "arc_times_snorm16",
+        "polynomial_frames_f32",
+        "polynomial_frames_f16",
+        "polynomial_frames_snorm16",
+        "polynomial_times_f32",
+        "polynomial_times_f16",
+        "polynomial_times_snorm16"
+    );
+    &shaders[kernel_index(form, clock, encoding)]
+}
+
+/// Kernels that there are.
+pub(super) const KERNELS: usize = 12;
+
+/// The place of a kernel among all.
+pub(super) fn kernel_index(form: Form, clock: Clock, encoding: Encoding) -> usize {
+    let form = match form {
+        Form::Arc => 0,
+        Form::Polynomial => 1,
+    };
+    let clock = match clock {
+        Clock::Frames => 0,
+        Clock::Times => 1,
+    };
+    let encoding = match encoding {
+        Encoding::F32 => 0,
+        Encoding::F16 => 1,
+        Encoding::Snorm16 => 2,
+    };
+    (form * 2 + clock) * 3 + encoding
 }
 
 /// Number of storage buffers that `kernel.wgsl` binds.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Quat;
+use ash::vk;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
@@ -11,6 +11,7 @@ use super::error::VulkanError;
 use super::submission::{Spent, Submission};
 use super::work_list::GroupWork;
 use crate::device::Timings;
+use crate::encoding::Encoding;
 use crate::segment::Item;
 use crate::window::Window;
 
@@ -61,7 +62,17 @@ pub(super) enum Target<'a> {
     /// Straight into a mapped buffer.
     Buffer(&'a mut Buffer),
     /// Through a window's own buffer into the caller's memory.
-    Slice(&'a mut [[f32; 4]]),
+    Slice(&'a mut [u8]),
+    /// Into a buffer of the caller's.
+    External(External),
+}
+
+/// A stretch of a buffer that somebody else made on this device.
+#[derive(Clone, Copy)]
+pub(super) struct External {
+    pub(super) raw: vk::Buffer,
+    /// Where it starts, bytes.
+    pub(super) offset: u64,
 }
 
 impl Slot {
@@ -135,6 +146,7 @@ impl Slot {
     /// Waits for the window in flight, if any, and brings its results home.
     pub(super) fn finish(
         &mut self,
+        encoding: Encoding,
         target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
@@ -145,22 +157,22 @@ impl Slot {
         let Some(Finish { window, patches }) = self.done.take() else {
             return Ok(());
         };
-        let all = window.start..window.start + window.len();
-        let output: &mut [[f32; 4]] = match target {
-            Target::Buffer(buffer) => bytemuck::cast_slice_mut(
-                buffer.bytes_mut(all.start * size_of::<Quat>()..all.end * size_of::<Quat>()),
-            ),
+        let rotation = encoding.bytes();
+        let all = window.start * rotation..(window.start + window.len()) * rotation;
+        let output: &mut [u8] = match target {
+            Target::Buffer(buffer) => buffer.bytes_mut(all),
+            Target::External(_) => &mut [],
             Target::Slice(slice) => {
                 let output = &mut slice[all];
                 let written = self.readback.as_ref().or(self.rotations.as_ref());
-                let bytes = 0..size_of_val(output);
-                let written = written.map_or(&[][..], |buffer| buffer.bytes(bytes));
-                output.copy_from_slice(bytemuck::cast_slice(written));
+                let bytes = 0..output.len();
+                output.copy_from_slice(written.map_or(&[][..], |buffer| buffer.bytes(bytes)));
                 output
             }
         };
-        for (place, rotation) in patches {
-            output[place] = rotation;
+        for (place, value) in patches {
+            let place = place * rotation;
+            encoding.encode(&[value], &mut output[place..place + rotation]);
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())

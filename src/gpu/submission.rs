@@ -42,17 +42,17 @@ pub(super) struct Spent {
 
 /// A stretch of a buffer that a kernel sees.
 #[derive(Clone, Copy)]
-pub(super) struct Binding<'a> {
-    pub(super) buffer: &'a Buffer,
+pub(super) struct Binding {
+    pub(super) buffer: vk::Buffer,
     pub(super) offset: u64,
     pub(super) size: u64,
 }
 
-impl<'a> Binding<'a> {
+impl Binding {
     /// All of a buffer.
-    pub(super) fn whole(buffer: &'a Buffer) -> Self {
+    pub(super) fn whole(buffer: &Buffer) -> Self {
         Self {
-            buffer,
+            buffer: buffer.raw,
             offset: 0,
             size: buffer.size(),
         }
@@ -147,7 +147,7 @@ impl Submission {
     pub(super) fn dispatch(
         &mut self,
         pipeline: &Pipeline,
-        bindings: &[Binding<'_>],
+        bindings: &[Binding],
         constants: &[u8],
         groups: [u32; 2],
     ) -> Result<(), VulkanError> {
@@ -164,7 +164,7 @@ impl Submission {
             .iter()
             .map(|binding| {
                 [vk::DescriptorBufferInfo::default()
-                    .buffer(binding.buffer.raw)
+                    .buffer(binding.buffer)
                     .offset(binding.offset)
                     .range(binding.size)]
             })
@@ -202,6 +202,16 @@ impl Submission {
             self.device
                 .raw
                 .cmd_copy_buffer(self.commands, from.raw, to.raw, &region);
+        }
+    }
+
+    /// Records that some bytes, a multiple of 4, are written into a buffer.
+    pub(super) fn update(&mut self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
+        // SAFETY: as in `copy`; the bytes are few, and copied into the commands.
+        unsafe {
+            self.device
+                .raw
+                .cmd_update_buffer(self.commands, to, offset, bytes);
         }
     }
 
@@ -292,6 +302,8 @@ pub(super) enum Access {
     Kernel,
     Copy,
     Host,
+    /// Whatever comes later on the queue.
+    Any,
 }
 
 impl Access {
@@ -304,6 +316,8 @@ impl Access {
             (Self::Copy, false) => (S::TRANSFER, A::TRANSFER_READ),
             (Self::Host, true) => (S::HOST, A::HOST_WRITE),
             (Self::Host, false) => (S::HOST, A::HOST_READ),
+            (Self::Any, true) => (S::ALL_COMMANDS, A::MEMORY_WRITE),
+            (Self::Any, false) => (S::ALL_COMMANDS, A::MEMORY_READ | A::MEMORY_WRITE),
         }
     }
 }

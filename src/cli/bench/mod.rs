@@ -4,6 +4,7 @@
 
 mod naive;
 mod report;
+mod stream;
 mod workload;
 
 use std::time::{Duration, Instant};
@@ -58,8 +59,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 rounds: arguments.rounds,
                 calls,
             };
-            let section = measure(kind, &workload, method, &devices, turns)
-                .map_err(|error| super::device::refused(&error))?;
+            let section = if kind == Kind::Stream {
+                stream::measure(&workload, method, turns)?
+            } else {
+                measure(kind, &workload, method, &devices, turns)
+                    .map_err(|error| super::device::refused(&error))?
+            };
             sections.push(section);
         }
     }
@@ -72,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// One way to do the work; what it returns are times besides that of the whole.
-type Action<'a> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a>;
+type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a>;
 
 /// How often each is measured, and how many calls one measurement takes.
 #[derive(Clone, Copy)]
@@ -87,15 +92,15 @@ struct Part {
     time: Duration,
 }
 
-struct Contestant<'a> {
+struct Contestant<'a, E> {
     name: String,
-    action: Action<'a>,
+    action: Action<'a, E>,
 }
 
-impl<'a> Contestant<'a> {
+impl<'a, E> Contestant<'a, E> {
     fn new(
         name: impl Into<String>,
-        action: impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a,
+        action: impl FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a,
     ) -> Self {
         Self {
             name: name.into(),
@@ -212,11 +217,11 @@ fn on_device<'a>(
 }
 
 /// Every contestant in turn, round after round; the first round does not count.
-fn race(
-    mut contestants: Vec<Contestant<'_>>,
+fn race<E>(
+    mut contestants: Vec<Contestant<'_, E>>,
     output: &mut [Quat],
     Turns { rounds, calls }: Turns,
-) -> Result<Vec<Row>, tumble::Error> {
+) -> Result<Vec<Row>, E> {
     let mut times = vec![Vec::new(); contestants.len()];
     let mut parts: Vec<Vec<(&str, Vec<Duration>)>> = vec![Vec::new(); contestants.len()];
     for round in 0..=rounds {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 use tumble::{Method, VectorWidth};
 
+use super::super::words;
 use super::workload::Kind;
 
 /// A whole run; also the form of the JSON.
@@ -25,6 +26,9 @@ pub(super) struct Section {
     workload: Kind,
     method: &'static str,
     rotations: usize,
+    /// The most memory that the process has had so far, where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peak_memory_bytes: Option<u64>,
     rows: Vec<Row>,
 }
 
@@ -37,7 +41,8 @@ pub(super) struct Row {
     nanoseconds_per_rotation: f64,
     /// 1 is as fast as memory can be written.
     share_of_write_rate: f64,
-    ratio_to_naive: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ratio_to_naive: Option<f64>,
     /// Where the time went, milliseconds.
     parts: Vec<(&'static str, f64)>,
 }
@@ -70,24 +75,26 @@ impl Report {
 }
 
 impl Section {
-    /// `rows`: the write rate first, then the naive peer.
+    /// `rows`: the write rate first, then the naive peer where there is one.
     pub(super) fn new(
         workload: Kind,
         method: Method,
         rotations: usize,
         mut rows: Vec<Row>,
     ) -> Self {
-        let (write, naive) = (rows[0].milliseconds, rows[1].milliseconds);
+        let write = rows[0].milliseconds;
+        let naive = (workload != Kind::Stream).then_some(rows[1].milliseconds);
         for row in &mut rows {
             row.million_rotations_per_second = rotations as f64 / row.milliseconds / 1e3;
             row.nanoseconds_per_rotation = row.milliseconds * 1e6 / rotations as f64;
             row.share_of_write_rate = write / row.milliseconds;
-            row.ratio_to_naive = naive / row.milliseconds;
+            row.ratio_to_naive = naive.map(|naive| naive / row.milliseconds);
         }
         Self {
             workload,
             method: method.name,
             rotations,
+            peak_memory_bytes: (workload == Kind::Stream).then(peak_memory).flatten(),
             rows,
         }
     }
@@ -106,19 +113,33 @@ impl Section {
         for row in &self.rows {
             let _ = writeln!(
                 text,
-                "{:width$}  {:>10.3}  {:>8.1}  {:>8.2}  {:>6.2}x  {:>6.2}x",
+                "{:width$}  {:>10.3}  {:>8.1}  {:>8.2}  {:>6.2}x  {:>7}",
                 row.name,
                 row.milliseconds,
                 row.million_rotations_per_second,
                 row.nanoseconds_per_rotation,
                 row.share_of_write_rate,
                 row.ratio_to_naive
+                    .map_or(String::new(), |ratio| format!("{ratio:.2}x"))
             );
             for (name, milliseconds) in &row.parts {
                 let _ = writeln!(text, "{:width$}  {milliseconds:>10.3}", format!("  {name}"));
             }
         }
+        if let Some(bytes) = self.peak_memory_bytes {
+            let bytes = words::bytes(bytes as f64);
+            let _ = writeln!(text, "the process has had {bytes} of memory at most");
+        }
     }
+}
+
+/// What Linux says of this process; unknown elsewhere.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let mut lines = status.lines();
+    let kibibytes = lines.find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = kibibytes.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024)
 }
 
 impl Row {
@@ -130,7 +151,7 @@ impl Row {
             million_rotations_per_second: 0.0,
             nanoseconds_per_rotation: 0.0,
             share_of_write_rate: 0.0,
-            ratio_to_naive: 0.0,
+            ratio_to_naive: None,
             parts: parts
                 .into_iter()
                 .map(|(name, time)| (name, milliseconds(time)))

@@ -29,6 +29,8 @@ pub(super) enum Kind {
     Crowd,
     /// 1 track of 10 000 000 keys at 120 Hz, 60 frames a second
     Long,
+    /// 8 GiB of rotations, written to a file in chunks
+    Stream,
 }
 
 /// Frames per second, in every workload.
@@ -47,6 +49,10 @@ impl Kind {
             Self::Long => {
                 let keys = few(10_000_000).max(4);
                 frames(even(1, keys), 1.0 / 240.0, keys / 2 - 1)
+            }
+            Self::Stream => {
+                let count = few(1 << 17);
+                frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
             }
             Self::Crowd => crowd(few(1_000_000)),
         }

@@ -1,0 +1,236 @@
+//! The walk over a result's windows: two are in flight, the host lists the work of one
+//! while the device does that of the other.
+
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
+
+use super::buffer::Residence;
+use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
+use super::error::VulkanError;
+use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel, kernel_index};
+use super::slot::{Finish, Slot, Stopwatch, Target};
+use super::submission::{Access, Binding};
+use super::work_list::work;
+use crate::clock::{Ticks, Timeline};
+use crate::encoding::Encoding;
+use crate::method::Form;
+use crate::segment::Launch;
+use crate::segment::shader::WORKGROUP;
+use crate::window::Window;
+
+impl VulkanEngine {
+    /// Evaluates a window of a result, in windows of its own.
+    pub(super) fn run(
+        &self,
+        job: Job<'_>,
+        window: &Window,
+        mut target: Target<'_>,
+    ) -> Result<(), EvaluateError> {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let windows = window.cut(self.window);
+        while slots.len() < SLOTS.min(windows.len()) {
+            slots.push(Slot::new(&self.device)?);
+        }
+        let mut next = 0;
+        let mut result = Ok(());
+        let mut stopwatch = Stopwatch::default();
+        for window in windows {
+            next = (next + 1) % slots.len();
+            let slot = &mut slots[next];
+            result = slot
+                .finish(job.encoding, &mut target, &mut stopwatch)
+                .map_err(EvaluateError::from)
+                .and_then(|()| {
+                    let listing = Instant::now();
+                    let started = self.start(slot, job, window, &target);
+                    stopwatch.timings.work_lists += listing.elapsed();
+                    started
+                });
+            if result.is_err() {
+                break;
+            }
+        }
+        // Also after an error: what was submitted uses the caller's buffers.
+        let oldest_first = slots.len();
+        for i in 1..=oldest_first {
+            let slot = &mut slots[(next + i) % oldest_first];
+            let finished = slot.finish(job.encoding, &mut target, &mut stopwatch);
+            result = result.and(finished.map_err(EvaluateError::from));
+        }
+        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
+        result
+    }
+
+    /// Submits one window.
+    fn start(
+        &self,
+        slot: &mut Slot,
+        job: Job<'_>,
+        window: Window,
+        target: &Target<'_>,
+    ) -> Result<(), EvaluateError> {
+        let Job {
+            clip,
+            buffers,
+            timeline,
+            encoding,
+        } = job;
+        let rotation = encoding.bytes() as u64;
+        let alignment = self
+            .device
+            .physical
+            .info
+            .min_storage_buffer_offset_alignment
+            .max(1);
+        let start = match target {
+            Target::Buffer(_) => window.start as u64 * rotation,
+            Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
+            Target::Slice(_) => 0,
+        };
+        let aligned = start / alignment * alignment;
+        let shift = (start - aligned) / rotation;
+        let size = (window.len() as u64 + shift) * rotation;
+        let mut lists = work(clip, timeline, &window, shift as u32)?;
+        slot.write(&self.device, &lists)?;
+
+        let staged_items = !self.in_place;
+        if staged_items {
+            Slot::grow(
+                &self.device,
+                &mut slot.device_items,
+                slot.items.size(),
+                Residence::Device,
+            )?;
+            let size = slot.distances.size();
+            Slot::grow(
+                &self.device,
+                &mut slot.device_distances,
+                size,
+                Residence::Device,
+            )?;
+        }
+        if matches!(target, Target::Slice(_)) {
+            let residence = if self.in_place {
+                Residence::Readback
+            } else {
+                Residence::Device
+            };
+            Slot::grow(&self.device, &mut slot.rotations, size, residence)?;
+            if !self.in_place {
+                Slot::grow(&self.device, &mut slot.readback, size, Residence::Readback)?;
+            }
+        }
+        slot.submission.begin(lists.len() as u32)?;
+        let (mut items, mut distances) = (&slot.items, &slot.distances);
+        if let (Some(own_items), Some(own_distances)) = (&slot.device_items, &slot.device_distances)
+        {
+            slot.submission.copy(items, own_items, 0, items.size());
+            slot.submission
+                .copy(distances, own_distances, 0, distances.size());
+            slot.submission.barrier(Access::Copy, Access::Kernel);
+            (items, distances) = (own_items, own_distances);
+        }
+        let rotations = match (target, &slot.rotations) {
+            (Target::Buffer(buffer), _) => Binding {
+                buffer: buffer.raw,
+                offset: aligned,
+                size,
+            },
+            (Target::External(buffer), _) => Binding {
+                buffer: buffer.raw,
+                offset: aligned,
+                size,
+            },
+            (Target::Slice(_), Some(buffer)) => Binding {
+                buffer: buffer.raw,
+                offset: 0,
+                size,
+            },
+            (Target::Slice(_), None) => unreachable!("grown above"),
+        };
+        let pipeline = self.pipeline(clip.interpolation.method.form, timeline, encoding)?;
+        let mut first_item = 0;
+        for list in &lists {
+            let item_count = list.item_count() as u32;
+            if item_count == 0 {
+                continue;
+            }
+            let group = &buffers.groups[list.group];
+            let bindings = [
+                Binding::whole(&group.segments),
+                Binding::whole(&group.constants),
+                Binding::whole(items),
+                Binding::whole(distances),
+                rotations,
+            ];
+            let launch = Launch {
+                first_item,
+                item_count,
+                stride: window.stride() as u32,
+            };
+            let groups = self.workgroups(item_count);
+            slot.submission
+                .dispatch(&pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
+            first_item += item_count;
+        }
+        let chunks = lists.iter_mut().flat_map(|list| &mut list.chunks);
+        let mut patches: Vec<(usize, [f32; 4])> = chunks
+            .flat_map(|chunk| std::mem::take(&mut chunk.patches))
+            .collect();
+        match (target, &slot.rotations, &slot.readback) {
+            (Target::Slice(_), Some(rotations), Some(readback)) => {
+                slot.submission.barrier(Access::Kernel, Access::Copy);
+                slot.submission.copy(rotations, readback, 0, size);
+                slot.submission.barrier(Access::Copy, Access::Host);
+            }
+            (Target::External(buffer), ..) => {
+                slot.submission.barrier(Access::Kernel, Access::Copy);
+                let mut bytes = [0; size_of::<[f32; 4]>()];
+                let bytes = &mut bytes[..encoding.bytes()];
+                for (place, value) in patches.drain(..) {
+                    encoding.encode(&[value], bytes);
+                    let offset = start + place as u64 * rotation;
+                    slot.submission.update(buffer.raw, offset, bytes);
+                }
+                slot.submission.barrier(Access::Kernel, Access::Any);
+                slot.submission.barrier(Access::Copy, Access::Any);
+            }
+            _ => slot.submission.barrier(Access::Kernel, Access::Host),
+        }
+        slot.submission.submit()?;
+        slot.done = Some(Finish { window, patches });
+        Ok(())
+    }
+
+    /// The kernel for some work, made when it is first needed.
+    fn pipeline(
+        &self,
+        form: Form,
+        timeline: &Timeline,
+        encoding: Encoding,
+    ) -> Result<Arc<Pipeline>, VulkanError> {
+        let clock = match timeline.ticks {
+            Ticks::Frames { .. } => Clock::Frames,
+            Ticks::Times { .. } => Clock::Times,
+        };
+        let mut all = self
+            .pipelines
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let place = &mut all[kernel_index(form, clock, encoding)];
+        if let Some(pipeline) = place {
+            return Ok(Arc::clone(pipeline));
+        }
+        let shader = kernel(form, clock, encoding);
+        let exactness = Exactness::Demanded;
+        let pipeline = Pipeline::new(&self.device, shader, KERNEL_BINDINGS, exactness)?;
+        Ok(Arc::clone(place.insert(Arc::new(pipeline))))
+    }
+
+    /// Enough workgroups for `items`, within the limit along x.
+    fn workgroups(&self, items: u32) -> [u32; 2] {
+        let groups = items.div_ceil(WORKGROUP);
+        let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
+        [x, groups.div_ceil(x)]
+    }
+}

@@ -1,0 +1,57 @@
+//! Results of half the size: the same bits from every device, namely those that the
+//! f32 result gives.
+
+mod support;
+
+use support::{hostile_set, vulkan_devices};
+use tumble::{Device, Encoding, Engine, EngineOptions, Error, Frames, Layout, METHODS};
+
+#[test]
+fn every_device_encodes_like_the_host() {
+    let set = hostile_set(12, 96);
+    let explicit = (0..500)
+        .map(|i| 0.013 * f64::from((i * 29) % 500))
+        .collect();
+    let requests = [Frames::fps(60).between(-1.0, 25.0), Frames::at(explicit)];
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    for device in [vec![Device::Cpu], vulkan_devices()].concat() {
+        for memory in [None, Some(500_000)] {
+            let mut options = EngineOptions::default();
+            options.memory = memory;
+            let engine = Engine::with_options(device.clone(), &options).unwrap();
+            for method in METHODS {
+                let clip = engine.upload(&set, method).unwrap();
+                let of_cpu = cpu.upload(&set, method).unwrap();
+                for frames in &requests {
+                    for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                        let rotations = of_cpu.evaluate_as(frames, layout).unwrap();
+                        for encoding in Encoding::ALL {
+                            let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
+                            let mut expected = vec![0; quats.len() * encoding.bytes()];
+                            encoding.encode(quats, &mut expected);
+                            let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                            let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
+                            assert!(found == expected, "{what}");
+                            let mut own = vec![0xff; expected.len()];
+                            clip.evaluate_encoded_into(frames, layout, encoding, &mut own)
+                                .unwrap();
+                            assert!(own == expected, "{what}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn memory_of_another_size_is_refused() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let clip = engine.upload(&hostile_set(1, 2), METHODS[0]).unwrap();
+    let frames = Frames::at(vec![0.0, 1.0]);
+    let result =
+        clip.evaluate_encoded_into(&frames, Layout::TrackMajor, Encoding::F16, &mut [0; 33]);
+    let expected = "the output has 33 bytes; the result has 32";
+    assert!(matches!(&result, Err(Error::OutputBytes { .. })));
+    assert_eq!(result.unwrap_err().to_string(), expected);
+}
