@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 use std::time::Duration;
 
 use crate::cpu::VectorWidth;
-use crate::gpu::{self, DeviceInfo, PhysicalDevice, VulkanError};
+use crate::gpu::{self, DeviceInfo, DeviceKind, PhysicalDevice, VulkanError};
 
 /// Where an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
@@ -53,6 +53,14 @@ impl Device {
                 })
             })
             .collect())
+    }
+
+    /// Whether it is a Vulkan driver that computes on the CPU (Mesa's lavapipe).
+    pub fn is_software(&self) -> bool {
+        match self {
+            Self::Cpu => false,
+            Self::Vulkan(device) => device.info().kind == DeviceKind::Cpu,
+        }
     }
 
     /// Its name: the driver's, or `CPU`.

@@ -118,9 +118,9 @@ impl Engine {
     ///
     /// # Errors
     /// When the system refuses what the CPU needs.
-    pub fn auto() -> Result<Self, Error> {
-        let devices = Device::list().unwrap_or_default();
-        let exact = devices
+    pub fn first() -> Result<Self, Error> {
+        let exact = Device::list()
+            .unwrap_or_default()
             .into_iter()
             .find_map(|device| Self::new(device).ok());
         exact.map_or_else(|| Self::new(Device::Cpu), Ok)

@@ -13,7 +13,7 @@
 //! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;
 //!
 //! // 2. Where to evaluate: the first Vulkan device that is exact, else the CPU.
-//! let engine = Engine::auto()?;
+//! let engine = Engine::first()?;
 //!
 //! // 3. A clip stays on the device; evaluate it as often as needed.
 //! let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
@@ -44,6 +44,7 @@
 //! * **Keys are met exactly**: a sample on a key returns the key's own bits (for
 //!   methods that pass through their keys).
 
+mod auto;
 mod branchless;
 mod clip;
 mod clock;

@@ -84,7 +84,7 @@ impl Verification {
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
-/// let engine = Engine::auto()?;
+/// let engine = Engine::first()?;
 /// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
 /// assert!(found.passes());
 /// # Ok::<(), Box<dyn std::error::Error>>(())

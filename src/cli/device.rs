@@ -18,8 +18,9 @@ const CHUNK: usize = 1 << 20;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviceArguments {
-    /// auto, cpu, vulkan, or a device by its index or part of its name (`tumble devices`)
-    #[arg(long, value_name = "DEVICE", default_value = "auto")]
+    /// first (Vulkan device, else the CPU), auto (the fastest for the job), cpu, vulkan, or
+    /// a device by its index or part of its name (`tumble devices`)
+    #[arg(long, value_name = "DEVICE", default_value = "first")]
     device: Choice,
     /// Use a device although its canaries fail: its bits may differ from the CPU's
     #[arg(long)]
@@ -32,6 +33,8 @@ pub(crate) struct DeviceArguments {
 #[derive(Debug, Clone, PartialEq)]
 enum Choice {
     /// The first Vulkan device that is exact, else the CPU.
+    First,
+    /// The one that is fastest for each job.
     Auto,
     Cpu,
     /// The first Vulkan device that is exact.
@@ -45,6 +48,7 @@ impl FromStr for Choice {
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text.to_lowercase().as_str() {
+            "first" => Self::First,
             "auto" => Self::Auto,
             "cpu" => Self::Cpu,
             "vulkan" | "gpu" => Self::Vulkan,
@@ -59,13 +63,19 @@ pub(crate) struct Opened {
     pub(crate) label: String,
     /// Another device may stand in: the bits are the same.
     automatic: bool,
+    /// Each job goes to the device that is fastest for it.
+    by_cost: bool,
 }
 
 impl DeviceArguments {
     pub(crate) fn open(&self) -> Result<Opened, Failure> {
         match &self.device {
             Choice::Cpu => self.cpu("CPU".to_owned()),
-            Choice::Auto => match self.first_exact() {
+            Choice::Auto => Ok(Opened {
+                by_cost: true,
+                ..self.cpu("CPU".to_owned())?
+            }),
+            Choice::First => match self.first_exact() {
                 Ok(engine) => Ok(Opened {
                     automatic: true,
                     ..Opened::new(engine)
@@ -100,6 +110,7 @@ impl DeviceArguments {
             engine,
             label,
             automatic: false,
+            by_cost: false,
         })
     }
 
@@ -124,6 +135,7 @@ impl Opened {
             engine,
             label,
             automatic: false,
+            by_cost: false,
         }
     }
 
@@ -146,6 +158,15 @@ impl Opened {
             Layout::TrackMajor => 1,
             Layout::FrameMajor => set.track_count(),
         };
+        if self.by_cost {
+            let samples = frames
+                .resolve(set.track_count(), set.time_span())
+                .map_err(Error::from)?
+                .len();
+            self.engine = Engine::auto(set.track_count() * samples)?;
+            self.label = self.engine.device_name().to_owned();
+            self.automatic = self.is_vulkan();
+        }
         let chunk = CHUNK.max(row);
         let mut done = 0;
         let result = self
@@ -207,7 +228,7 @@ fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> {
             let known = devices
                 .iter()
                 .map(Device::name)
-                .chain(["auto", "cpu", "vulkan"]);
+                .chain(["first", "auto", "cpu", "vulkan"]);
             let hint = words::nearest(given, known)
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default();
@@ -227,7 +248,10 @@ fn listing(devices: &[Device]) -> String {
         .enumerate()
         .map(|(index, device)| format!("  {index}  {}", device.name()))
         .collect();
-    format!("  there are: auto, cpu, vulkan, and\n{}", lines.join("\n"))
+    format!(
+        "  there are: first, auto, cpu, vulkan, and\n{}",
+        lines.join("\n")
+    )
 }
 
 fn no_vulkan(error: &VulkanError) -> Failure {

@@ -1,0 +1,121 @@
+//! The choice of a device by what it costs.
+
+use std::time::{Duration, Instant};
+
+use glam::Quat;
+
+use crate::clock::Frames;
+use crate::device::Device;
+use crate::engine::{Engine, Error};
+use crate::rotations::Layout;
+use crate::tracks::TrackSet;
+
+/// Rotations that the CPU evaluates (in 1 to 3 ms) before a device has been opened (in
+/// 50): see [`Engine::auto`].
+const FEW_FOR_A_DEVICE: usize = 1 << 20;
+
+/// Work that tells how fast a device is.
+struct Probe {
+    set: TrackSet,
+    frames: Frames,
+    rotations: usize,
+}
+
+impl Probe {
+    const TRACKS: usize = 512;
+    const FRAMES: usize = 1024;
+
+    fn new() -> Self {
+        let mut set = TrackSet::new();
+        let keys: Vec<Quat> = (0..18u8)
+            .map(|i| Quat::from_rotation_y(f32::from(i) * 0.7))
+            .collect();
+        let last = (Self::FRAMES - 1) as f64;
+        let times: Vec<f64> = (0..18u8).map(|i| last * f64::from(i) / 17.0).collect();
+        for _ in 0..Self::TRACKS {
+            set.push("", &times, &keys)
+                .expect("unit keys at increasing times");
+        }
+        Self {
+            set,
+            frames: Frames::fps(1),
+            rotations: Self::TRACKS * Self::FRAMES,
+        }
+    }
+
+    /// The shortest of three evaluations after one that does not count.
+    fn time(&self, engine: &Engine) -> Result<Duration, Error> {
+        let clip = engine.upload(&self.set, crate::method::SLERP)?;
+        let mut output = vec![Quat::IDENTITY; self.rotations];
+        let mut shortest = Duration::MAX;
+        for round in 0..4 {
+            let started = Instant::now();
+            clip.evaluate_into(&self.frames, Layout::TrackMajor, &mut output)?;
+            if round > 0 {
+                shortest = shortest.min(started.elapsed());
+            }
+        }
+        Ok(shortest)
+    }
+}
+
+impl Engine {
+    /// The device that evaluates calls of `rotations` rotations each soonest, into the
+    /// host's memory. The rule:
+    ///
+    /// * fewer than 2^20: the CPU. It has done them before a device is even open.
+    /// * Software devices never: they compute on the CPU too, and slower.
+    /// * Else every device that is exact, and the CPU, evaluate a probe; what counts is
+    ///   the shortest of three times.
+    ///
+    /// # Errors
+    /// When the system refuses what the CPU needs.
+    pub fn auto(rotations: usize) -> Result<Self, Error> {
+        let cpu = Self::new(Device::Cpu)?;
+        if rotations < FEW_FOR_A_DEVICE {
+            return Ok(cpu);
+        }
+        let devices = Device::list().unwrap_or_default();
+        let mut others = devices
+            .into_iter()
+            .filter(|device| !device.is_software())
+            .filter_map(|device| Self::new(device).ok())
+            .peekable();
+        if others.peek().is_none() {
+            return Ok(cpu);
+        }
+        let probe = Probe::new();
+        let mut best = (probe.time(&cpu)?, cpu);
+        for engine in others {
+            // One that fails is not chosen.
+            if let Ok(time) = probe.time(&engine)
+                && time < best.0
+            {
+                best = (time, engine);
+            }
+        }
+        Ok(best.1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wherever the tests run: a small job goes to the CPU, a large one never to a
+    /// device that is one.
+    #[test]
+    fn nothing_slower_than_the_cpu_is_chosen() {
+        let small = Engine::auto(2000).unwrap();
+        assert!(small.device_info().is_none());
+        let large = Engine::auto(usize::MAX).unwrap();
+        let software = |info: &crate::DeviceInfo| info.kind == crate::DeviceKind::Cpu;
+        assert!(!large.device_info().is_some_and(software));
+    }
+
+    #[test]
+    fn the_probe_can_be_evaluated() {
+        let cpu = Engine::new(Device::Cpu).unwrap();
+        assert!(Probe::new().time(&cpu).unwrap() > Duration::ZERO);
+    }
+}
