@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Every test, on this machine as on CI. Installs what the tests need where it is
-# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val.
+# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val, and
+# valgrind, which counts instructions.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -8,18 +9,21 @@ has_driver() { compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null; }
 has_layer() { compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null; }
 has_loader() { ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'; }
 
-if ! has_driver || ! has_layer || ! has_loader || ! command -v spirv-val >/dev/null; then
+if ! has_driver || ! has_layer || ! has_loader || ! command -v spirv-val >/dev/null ||
+    ! command -v valgrind >/dev/null; then
     if command -v apt-get >/dev/null; then
         sudo=""
         [ "$(id -u)" -eq 0 ] || sudo="sudo"
-        echo "installing lavapipe, the validation layer and spirv-tools" >&2
+        echo "installing lavapipe, the validation layer, spirv-tools and valgrind" >&2
         $sudo apt-get update -qq
         DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
-            libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools >/dev/null
+            libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools valgrind \
+            >/dev/null
     else
-        echo "the tests want a Vulkan loader, lavapipe, VK_LAYER_KHRONOS_validation and spirv-val;" >&2
-        echo "install your system's packages for them (Debian: libvulkan1 mesa-vulkan-drivers" >&2
-        echo "vulkan-validationlayers spirv-tools). Tests without them say so and compare nothing." >&2
+        echo "the tests want a Vulkan loader, lavapipe, VK_LAYER_KHRONOS_validation, spirv-val and" >&2
+        echo "valgrind; install your system's packages for them (Debian: libvulkan1" >&2
+        echo "mesa-vulkan-drivers vulkan-validationlayers spirv-tools valgrind). Tests without" >&2
+        echo "them say so and compare nothing." >&2
     fi
 fi
 
@@ -35,4 +39,5 @@ if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --all-targets --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --quiet
+cargo test --release --test cost
 cargo test

@@ -1,0 +1,92 @@
+//! What a rotation and a key cost, in instructions: counted, not timed, so that a
+//! loop that is no longer vectorised is found on any machine. Of the release build:
+//! checks for overflow keep loops scalar.
+#![cfg(all(target_arch = "x86_64", not(debug_assertions)))]
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use tumble::VectorWidth;
+
+/// Instructions that `tumble` executes to evaluate a file, on one thread; nothing
+/// where valgrind is not installed, which in CI it must be.
+fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64> {
+    let run = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(env!("CARGO_BIN_EXE_tumble"))
+        .arg("eval")
+        .arg(file)
+        .args(["-m", method, "--fps", &fps.to_string(), "--device", "cpu"])
+        .args(["-o", "-"])
+        .env("RAYON_NUM_THREADS", "1")
+        .env("TUMBLE_VECTOR_WIDTH", width)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .and_then(Child::wait_with_output);
+    let output = match run {
+        Ok(output) => output,
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "valgrind: {error}");
+            eprintln!("valgrind: {error}: this test counted nothing");
+            return None;
+        }
+    };
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{words}");
+    let count = words
+        .lines()
+        .find_map(|line| line.split("Collected : ").nth(1));
+    Some(count.expect(&words).trim().parse().expect("a number"))
+}
+
+const TRACKS: u64 = 32;
+
+fn generate(folder: &Path, keys: u32) -> std::path::PathBuf {
+    let file = folder.join(format!("{keys}.dat"));
+    let run = Command::new(env!("CARGO_BIN_EXE_tumble"))
+        .args(["generate", "--boxes", &TRACKS.to_string(), "--random"])
+        .args(["--keys", &keys.to_string(), "--seconds", "20", "-o"])
+        .arg(&file)
+        .output()
+        .unwrap();
+    assert!(run.status.success());
+    file
+}
+
+/// Bounds are a quarter above what was counted when they were set.
+#[test]
+fn rotations_and_keys_cost_no_more_than_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let (few, many) = (generate(folder.path(), 26), generate(folder.path(), 260));
+    let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
+    let bounds = [
+        ("baseline", [36.0, 64.0], 3000.0),
+        ("avx2", [19.0, 36.0], 2000.0),
+    ];
+    for (width, a_rotation, a_key) in bounds {
+        if width == "avx2" && !has_avx2 {
+            eprintln!("no AVX2 here: not counted");
+            continue;
+        }
+        let mut per_keys = Vec::new();
+        for (method, bound) in ["slerp", "bessel-overhauser"].into_iter().zip(a_rotation) {
+            let count = |file, fps| instructions(file, method, fps, width);
+            let (Some(coarse), Some(fine), Some(dense)) =
+                (count(&few, 60), count(&few, 240), count(&many, 60))
+            else {
+                return;
+            };
+            let rotations = TRACKS * 20 * (240 - 60);
+            let each = (fine - coarse) as f64 / rotations as f64;
+            println!("{width}, {method}: {each:.1} instructions a rotation");
+            assert!(each < bound, "{width}, {method}: {each:.1} a rotation");
+            per_keys.push((dense - coarse) as f64);
+        }
+        // What both spend on a key (reading text, most of all) is not counted.
+        let keys = (TRACKS * (260 - 26)) as f64;
+        let each = (per_keys[1] - per_keys[0]) / keys;
+        println!("{width}: {each:.0} instructions a key more for a cubic than for an arc");
+        assert!(each < a_key, "{width}: {each:.0} a key");
+    }
+}
