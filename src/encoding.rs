@@ -1,5 +1,7 @@
 //! How a result is stored: f32, or half of the bytes.
 
+use crate::cpu::{InLanes, in_lanes, to_half, to_snorm};
+
 /// What a component of a rotation becomes. The shorter ones are converted where the
 /// rotations are evaluated, so that only half of the bytes are moved; with the same
 /// bits on every device.
@@ -37,8 +39,8 @@ impl Encoding {
         assert_eq!(output.len(), rotations.len() * self.bytes());
         match self {
             Self::F32 => output.copy_from_slice(bytemuck::cast_slice(rotations)),
-            Self::F16 => encode(rotations, output, crate::cpu::to_half),
-            Self::Snorm16 => encode(rotations, output, crate::cpu::to_snorm),
+            Self::F16 => in_lanes(&mut Halves(components(rotations), output)),
+            Self::Snorm16 => in_lanes(&mut WholeNumbers(components(rotations), output)),
         }
     }
 
@@ -60,11 +62,31 @@ impl Encoding {
     }
 }
 
-#[inline(always)]
-fn encode(rotations: &[[f32; 4]], output: &mut [u8], convert: impl Fn(f32) -> u16) {
-    for (rotation, bytes) in rotations.iter().zip(output.chunks_exact_mut(8)) {
-        let components = rotation.map(&convert);
-        bytes.copy_from_slice(bytemuck::bytes_of(&components));
+fn components(rotations: &[[f32; 4]]) -> &[f32] {
+    rotations.as_flattened()
+}
+
+/// From and to.
+struct Halves<'a>(&'a [f32], &'a mut [u8]);
+
+impl InLanes for Halves<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
+            bytes.copy_from_slice(&to_half(value).to_ne_bytes());
+        }
+    }
+}
+
+/// From and to.
+struct WholeNumbers<'a>(&'a [f32], &'a mut [u8]);
+
+impl InLanes for WholeNumbers<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
+            bytes.copy_from_slice(&to_snorm(value).to_ne_bytes());
+        }
     }
 }
 
@@ -97,9 +119,9 @@ mod tests {
                 (middle.next_up(), half + 1),
                 (high, half + 1),
             ] {
-                let stored = crate::cpu::to_half(value);
+                let stored = to_half(value);
                 assert_eq!(stored, expected, "{value}");
-                assert_eq!(crate::cpu::to_half(-value), expected | 0x8000);
+                assert_eq!(to_half(-value), expected | 0x8000);
             }
         }
     }
@@ -108,13 +130,13 @@ mod tests {
     fn whole_numbers_are_the_nearest() {
         for n in -32767..=32767i32 {
             let value = n as f32 / 32767.0;
-            assert_eq!(crate::cpu::to_snorm(value), n as i16 as u16);
+            assert_eq!(to_snorm(value), n as i16 as u16);
             let off = (f64::from(n) + 0.49) / 32767.0;
-            assert_eq!(crate::cpu::to_snorm(off as f32), n as i16 as u16);
+            assert_eq!(to_snorm(off as f32), n as i16 as u16);
         }
         // A component may pass 1 by rounding.
-        assert_eq!(crate::cpu::to_snorm(1.000_000_4), 32767);
-        assert_eq!(crate::cpu::to_snorm(-1.000_000_4), -32767i16 as u16);
+        assert_eq!(to_snorm(1.000_000_4), 32767);
+        assert_eq!(to_snorm(-1.000_000_4), -32767i16 as u16);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 use super::evaluate::Evaluate;
 use super::row::row;
 use crate::clock::{FramesError, Timeline};
-use crate::prepare::{InLanes, PartRef};
+use crate::prepare::PartRef;
 use crate::segment::{ArcSegment, PolynomialSegment};
 
 /// Vector instructions that the twins can be compiled for.
@@ -159,6 +159,12 @@ impl Kernels {
             },
         }
     }
+}
+
+/// Work over lanes: `run` is compiled for each vector width. Implementations are
+/// `#[inline(always)]`, and have no branches, calls or intrinsics in their loops.
+pub(crate) trait InLanes {
+    fn run(&mut self);
 }
 
 /// Does work over lanes with the widest vectors there are.

@@ -12,9 +12,9 @@ mod sine_cosine;
 mod store_f16;
 mod store_snorm16;
 
-pub(crate) use dispatch::in_lanes;
 #[cfg(test)]
 pub(crate) use dispatch::tests::at_every_width;
+pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
 pub(crate) use sine_cosine::sine_and_fall;

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use super::{InLanes, NONE, Part, Prepared, Source};
+use super::{NONE, Part, Prepared, Source};
 use crate::branchless::{arc_tangent, dot, norm, unit};
-use crate::cpu::in_lanes;
+use crate::cpu::{InLanes, in_lanes};
 use crate::method::{Ends, Interpolation, InterpolationError, Path};
 use crate::numeric::{canonical, round_f32};
 use crate::segment::{ArcSegment, Segments};

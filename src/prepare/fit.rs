@@ -7,9 +7,10 @@
 //! their sum, that of a power found directly would not.
 
 use super::cubic::{Cubic, Piece};
-use super::intervals::{InLanes, Intervals, LANES};
+use super::intervals::{Intervals, LANES};
 use super::nodes::{EVEN_POWERS, FULL_NODES, GENTLE_NODES, Nodes, ODD_POWERS};
 use super::sample::{Differences, Expanded};
+use crate::cpu::InLanes;
 use crate::method::Basis;
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;

@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use super::cubic::{Cubic, Piece};
 use crate::branchless::{self, Algebra, Anywhere, Near, Quaternion, Vector, product, scaled};
+use crate::cpu::InLanes;
 use crate::method::Basis;
 use crate::tracks::Track;
 
@@ -22,12 +23,6 @@ const ROOM: usize = LANES + 8;
 
 /// A number of each interval.
 pub(crate) type Lane = [f64; ROOM];
-
-/// Work over lanes: `run` is compiled for each vector width. Implementations are
-/// `#[inline(always)]`, and have no branches, calls or intrinsics in their loops.
-pub(crate) trait InLanes {
-    fn run(&mut self);
-}
 
 /// Some consecutive intervals of a track in a block.
 #[derive(Debug, Clone)]

@@ -17,8 +17,8 @@ mod set;
 pub(crate) use clip_data::{ClipData, PartRef};
 pub(crate) use cubic::Cubic;
 pub(crate) use intervals::{
-    BetweenHandles, BetweenNeighbours, HandleRule, Handles, InLanes, Interval, Intervals,
-    KeyHandles, Stretch,
+    BetweenHandles, BetweenNeighbours, HandleRule, Handles, Interval, Intervals, KeyHandles,
+    Stretch,
 };
 pub(crate) use set::Preparation;
 

@@ -1,0 +1,68 @@
+//! Parts of an evaluation, each alone: `cargo bench`. For comparisons with others, and
+//! of whole evaluations, see `tumble bench` and `benches/peers`.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use glam::Quat;
+use tumble::{Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, TrackSet};
+
+fn main() {
+    divan::main();
+}
+
+const TRACKS: usize = 256;
+const KEYS: usize = 26;
+
+/// Tracks whose keys turn by about `step` radians from one to the next.
+fn set(step: f32) -> TrackSet {
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..KEYS).map(|i| i as f64 + 0.3 * (i % 3) as f64).collect();
+    for track in 0..TRACKS {
+        let key = |i: usize| {
+            let turn = step * (i as f32 + (i as f32 + track as f32).sin());
+            Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.4 * turn.cos())
+        };
+        let keys: Vec<Quat> = (0..KEYS).map(key).collect();
+        set.push("", &times, &keys).expect("unit keys in order");
+    }
+    set
+}
+
+fn one_thread() -> Engine {
+    let mut options = EngineOptions::default();
+    options.threads = Some(1);
+    Engine::with_options(Device::Cpu, &options).expect("a CPU")
+}
+
+/// Keys to segments, per key; steps of 3 degrees are motion capture's, of 60 an
+/// animator's.
+#[divan::bench(args = [0.05, 1.0])]
+fn prepare(bencher: Bencher<'_, '_>, step: f32) {
+    let (engine, set) = (one_thread(), set(step));
+    bencher
+        .counter(ItemsCount::new(TRACKS * KEYS))
+        .bench(|| engine.upload(&set, METHODS[2]));
+}
+
+/// Segments to rotations, per rotation, for each method.
+#[divan::bench(args = METHODS.map(|method| method.name))]
+fn evaluate(bencher: Bencher<'_, '_>, method: &str) {
+    let method = tumble::Method::named(method).expect("in the list");
+    let clip = one_thread().upload(&set(1.0), method).expect("good keys");
+    let frames = Frames::fps(40);
+    let rotations = TRACKS * clip.timeline(&frames).expect("frames").len();
+    let mut output = vec![Quat::IDENTITY; rotations];
+    bencher
+        .counter(ItemsCount::new(rotations))
+        .bench_local(|| clip.evaluate_into(&frames, Layout::TrackMajor, &mut output));
+}
+
+/// f32 to shorter rotations, per rotation.
+#[divan::bench(args = [Encoding::F16, Encoding::Snorm16])]
+fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
+    let rotations = vec![[0.5, -0.5, 0.1, 0.7]; 1 << 14];
+    let mut output = vec![0; rotations.len() * encoding.bytes()];
+    bencher
+        .counter(ItemsCount::new(rotations.len()))
+        .bench_local(|| encoding.encode(divan::black_box(&rotations), &mut output));
+}
