@@ -143,7 +143,7 @@ const ARC_TANGENT: [f64; 11] = [
 
 /// The arc tangent of `t`, 0 <= t <= 1, within 5e-16 of it, relative.
 #[inline(always)]
-pub(crate) fn arc_tangent(t: f64) -> f64 {
+fn arc_tangent(t: f64) -> f64 {
     // That of half the angle, twice: a wild tangent multiplies an angle's error.
     let half = t / (1.0 + (1.0 + t * t).sqrt());
     let z = half * half;
@@ -313,6 +313,13 @@ fn one_plus<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
     sum * x + 1.0
 }
 
+/// `x / sin(x)` for `u = 1 - cos(x)`, 0 <= x <= pi/2: an angle from its sine without
+/// an arc function.
+#[inline(always)]
+pub(crate) fn angle_by_sine(u: f64) -> f64 {
+    one_plus(&ANGLE_BY_SINE, u)
+}
+
 impl Near {
     #[inline(always)]
     pub(crate) fn new() -> Self {
@@ -340,7 +347,7 @@ impl Algebra for Near {
     fn log(&mut self, q: Quaternion) -> Vector {
         let u = 1.0 - q[3];
         self.check(u, 1.0);
-        scaled([q[0], q[1], q[2]], one_plus(&ANGLE_BY_SINE, u))
+        scaled([q[0], q[1], q[2]], angle_by_sine(u))
     }
 
     #[inline(always)]

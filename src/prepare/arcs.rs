@@ -3,10 +3,11 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
 use glam::Quat;
 
 use super::{NONE, Part, Prepared, Source};
-use crate::branchless::{arc_tangent, dot, norm, unit};
+use crate::branchless::{angle_by_sine, dot, norm, unit};
 use crate::cpu::{InLanes, in_lanes};
 use crate::method::{Ends, Interpolation, InterpolationError, Path};
 use crate::numeric::{canonical, round_f32};
@@ -28,14 +29,23 @@ pub(crate) struct ArcBlock {
     noise: f64,
     /// Inner products of the two keys.
     dots: [f64; LANES],
-    /// -1 where the second key counts with the other sign.
-    flips: [f32; LANES],
     angles: [f64; LANES],
     middles: [[f32; LANES]; 4],
     partners: [[f32; LANES]; 4],
+    /// The sign of each interval's first key after those before it in its track.
+    signs: [f32; LANES],
+    /// With their signs, and a lane's components together.
+    signed_middles: [[f32; 4]; LANES],
+    signed_partners: [[f32; 4]; LANES],
 }
 
 impl ArcBlock {
+    /// Lanes to work out: whole vectors of them.
+    #[inline(always)]
+    fn whole(&self) -> usize {
+        self.count.next_multiple_of(16).min(LANES)
+    }
+
     fn new(noise: f64) -> Self {
         Self {
             from: [[0.0; 4]; LANES],
@@ -44,10 +54,12 @@ impl ArcBlock {
             count: 0,
             noise,
             dots: [0.0; LANES],
-            flips: [0.0; LANES],
             angles: [0.0; LANES],
             middles: [[0.0; LANES]; 4],
             partners: [[0.0; LANES]; 4],
+            signs: [1.0; LANES],
+            signed_middles: [[0.0; 4]; LANES],
+            signed_partners: [[0.0; 4]; LANES],
         }
     }
 }
@@ -58,12 +70,11 @@ impl InLanes for ArcBlock {
     fn run(&mut self) {
         let noise = self.noise;
         // Arrays of its own: the compiler must see that they do not overlap.
-        let (from, to) = (self.from, self.to);
+        let (from, to) = (&self.from, &self.to);
         let (mut dots, mut angles) = ([0.0; LANES], [0.0; LANES]);
-        let mut flips = [0.0; LANES];
         let [mut mx, mut my, mut mz, mut mw] = [[0.0; LANES]; 4];
         let [mut px, mut py, mut pz, mut pw] = [[0.0; LANES]; 4];
-        for j in 0..self.count.min(LANES) {
+        for j in 0..self.whole() {
             let a = unit(from[j]);
             let b = unit(to[j]);
             let dot = dot(a, b);
@@ -75,10 +86,8 @@ impl InLanes for ArcBlock {
             // loses half of the digits of a small one.
             let cosine = norm(sum);
             let chord = norm(difference);
-            let t = chord / (2.0 + cosine);
             dots[j] = dot;
-            flips[j] = flip as f32;
-            angles[j] = 4.0 * arc_tangent(t);
+            angles[j] = chord * angle_by_sine(1.0 - 0.5 * cosine);
             let to_unit = 1.0 / cosine;
             // Equal keys have no plane; with an angle of 0 any partner will do.
             let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
@@ -91,10 +100,41 @@ impl InLanes for ArcBlock {
             pz[j] = round_f32(difference[2] * to_partner);
             pw[j] = round_f32(difference[3] * to_partner);
         }
-        (self.dots, self.flips, self.angles) = (dots, flips, angles);
+        (self.dots, self.angles) = (dots, angles);
         self.middles = [mx, my, mz, mw];
         self.partners = [px, py, pz, pw];
     }
+}
+
+/// Gives every lane its sign.
+struct Signed<'a>(&'a mut ArcBlock);
+
+impl InLanes for Signed<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let count = self.0.whole();
+        let (mut middles, mut partners) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+        let signs = &self.0.signs;
+        let [x, y, z, w] = &self.0.middles;
+        for j in 0..count {
+            middles[j] = signed(signs[j], [x[j], y[j], z[j], w[j]]);
+        }
+        let [x, y, z, w] = &self.0.partners;
+        for j in 0..count {
+            partners[j] = signed(signs[j], [x[j], y[j], z[j], w[j]]);
+        }
+        (self.0.signed_middles, self.0.signed_partners) = (middles, partners);
+    }
+}
+
+#[inline(always)]
+fn signed(sign: f32, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
+    [
+        canonical(x * sign),
+        canonical(y * sign),
+        canonical(z * sign),
+        canonical(w * sign),
+    ]
 }
 
 /// Prepares arcs; its block is made once for many tracks.
@@ -195,34 +235,35 @@ impl ArcPreparation {
 
     fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
         in_lanes(&mut self.block);
-        let block = &self.block;
-        let Segments::Arc(segments) = &mut prepared.segments else {
-            unreachable!("the method's form")
-        };
+        let block = &mut self.block;
+        let count = block.count;
         let refused = |&dot: &f64| self.path.refuses(dot);
-        if let Some(lane) = block.dots[..block.count].iter().position(refused) {
+        if let Some(lane) = block.dots[..count].iter().position(refused) {
             let (track, key) = block.places[lane];
             return Err(InterpolationError::Antipodal { track, key });
         }
-        let mut sign = self.sign;
-        segments.extend((0..block.count).map(|lane| {
+        for lane in 0..count {
             if block.places[lane].1 == 0 {
-                sign = 1.0;
+                self.sign = 1.0;
             }
-            let signed = |components: &[[f32; LANES]; 4]| {
-                [0, 1, 2, 3].map(|i| canonical(components[i][lane] * sign))
-            };
-            let segment = ArcSegment {
-                middle: signed(&block.middles),
-                partner: signed(&block.partners),
-            };
-            sign *= block.flips[lane];
-            segment
-        }));
-        self.sign = sign;
-        let angles = &block.angles[..block.count];
+            block.signs[lane] = self.sign;
+            if block.dots[lane] < block.noise {
+                self.sign = -self.sign;
+            }
+        }
+        in_lanes(&mut Signed(block));
+        let Segments::Arc(segments) = &mut prepared.segments else {
+            unreachable!("the method's form")
+        };
+        let start = segments.len();
+        segments.resize(start + count, ArcSegment::zeroed());
+        let middles = block.signed_middles.iter().zip(&block.signed_partners);
+        for (segment, (&middle, &partner)) in segments[start..].iter_mut().zip(middles) {
+            *segment = ArcSegment { middle, partner };
+        }
+        let angles = &block.angles[..count];
         prepared.spans.extents.extend_from_slice(angles);
-        self.block.count = 0;
+        block.count = 0;
         Ok(())
     }
 }
@@ -250,11 +291,13 @@ mod tests {
             in_lanes(&mut block);
             let components = [block.middles, block.partners].concat();
             let bits: Vec<u32> = components.concat().iter().map(|c| c.to_bits()).collect();
-            (bits, block.angles.map(f64::to_bits), block.flips)
+            let dots = block.dots.map(f64::to_bits);
+            (bits, block.angles.map(f64::to_bits), dots)
         };
         let results = at_every_width(filled);
         let (_, expected) = &results[0];
-        assert!(expected.2.contains(&-1.0) && expected.2.contains(&1.0));
+        let negative = |&bits: &u64| f64::from_bits(bits) < 0.0;
+        assert!(expected.2.iter().any(negative) && !expected.2.iter().all(negative));
         for (width, found) in &results {
             assert!(found == expected, "{width:?}");
         }
