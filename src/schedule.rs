@@ -250,6 +250,7 @@ impl Prepared {
         }
     }
 
+    #[inline(always)]
     fn time_source(&self, span: usize, end: f64) -> RunSource {
         let start = self.spans.starts[span];
         let seconds = end - start;

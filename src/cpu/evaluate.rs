@@ -6,7 +6,7 @@ use crate::segment::shader::TINY_BITS;
 const BLOCK: usize = 16;
 
 /// So few samples are evaluated one by one: a block would be mostly waste.
-const FEW: usize = 3;
+pub(super) const FEW: usize = 3;
 
 /// Samples whose components are kept before they are stored.
 pub(super) const CHUNK: usize = 4 * BLOCK;
@@ -67,6 +67,18 @@ pub(super) fn distances<S: Evaluate>(
     run(segment, affine, distances.len(), distance, scratch, output);
 }
 
+/// Evaluates the sample at a distance from the middle.
+#[inline(always)]
+pub(super) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
+    let q = segment.evaluate(distance * affine.scale + affine.offset);
+    [
+        canonical(q[0]),
+        canonical(q[1]),
+        canonical(q[2]),
+        canonical(q[3]),
+    ]
+}
+
 /// Components side by side, so that lanes run along samples and the compiler
 /// vectorises the whole formula. The number of samples is kept a variable on
 /// purpose: a constant one is unrolled first and then vectorised across the four
@@ -82,14 +94,7 @@ fn run<S: Evaluate>(
 ) {
     if count <= FEW {
         for (j, rotation) in output[..count].iter_mut().enumerate() {
-            let parameter = distance(j as u32) * affine.scale + affine.offset;
-            let q = segment.evaluate(parameter);
-            *rotation = [
-                canonical(q[0]),
-                canonical(q[1]),
-                canonical(q[2]),
-                canonical(q[3]),
-            ];
+            *rotation = one(segment, affine, distance(j as u32));
         }
         return;
     }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::evaluate::{Affine, CHUNK, Evaluate, Scratch, distances, frames};
+use super::evaluate::{Affine, CHUNK, Evaluate, FEW, Scratch, distances, frames, one};
 use crate::clock::{FramesError, Timeline};
 use crate::numeric::round_f32;
 use crate::prepare::PartRef;
@@ -20,6 +20,16 @@ pub(super) fn row<S: Evaluate>(
     output: &mut [[f32; 4]],
 ) -> Result<(), FramesError> {
     let first = samples.start;
+    if samples.len() <= FEW {
+        let mut row = ShortRow {
+            part: PartRef { prepared, part },
+            segments,
+            timeline,
+            first,
+            output,
+        };
+        return prepared.runs(part, timeline, samples, &mut row);
+    }
     let mut row = Row {
         part: PartRef { prepared, part },
         segments,
@@ -88,6 +98,52 @@ impl<S: Evaluate> Emit for Row<'_, S> {
                     *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
                 }
             }
+        }
+    }
+}
+
+/// A few samples, one by one: nothing is prepared for many.
+struct ShortRow<'a, S> {
+    part: PartRef<'a>,
+    segments: &'a [S],
+    timeline: &'a Timeline,
+    /// The sample that `output` starts with.
+    first: usize,
+    output: &'a mut [[f32; 4]],
+}
+
+impl<S: Evaluate> Emit for ShortRow<'_, S> {
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        let PartRef { prepared, part } = self.part;
+        let output = &mut self.output[run.sample - self.first..][..run.count];
+        for (sample, rotation) in (run.sample..).zip(output) {
+            *rotation = match run.source {
+                RunSource::Constant(index) => prepared.constants[index as usize],
+                RunSource::Segment {
+                    index,
+                    distance,
+                    scale,
+                    offset,
+                } => {
+                    let distance = match distance {
+                        Distance::Frames { first } => {
+                            first.wrapping_add((sample - run.sample) as i32) as f32
+                        }
+                        Distance::Seconds { middle } => {
+                            round_f32(self.timeline.time(part.track, sample) - middle)
+                        }
+                    };
+                    one(
+                        &self.segments[index as usize],
+                        Affine { scale, offset },
+                        distance,
+                    )
+                }
+                RunSource::Exact { index, parameter } => {
+                    prepared.exact(index, parameter, self.timeline, part.track, sample)
+                }
+            };
         }
     }
 }

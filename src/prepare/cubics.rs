@@ -114,14 +114,19 @@ impl CubicPreparation {
             after: held(intervals.end == all, last_key),
         });
         let looped = matches!(self.interpolation.ends, Ends::Loop);
+        // Two keys are joined by constant velocity, whatever lies beside them.
+        let alone = all == 1 && self.interpolation.method.interpolates;
+        let context = if alone { 0 } else { CONTEXT };
         let mut from = intervals.start;
         while from < intervals.end {
             let left = intervals.end - from;
-            if self.intervals.count + CONTEXT + left.min(SHORTEST) > LANES {
+            if self.intervals.count + context + left.min(SHORTEST) > LANES {
                 self.flush(prepared)?;
             }
-            let to = from + left.min(LANES - CONTEXT - self.intervals.count);
-            self.neighbour(track, from.checked_sub(1).or(looped.then_some(all - 1)));
+            let to = from + left.min(LANES - context - self.intervals.count);
+            if context > 0 {
+                self.neighbour(track, from.checked_sub(1).or(looped.then_some(all - 1)));
+            }
             self.stretches.push(Stretch {
                 lane: self.intervals.count,
                 intervals: from..to,
@@ -137,9 +142,9 @@ impl CubicPreparation {
             for i in from..to {
                 self.intervals.push(track, i);
             }
-            self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
-            // Where the last interval ends, whatever follows it.
-            self.intervals.starts[self.intervals.count - 1] = track.times[to];
+            if context > 0 {
+                self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
+            }
             from = to;
         }
         Ok(())
@@ -188,7 +193,7 @@ impl CubicPreparation {
                 let place = Place {
                     part: stretch.part,
                     start: self.intervals.starts[lane],
-                    end: self.intervals.starts[lane + 1],
+                    end: self.intervals.ends[lane],
                     key,
                 };
                 let is_empty = |clock: FrameClock| {

@@ -64,8 +64,9 @@ pub(crate) struct Intervals {
     /// Keys at both ends, as stored.
     from: [[f32; 4]; ROOM],
     to: [[f32; 4]; ROOM],
-    /// Where it starts, and how long it is; seconds.
+    /// Where it starts and ends, and how long it is; seconds.
     pub(super) starts: Lane,
+    pub(super) ends: Lane,
     durations: Lane,
     pub(super) count: usize,
     /// Dot products below this turn the second key's sign.
@@ -97,6 +98,7 @@ impl Intervals {
             from: [identity; ROOM],
             to: [identity; ROOM],
             starts: lane,
+            ends: lane,
             durations: [1.0; ROOM],
             count: 0,
             noise,
@@ -118,6 +120,7 @@ impl Intervals {
         self.from[lane] = track.keys[i].to_array();
         self.to[lane] = track.keys[i + 1].to_array();
         self.starts[lane] = track.times[i];
+        self.ends[lane] = track.times[i + 1];
         self.durations[lane] = track.times[i + 1] - track.times[i];
         self.count += 1;
     }
