@@ -11,7 +11,9 @@ use crate::segment::PolynomialSegment;
 
 /// Cuts curves; what it needs for that is kept.
 pub(super) struct Cutter {
-    block: FitBlock,
+    basis: &'static Basis,
+    /// Made when there is something to cut.
+    block: Option<Box<FitBlock>>,
     waiting: Vec<Part>,
     /// The parts of every curve given, in order of intervals and time.
     parts: Vec<Part>,
@@ -30,7 +32,8 @@ pub(super) struct Part {
 impl Cutter {
     pub(super) fn new(basis: &'static Basis) -> Self {
         Self {
-            block: FitBlock::new(basis, Tier::Full),
+            basis,
+            block: None,
             waiting: Vec::new(),
             parts: Vec::new(),
         }
@@ -53,13 +56,17 @@ impl Cutter {
         while !self.waiting.is_empty() {
             let first = self.waiting.len().saturating_sub(LANES);
             let now = self.waiting.split_off(first);
-            self.block.clear();
-            now.iter().for_each(|part| self.block.push(&part.cubic));
-            in_lanes(&mut self.block);
+            let mut block = match self.block.take() {
+                Some(block) => block,
+                None => Box::new(FitBlock::new(self.basis, Tier::Full)),
+            };
+            block.clear();
+            now.iter().for_each(|part| block.push(&part.cubic));
+            in_lanes(&mut *block);
             for (lane, part) in now.into_iter().enumerate() {
-                if self.block.fits(lane) {
+                if block.fits(lane) {
                     let mut segment = PolynomialSegment::zeroed();
-                    self.block.write(lane, &mut segment);
+                    block.write(lane, &mut segment);
                     let segment = Some(segment);
                     self.parts.push(Part { segment, ..part });
                 } else if part.cubic.piece.is_finest() {
@@ -68,6 +75,7 @@ impl Cutter {
                     self.push(part.interval, part.cubic);
                 }
             }
+            self.block = Some(block);
         }
         self.parts
             .sort_unstable_by_key(|part| (part.interval, part.cubic.piece.from));

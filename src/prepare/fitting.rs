@@ -45,26 +45,19 @@ enum CurveSource {
 }
 
 /// Curves that wait for a block to fill, and which intervals they are of.
+#[derive(Default)]
 struct Queue {
-    block: FitBlock,
+    /// Made when there is a curve for it: to make one takes longer than to fit few.
+    block: Option<Box<FitBlock>>,
     intervals: Vec<usize>,
-}
-
-impl Queue {
-    fn new(basis: &'static Basis, tier: Tier) -> Self {
-        Self {
-            block: FitBlock::new(basis, tier),
-            intervals: Vec::new(),
-        }
-    }
 }
 
 impl Fitting {
     pub(super) fn new(basis: &'static Basis) -> Self {
         Self {
             basis,
-            gentle: Queue::new(basis, Tier::Gentle),
-            full: Queue::new(basis, Tier::Full),
+            gentle: Queue::default(),
+            full: Queue::default(),
             cutter: Cutter::new(basis),
             intervals: Vec::new(),
         }
@@ -100,8 +93,10 @@ impl Fitting {
             Tier::Full => &mut self.full,
         };
         queue.intervals.push(interval);
-        queue.block.push_from(curves, lane);
-        if queue.block.is_full() {
+        let new = || Box::new(FitBlock::new(self.basis, tier));
+        let block = queue.block.get_or_insert_with(new);
+        block.push_from(curves, lane);
+        if block.is_full() {
             self.run(tier, prepared);
         }
     }
@@ -112,21 +107,24 @@ impl Fitting {
             Tier::Gentle => &mut self.gentle,
             Tier::Full => &mut self.full,
         };
-        in_lanes(&mut queue.block);
+        let Some(block) = &mut queue.block else {
+            return;
+        };
+        in_lanes(&mut **block);
         let segments = polynomials(prepared);
         for (lane, interval) in queue.intervals.drain(..).enumerate() {
             let source = &mut self.intervals[interval].source;
             let CurveSource::Segment(segment) = *source else {
                 continue;
             };
-            if tier == Tier::Gentle || queue.block.fits(lane) {
-                queue.block.write(lane, &mut segments[segment as usize]);
+            if tier == Tier::Gentle || block.fits(lane) {
+                block.write(lane, &mut segments[segment as usize]);
             } else {
                 *source = CurveSource::Parts(Some(segment));
-                self.cutter.push(interval, queue.block.cubic(lane));
+                self.cutter.push(interval, block.cubic(lane));
             }
         }
-        queue.block.clear();
+        block.clear();
     }
 
     /// Fits what still waits, and appends the spans of all intervals given.
