@@ -5,6 +5,8 @@
 //! one f32 distance from that middle), so a frame 24 hours into a set is as exact
 //! as the first.
 
+use std::sync::Arc;
+
 use crate::frame_rate::FrameRate;
 
 /// More samples of one track than this are refused.
@@ -36,8 +38,8 @@ enum Request {
         start: Option<f64>,
         end: Option<f64>,
     },
-    Shared(Vec<f64>),
-    PerTrack(Vec<f64>),
+    Shared(Arc<[f64]>),
+    PerTrack(Arc<[f64]>),
 }
 
 /// Why samples were refused.
@@ -132,14 +134,14 @@ impl Frames {
     /// Explicit times, seconds, the same for every track, in any order.
     pub fn at(times: Vec<f64>) -> Self {
         Self {
-            request: Request::Shared(times),
+            request: Request::Shared(times.into()),
         }
     }
 
     /// Explicit times of each track's own, one track after another.
     pub fn at_each(times: Vec<f64>) -> Self {
         Self {
-            request: Request::PerTrack(times),
+            request: Request::PerTrack(times.into()),
         }
     }
 
@@ -180,7 +182,7 @@ impl Frames {
                 check_size(tracks, times.len() as f64)?;
                 (
                     Ticks::Times {
-                        times: times.clone(),
+                        times: Arc::clone(times),
                         stride: 0,
                     },
                     times.len(),
@@ -197,7 +199,7 @@ impl Frames {
                 let stride = times.len() / tracks;
                 (
                     Ticks::Times {
-                        times: times.clone(),
+                        times: Arc::clone(times),
                         stride,
                     },
                     stride,
@@ -234,7 +236,7 @@ pub(crate) enum Ticks {
     Frames { rate: FrameRate, start: f64 },
     /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
     /// one list for all tracks.
-    Times { times: Vec<f64>, stride: usize },
+    Times { times: Arc<[f64]>, stride: usize },
 }
 
 impl Timeline {
@@ -252,7 +254,7 @@ impl Timeline {
     pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
         let mut own = self.clone();
         if let Ticks::Times { times, stride: 1.. } = &mut own.ticks {
-            *times = times[tracks.start * self.count..tracks.end * self.count].to_vec();
+            *times = times[tracks.start * self.count..tracks.end * self.count].into();
         }
         own
     }

@@ -7,7 +7,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{Frames, FramesError, Timeline};
-use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth};
+use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
@@ -270,13 +270,17 @@ impl Engine {
         layout: Layout,
     ) -> Result<Rotations, Error> {
         let interpolation = interpolation.into();
-        if self.pieces(set, &interpolation).len() == 1 && !self.is_fused(set, layout) {
+        let tracks = set.track_count();
+        let timeline = frames.resolve(tracks, set.time_span())?;
+        let samples = timeline.len();
+        let on_cpu = matches!(*self.backend, Backend::Cpu(_));
+        let by_segments =
+            !(self.is_fused(set, layout) || on_cpu && is_sampled(set, &interpolation, &timeline));
+        if by_segments && self.pieces(set, &interpolation).len() == 1 {
             return self.upload(set, interpolation)?.evaluate_as(frames, layout);
         }
-        let (tracks, span) = (set.track_count(), set.time_span());
-        let samples = frames.resolve(tracks, span)?.len();
         let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
-        self.evaluate_into(set, interpolation, frames, layout, &mut quats)?;
+        self.evaluate_timeline_into(set, interpolation, &timeline, layout, &mut quats)?;
         Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
     }
 
@@ -314,6 +318,15 @@ impl Engine {
         let (tracks, samples) = (set.track_count(), timeline.len());
         if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
             return engine.evaluate_set(set, 0..tracks, &interpolation, timeline, output);
+        }
+        if let (Backend::Cpu(engine), Layout::TrackMajor) = (&*self.backend, layout)
+            && is_sampled(set, &interpolation, timeline)
+            && samples > 0
+        {
+            let mut rows = output.chunks_mut(samples).enumerate();
+            return rows.try_for_each(|(track, row)| {
+                engine.sampled_track(set, track, &interpolation, timeline, row)
+            });
         }
         let pieces = self.pieces(set, &interpolation);
         if let [_] = &*pieces {

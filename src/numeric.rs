@@ -18,12 +18,20 @@ pub(crate) fn canonical(value: f32) -> f32 {
     if value.abs() < TINY { 0.0 } else { value }
 }
 
+/// In a sum with it what lies behind the point is rounded away.
+const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+
 /// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
 /// rounded away in the sum. A call to `round` costs more than all else here.
 #[inline(always)]
 pub(crate) fn nearest_whole(x: f64) -> f64 {
-    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
     (x + SHIFT) - SHIFT
+}
+
+/// A whole number below 2^51 as an integer: a conversion that saturates takes branches.
+#[inline(always)]
+pub(crate) fn whole_number(x: f64) -> i64 {
+    (x + SHIFT).to_bits() as i64 - SHIFT.to_bits() as i64
 }
 
 /// Rounds to f32 and makes the result canonical.

@@ -286,7 +286,7 @@ fn clip(from: usize, to: usize, samples: &Range<usize>, constant: u32, emit: &mu
 }
 
 /// Distances in frames are whole numbers of 32 bits.
-const COUNTABLE: f64 = (1u64 << 31) as f64;
+pub(crate) const COUNTABLE: f64 = (1u64 << 31) as f64;
 
 /// The frame coordinates of consecutive spans, and what their samples' parameters
 /// follow from. Worked out in vector lanes: plain loops over arrays, no calls.
@@ -335,18 +335,40 @@ impl SpanBlock {
         let scales = &mut self.scale[..count];
         let offsets = &mut self.offset[..count];
         for j in 0..count {
-            let middle = (from[j] + to[j]) * 0.5;
-            let scale = extents[j] / (to[j] - from[j]);
-            whole[j] = nearest_whole(middle);
-            scales[j] = finite_scale(scale);
-            offsets[j] = round_f32((whole[j] - middle) * scale);
+            let span = in_frames(from[j], to[j], extents[j]);
+            whole[j] = span.whole;
+            scales[j] = span.scale;
+            offsets[j] = span.offset;
         }
+    }
+}
+
+/// How the parameter of a span's frames follows from their numbers.
+pub(crate) struct InFrames {
+    /// The whole frame nearest to the span's middle.
+    pub(crate) whole: f64,
+    /// parameter = (frame - whole) × scale + offset
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+
+/// A span between two frame coordinates over which the parameter runs through
+/// `extent`.
+#[inline(always)]
+pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
+    let middle = (from + to) * 0.5;
+    let scale = extent / (to - from);
+    let whole = nearest_whole(middle);
+    InFrames {
+        whole,
+        scale: finite_scale(scale),
+        offset: round_f32((whole - middle) * scale),
     }
 }
 
 /// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
 #[inline(always)]
-fn finite_scale(scale: f64) -> f32 {
+pub(crate) fn finite_scale(scale: f64) -> f32 {
     let largest = f64::from(f32::MAX);
     round_f32(if scale < largest { scale } else { largest })
 }
@@ -362,11 +384,11 @@ pub(crate) struct FrameClock {
 
 /// Where one span ends and the next starts.
 #[derive(Clone, Copy)]
-struct Boundary {
+pub(crate) struct Boundary {
     /// Its frame coordinate.
-    frame: f64,
+    pub(crate) frame: f64,
     /// The first whole frame not before it.
-    first: f64,
+    pub(crate) first: f64,
 }
 
 impl FrameClock {
@@ -383,7 +405,7 @@ impl FrameClock {
     /// A time within its own rounding of a whole frame is that frame, so a sample on
     /// a key returns the key at hour 24 too.
     #[inline(always)]
-    fn boundary(self, time: f64) -> Boundary {
+    pub(crate) fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.start);
         let whole = nearest_whole(exact);
         let frame = if (exact - whole).abs() <= self.rounding {

@@ -35,6 +35,8 @@ pub struct TrackSet {
     tracks: Vec<TrackRange>,
     names: Vec<String>,
     box_length: Option<f64>,
+    /// First and last key time over all tracks.
+    span: Option<(f64, f64)>,
 }
 
 /// Where a track's keys and times lie in the pools of its set; tracks whose
@@ -55,6 +57,17 @@ pub struct Track<'a> {
     pub times: &'a [f64],
     /// Unit keys, one for each time.
     pub keys: &'a [Quat],
+}
+
+impl Track<'_> {
+    /// Its keys from one to another, both included.
+    pub(crate) fn keys_between(self, first: usize, last: usize) -> Self {
+        Self {
+            times: &self.times[first..=last],
+            keys: &self.keys[first..=last],
+            ..self
+        }
+    }
 }
 
 /// Why keys were refused. Places count from 0.
@@ -241,9 +254,7 @@ impl TrackSet {
 
     /// First and last key time over all tracks, seconds; `None` when empty.
     pub fn time_span(&self) -> Option<(f64, f64)> {
-        self.tracks()
-            .map(|track| (track.times[0], track.times[track.times.len() - 1]))
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        self.span
     }
 
     /// The tracks in `range` as a set of their own.
@@ -275,6 +286,9 @@ impl TrackSet {
 
     /// Files hold many tracks with one list of times: keep it once.
     fn share_or_append(&mut self, times: &[f64]) -> usize {
+        let own = (times[0], times[times.len() - 1]);
+        let (first, last) = self.span.unwrap_or(own);
+        self.span = Some((first.min(own.0), last.max(own.1)));
         if let Some(last) = self.tracks.last()
             && self.times[last.first_time..last.first_time + last.len] == *times
         {

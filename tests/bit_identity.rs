@@ -340,3 +340,106 @@ fn engines_clips_and_results_are_send_and_sync() {
     check::<TrackSet>();
     check::<tumble::Error>();
 }
+
+/// Fewer samples than keys take another way on the CPU, arcs by no segments, cubics by
+/// fewer: the same bits, at every width, for frames and for times, wherever they begin
+/// and end.
+#[test]
+fn few_samples_of_many_keys_have_the_same_bits() {
+    let mut random = Random(77);
+    let mut set = TrackSet::new();
+    for track in 0..40 {
+        let count = [1, 2, 3, 64, 65, 66, 127, 128, 400][track % 9];
+        let mut time = random.between(-3.0, 3.0);
+        let (mut times, mut keys) = (Vec::new(), Vec::new());
+        for _ in 0..count {
+            times.push(time);
+            let sign = if random.next().is_multiple_of(3) {
+                -1.0
+            } else {
+                1.0
+            };
+            keys.push(random.rotation().as_quat() * sign);
+            // Some keys on whole frames, some a hair apart, some far.
+            time = match random.next() % 16 {
+                0 => ((time * 25.0).floor() + 2.0) / 25.0,
+                1 => time + 1e-9,
+                2 => time + 40.0,
+                _ => time + random.between(0.001, 0.05),
+            };
+        }
+        set.push("", &times, &keys).unwrap();
+    }
+    let (start, end) = set.time_span().unwrap();
+    let mut any = |count: usize, start: f64, end: f64| -> Vec<f64> {
+        (0..count).map(|_| random.between(start, end)).collect()
+    };
+    let scattered = any(50, start - 1.0, end + 1.0);
+    let of_each = any(40 * 7, start - 1.0, start + 4.0);
+    let requests = [
+        Frames::fps(25).between(start, start + 3.0),
+        Frames::fps(25).between(start + 1.0, start + 2.5),
+        Frames::rate("1/31".parse().unwrap()),
+        Frames::at(scattered),
+        Frames::at(set.track(8).times.iter().copied().step_by(9).collect()),
+        Frames::at_each(of_each),
+    ];
+    let paths = [Path::Shortest, Path::AsAuthored];
+    for (method, path) in METHODS
+        .into_iter()
+        .flat_map(|m| paths.map(|path| (m, path)))
+    {
+        let interpolation = Interpolation {
+            path,
+            ..method.into()
+        };
+        for frames in &requests {
+            let clip = cpu().upload(&set, interpolation).unwrap();
+            let expected = clip.evaluate(frames).unwrap();
+            assert!(expected.as_quats().len() < set.key_count(), "few samples");
+            for width in VectorWidth::available() {
+                let mut options = EngineOptions::default();
+                options.vector_width = Some(width);
+                let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+                let found = engine.evaluate(&set, interpolation, frames).unwrap();
+                let what = format!("{method}, {path:?}, {frames:?}, {width:?}");
+                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+            }
+            for device in vulkan_devices() {
+                let found = Engine::new(device)
+                    .unwrap()
+                    .evaluate(&set, interpolation, frames)
+                    .unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), "Vulkan");
+            }
+        }
+    }
+}
+
+/// The same of one long track, which the threads share.
+#[test]
+fn few_samples_of_a_long_track_have_the_same_bits() {
+    let mut random = Random(78);
+    let (mut times, mut keys) = (Vec::new(), Vec::new());
+    let mut time = 3.0;
+    for _ in 0..70_000 {
+        times.push(time);
+        keys.push(random.rotation().as_quat());
+        time += random.between(0.001, 0.1);
+    }
+    let mut set = TrackSet::new();
+    set.push("", &times, &keys).unwrap();
+    let slerp = METHODS[0];
+    let clip = cpu().upload(&set, slerp).unwrap();
+    for frames in [
+        Frames::fps(7),
+        Frames::fps(15).between(100.0, 900.0),
+        Frames::rate("1/1000".parse().unwrap()),
+        Frames::at(times.iter().copied().step_by(13).collect()),
+    ] {
+        let expected = clip.evaluate(&frames).unwrap();
+        let found = cpu().evaluate(&set, slerp, &frames).unwrap();
+        let what = format!("{frames:?}").chars().take(60).collect::<String>();
+        assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+    }
+}

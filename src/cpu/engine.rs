@@ -6,12 +6,14 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
-use crate::clock::{FramesError, Timeline};
+use super::sampled::{SampledArcs, Stretch};
+use crate::clock::{FramesError, Ticks, Timeline};
 use crate::encoding::Encoding;
 use crate::engine::Error;
-use crate::method::Interpolation;
+use crate::method::{Curves, Interpolation};
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
 use crate::rotations::Layout;
+use crate::schedule::FrameClock;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
 use crate::window::Window;
@@ -22,6 +24,9 @@ const TASK: usize = 16 * 1024;
 
 /// Keys that one turn of a task prepares: their segments stay in the cache.
 pub(crate) const TASK_KEYS: usize = 1024;
+
+/// Intervals of a long track that one task takes.
+const STRETCH: usize = 16 * 1024;
 
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
@@ -185,6 +190,9 @@ impl CpuEngine {
             return Ok(ClipData::new(set, *interpolation, None).map(drop)?);
         }
         let samples = timeline.len();
+        if is_sampled(set, interpolation, timeline) {
+            return self.sampled_arcs(set, tracks, interpolation, timeline, output);
+        }
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
         let new = || {
@@ -223,6 +231,93 @@ impl CpuEngine {
         };
         self.on_threads(work)
     }
+
+    /// As [`CpuEngine::evaluate_set`], for arcs with fewer samples than keys.
+    fn sampled_arcs(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), Error> {
+        let samples = timeline.len();
+        let each = (TASK / samples).max(1);
+        let task = |(i, rows): (usize, &mut [[f32; 4]])| {
+            let first = tracks.start + i * each;
+            let own = first..first + rows.len() / samples;
+            SampledArcs::new(interpolation, timeline).tracks(set, own, timeline, rows)
+        };
+        if output.len() <= TASK {
+            return task((0, output));
+        }
+        self.on_threads(|| {
+            let rows = output.par_chunks_mut(samples * each).enumerate();
+            rows.try_for_each(task)
+        })
+    }
+
+    /// As [`CpuEngine::sampled_arcs`], for one track that all threads share: stretches
+    /// of its intervals, once for the signs of their keys and once for their samples.
+    pub(crate) fn sampled_track(
+        &self,
+        set: &TrackSet,
+        index: usize,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let track = set.track(index);
+        let (Ticks::Frames { rate, start }, 1..) = (&timeline.ticks, track.keys.len() - 1) else {
+            return self.sampled_arcs(set, index..index + 1, interpolation, timeline, output);
+        };
+        interpolation.ends.check(track, index)?;
+        let last = track.keys.len() - 1;
+        let clock = FrameClock::new(*rate, *start, track.times[last]);
+        let stretches: Vec<Stretch<'_>> = (0..last)
+            .step_by(STRETCH)
+            .map(|first_key| Stretch {
+                track: track.keys_between(first_key, (first_key + STRETCH).min(last)),
+                index,
+                first_key,
+            })
+            .collect();
+        let new = || SampledArcs::new(interpolation, timeline);
+        let flips: Vec<f32> = self.on_threads(|| {
+            let stretches = stretches.par_iter();
+            stretches
+                .map_init(new, |arcs, &stretch| arcs.align(stretch, 1.0))
+                .collect::<Result<_, _>>()
+        })?;
+        let (mut sign, mut from) = (1.0, 0);
+        let mut work = Vec::new();
+        for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
+            let to = match stretches.get(i + 1) {
+                Some(next) => clock.first_frame(next.track.times[0]).min(timeline.len()),
+                None => timeline.len(),
+            };
+            let (own, others) = output.split_at_mut(to.max(from) - from);
+            work.push((stretch, sign, from..to.max(from), own));
+            (output, sign, from) = (others, sign * flip, to.max(from));
+        }
+        self.on_threads(|| {
+            work.into_par_iter()
+                .try_for_each_init(new, |arcs, (stretch, sign, window, own)| {
+                    arcs.stretch(stretch, sign, clock, window, own)
+                })
+        })
+    }
+}
+
+/// Whether every sample is worked out from its keys, on the CPU.
+pub(crate) fn is_sampled(
+    set: &TrackSet,
+    interpolation: &Interpolation,
+    timeline: &Timeline,
+) -> bool {
+    let arcs = matches!(interpolation.method.curves, Curves::Arcs);
+    arcs && timeline.len() * set.track_count() < set.key_count()
 }
 
 /// A window cut into tasks, each with its own part of the output, which has `each`

@@ -75,34 +75,61 @@ impl InLanes for ArcBlock {
         let [mut mx, mut my, mut mz, mut mw] = [[0.0; LANES]; 4];
         let [mut px, mut py, mut pz, mut pw] = [[0.0; LANES]; 4];
         for j in 0..self.whole() {
-            let a = unit(from[j]);
-            let b = unit(to[j]);
-            let dot = dot(a, b);
-            let flip = if dot < noise { -1.0 } else { 1.0 };
-            let b = [b[0] * flip, b[1] * flip, b[2] * flip, b[3] * flip];
-            let sum = [b[0] + a[0], b[1] + a[1], b[2] + a[2], b[3] + a[3]];
-            let difference = [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]];
-            // 2 cos and 2 sin of half the angle between them: never acos, which
-            // loses half of the digits of a small one.
-            let cosine = norm(sum);
-            let chord = norm(difference);
-            dots[j] = dot;
-            angles[j] = chord * angle_by_sine(1.0 - 0.5 * cosine);
-            let to_unit = 1.0 / cosine;
-            // Equal keys have no plane; with an angle of 0 any partner will do.
-            let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
-            mx[j] = round_f32(sum[0] * to_unit);
-            my[j] = round_f32(sum[1] * to_unit);
-            mz[j] = round_f32(sum[2] * to_unit);
-            mw[j] = round_f32(sum[3] * to_unit);
-            px[j] = round_f32(difference[0] * to_partner);
-            py[j] = round_f32(difference[1] * to_partner);
-            pz[j] = round_f32(difference[2] * to_partner);
-            pw[j] = round_f32(difference[3] * to_partner);
+            let arc = arc(from[j], to[j], noise);
+            dots[j] = arc.dot;
+            angles[j] = arc.angle;
+            [mx[j], my[j], mz[j], mw[j]] = arc.middle;
+            [px[j], py[j], pz[j], pw[j]] = arc.partner;
         }
         (self.dots, self.angles) = (dots, angles);
         self.middles = [mx, my, mz, mw];
         self.partners = [px, py, pz, pw];
+    }
+}
+
+/// The great circle between two keys.
+pub(crate) struct Arc {
+    /// Their inner product as stored.
+    pub(crate) dot: f64,
+    /// The angle between them once their signs are aligned.
+    pub(crate) angle: f64,
+    /// As in [`ArcSegment`].
+    pub(crate) middle: [f32; 4],
+    pub(crate) partner: [f32; 4],
+}
+
+/// The arc between two keys; dot products below `noise` turn the second one's sign.
+#[inline(always)]
+pub(crate) fn arc(from: [f32; 4], to: [f32; 4], noise: f64) -> Arc {
+    let a = unit(from);
+    let b = unit(to);
+    let dot = dot(a, b);
+    let flip = if dot < noise { -1.0 } else { 1.0 };
+    let b = [b[0] * flip, b[1] * flip, b[2] * flip, b[3] * flip];
+    let sum = [b[0] + a[0], b[1] + a[1], b[2] + a[2], b[3] + a[3]];
+    let difference = [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]];
+    // 2 cos and 2 sin of half the angle between them: never acos, which loses half
+    // of the digits of a small one.
+    let cosine = norm(sum);
+    let chord = norm(difference);
+    let to_unit = 1.0 / cosine;
+    // Equal keys have no plane; with an angle of 0 any partner will do.
+    let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
+    Arc {
+        dot,
+        angle: chord * angle_by_sine(1.0 - 0.5 * cosine),
+        middle: [
+            round_f32(sum[0] * to_unit),
+            round_f32(sum[1] * to_unit),
+            round_f32(sum[2] * to_unit),
+            round_f32(sum[3] * to_unit),
+        ],
+        partner: [
+            round_f32(difference[0] * to_partner),
+            round_f32(difference[1] * to_partner),
+            round_f32(difference[2] * to_partner),
+            round_f32(difference[3] * to_partner),
+        ],
     }
 }
 
@@ -127,8 +154,9 @@ impl InLanes for Signed<'_> {
     }
 }
 
+/// The same rotation with another sign.
 #[inline(always)]
-fn signed(sign: f32, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
+pub(crate) fn signed(sign: f32, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
     [
         canonical(x * sign),
         canonical(y * sign),

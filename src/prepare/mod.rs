@@ -14,6 +14,7 @@ mod nodes;
 mod sample;
 mod set;
 
+pub(crate) use arcs::{arc, signed};
 pub(crate) use clip_data::{ClipData, PartRef};
 pub(crate) use cubic::Cubic;
 pub(crate) use intervals::{

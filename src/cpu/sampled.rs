@@ -1,0 +1,303 @@
+//! Arcs with fewer samples than keys: a sample to a lane, straight from the two keys
+//! beside it. No segment is kept, and none is made where no sample falls. The same
+//! operations as by way of segments, and so the same bits.
+
+use std::ops::Range;
+
+use super::dispatch::in_lanes;
+use super::sample_lanes::{Boundaries, Dots, IN_DOUBT, LANES, SampleBlock};
+use crate::clock::{FramesError, Ticks, Timeline};
+use crate::engine::Error;
+use crate::method::{Interpolation, InterpolationError, Path};
+use crate::prepare::arc;
+use crate::schedule::{COUNTABLE, FrameClock, in_frames};
+use crate::tracks::{Track, TrackSet};
+
+/// Evaluates tracks; what it needs for that is kept.
+pub(super) struct SampledArcs<'a> {
+    interpolation: &'a Interpolation,
+    samples: Box<SampleBlock>,
+    boundaries: Boundaries,
+    dots: Dots,
+    /// For each interval of the track, the sign of its first key.
+    signs: Vec<f32>,
+}
+
+/// Some intervals of a track that follow one another.
+#[derive(Clone, Copy)]
+pub(super) struct Stretch<'a> {
+    /// Their keys and times.
+    pub(super) track: Track<'a>,
+    /// The track's place in the set.
+    pub(super) index: usize,
+    /// The first of their keys.
+    pub(super) first_key: usize,
+}
+
+impl<'a> SampledArcs<'a> {
+    pub(super) fn new(interpolation: &'a Interpolation, timeline: &Timeline) -> Self {
+        let identity = [0.0, 0.0, 0.0, 1.0];
+        Self {
+            interpolation,
+            samples: Box::new(SampleBlock {
+                from: [identity; LANES],
+                to: [identity; LANES],
+                signs: [1.0; LANES],
+                starts: [0.0; LANES],
+                ends: [1.0; LANES],
+                places: [0.0; LANES],
+                frames: matches!(timeline.ticks, Ticks::Frames { .. }),
+                noise: interpolation.path.flips_below(),
+                outputs: [0; LANES],
+                count: 0,
+                rotations: [identity; LANES],
+            }),
+            boundaries: Boundaries {
+                times: [0.0; LANES],
+                clock: None,
+                frames: [0.0; LANES],
+                firsts: [0; LANES],
+                whole: [0; LANES],
+            },
+            dots: Dots {
+                keys: [identity; LANES + 1],
+                count: 0,
+                dots: [0.0; LANES],
+                doubtful: 0,
+            },
+            signs: Vec::new(),
+        }
+    }
+
+    /// Every sample of some tracks, `[track][sample]`.
+    pub(super) fn tracks(
+        &mut self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        timeline: &Timeline,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), Error> {
+        let samples = timeline.len();
+        for (place, index) in tracks.enumerate() {
+            let track = set.track(index);
+            self.interpolation.ends.check(track, index)?;
+            let stretch = Stretch {
+                track,
+                index,
+                first_key: 0,
+            };
+            self.align(stretch, 1.0)?;
+            match &timeline.ticks {
+                Ticks::Frames { rate, start } => {
+                    let latest = track.times[track.times.len() - 1];
+                    let clock = FrameClock::new(*rate, *start, latest);
+                    let all = 0..samples;
+                    self.frames(stretch, clock, all, place * samples, output)?;
+                }
+                Ticks::Times { times, stride } => {
+                    let own = &times[index * stride..][..samples];
+                    let row = place * samples..(place + 1) * samples;
+                    self.times(track, own, row, output);
+                }
+            }
+        }
+        self.flush(output);
+        Ok(())
+    }
+
+    /// The samples of some intervals of a track, `window`, whose first key counts with
+    /// `sign`.
+    pub(super) fn stretch(
+        &mut self,
+        stretch: Stretch<'_>,
+        sign: f32,
+        clock: FrameClock,
+        window: Range<usize>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), Error> {
+        self.align(stretch, sign)?;
+        self.frames(stretch, clock, window, 0, output)?;
+        self.flush(output);
+        Ok(())
+    }
+
+    /// The sign of every interval's first key, where the first one's is given; what it
+    /// is behind the last.
+    pub(super) fn align(
+        &mut self,
+        stretch: Stretch<'_>,
+        mut sign: f32,
+    ) -> Result<f32, InterpolationError> {
+        let path = self.interpolation.path;
+        let noise = path.flips_below();
+        let track = stretch.track;
+        self.signs.clear();
+        if track.keys.len() == 2 && path == Path::Shortest && stretch.first_key == 0 {
+            // The second key's sign is nobody's first.
+            self.signs.push(sign);
+            return Ok(sign);
+        }
+        for start in (0..track.keys.len() - 1).step_by(LANES) {
+            let keys = &track.keys[start..track.keys.len().min(start + LANES + 1)];
+            for (own, key) in self.dots.keys.iter_mut().zip(keys) {
+                *own = key.to_array();
+            }
+            self.dots.count = keys.len() - 1;
+            in_lanes(&mut self.dots);
+            if self.dots.doubtful == 0 {
+                self.signs.resize(self.signs.len() + keys.len() - 1, sign);
+                continue;
+            }
+            for (i, &near) in self.dots.dots[..keys.len() - 1].iter().enumerate() {
+                self.signs.push(sign);
+                let dot = if near > IN_DOUBT || (-0.99..-IN_DOUBT).contains(&near) {
+                    f64::from(near)
+                } else {
+                    arc(keys[i].to_array(), keys[i + 1].to_array(), noise).dot
+                };
+                if path.refuses(dot) {
+                    return Err(InterpolationError::Antipodal {
+                        track: stretch.index,
+                        key: stretch.first_key + start + i,
+                    });
+                }
+                if dot < noise {
+                    sign = -sign;
+                }
+            }
+        }
+        Ok(sign)
+    }
+
+    /// The samples in `window` of a stretch's intervals, and of what lies beside the
+    /// track where it ends; the first of them goes to `place`.
+    fn frames(
+        &mut self,
+        stretch: Stretch<'_>,
+        clock: FrameClock,
+        window: Range<usize>,
+        place: usize,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        let Track { times, keys, .. } = stretch.track;
+        let (from, samples) = (window.start, window.end);
+        let last = times.len() - 1;
+        let at = |sample: usize| place + sample - from;
+        let begin = clock.first_frame(times[0]).clamp(from, samples);
+        output[place..at(begin)].fill(keys[0].to_array());
+        self.boundaries.clock = Some(clock);
+        // Each block starts with the boundary that the one before it ended with.
+        'blocks: for block in (0..last).step_by(LANES - 1) {
+            let own = &times[block..times.len().min(block + LANES)];
+            self.boundaries.times[..own.len()].copy_from_slice(own);
+            in_lanes(&mut self.boundaries);
+            for j in 0..own.len() - 1 {
+                let bounds = &self.boundaries;
+                let (frame, end) = (bounds.frames[j], bounds.frames[j + 1]);
+                let mut first = bounds.firsts[j];
+                let to = bounds.firsts[j + 1].min(samples as i64);
+                if first >= samples as i64 {
+                    break 'blocks;
+                }
+                if bounds.whole[j] == 1 && (from as i64..to).contains(&first) {
+                    output[at(first as usize)] = keys[block + j].to_array();
+                    first += 1;
+                }
+                for sample in first.max(from as i64)..to {
+                    let place = sample as f64;
+                    if end - frame >= COUNTABLE
+                        && (place - in_frames(frame, end, 0.0).whole).abs() >= COUNTABLE
+                    {
+                        return Err(FramesError::GapTooLong {
+                            track: stretch.index,
+                            key: stretch.first_key + block + j,
+                            frames: end - frame,
+                        });
+                    }
+                    let interval = (frame, end, place);
+                    self.push(
+                        stretch.track,
+                        block + j,
+                        interval,
+                        at(sample as usize),
+                        output,
+                    );
+                }
+            }
+        }
+        let end = clock.first_frame(times[last]).clamp(from, samples);
+        output[at(end)..at(samples)].fill(keys[last].to_array());
+        Ok(())
+    }
+
+    fn times(
+        &mut self,
+        track: Track<'_>,
+        times: &[f64],
+        row: Range<usize>,
+        output: &mut [[f32; 4]],
+    ) {
+        let (starts, keys) = (track.times, track.keys);
+        let last = starts.len() - 1;
+        let mut i = 0;
+        for (&time, place) in times.iter().zip(row) {
+            if time >= starts[last] {
+                output[place] = keys[last].to_array();
+                continue;
+            }
+            if time < starts[0] {
+                output[place] = keys[0].to_array();
+                continue;
+            }
+            let holds = |i: usize| starts[i] <= time && time < starts[i + 1];
+            // Times mostly increase: look here and next before searching.
+            if !holds(i) {
+                i = if i + 1 < last && holds(i + 1) {
+                    i + 1
+                } else {
+                    starts.partition_point(|&start| start <= time) - 1
+                };
+            }
+            if time == starts[i] {
+                output[place] = keys[i].to_array();
+            } else {
+                let interval = (starts[i], starts[i + 1], time);
+                self.push(track, i, interval, place, output);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn push(
+        &mut self,
+        track: Track<'_>,
+        key: usize,
+        (start, end, place): (f64, f64, f64),
+        output_place: usize,
+        output: &mut [[f32; 4]],
+    ) {
+        let samples = &mut *self.samples;
+        let lane = samples.count;
+        samples.from[lane] = track.keys[key].to_array();
+        samples.to[lane] = track.keys[key + 1].to_array();
+        samples.signs[lane] = self.signs[key];
+        samples.starts[lane] = start;
+        samples.ends[lane] = end;
+        samples.places[lane] = place;
+        samples.outputs[lane] = output_place;
+        samples.count += 1;
+        if samples.count == LANES {
+            self.flush(output);
+        }
+    }
+
+    fn flush(&mut self, output: &mut [[f32; 4]]) {
+        let samples = &mut *self.samples;
+        in_lanes(samples);
+        let places = &samples.outputs[..samples.count];
+        for (&place, &rotation) in places.iter().zip(&samples.rotations) {
+            output[place] = rotation;
+        }
+        samples.count = 0;
+    }
+}
