@@ -6,13 +6,14 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use glam::Quat;
 
+use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
 use crate::branchless::{angle_by_sine, dot, norm, unit};
 use crate::cpu::{InLanes, in_lanes};
 use crate::method::{Ends, Interpolation, InterpolationError, Path};
 use crate::numeric::{canonical, round_f32};
 use crate::segment::{ArcSegment, Segments};
-use crate::tracks::{Track, TrackSet};
+use crate::tracks::Track;
 
 /// Intervals worked out together.
 const LANES: usize = 64;
@@ -183,37 +184,10 @@ impl ArcPreparation {
             sign: 1.0,
         }
     }
+}
 
-    /// Prepares whole tracks, one part for each.
-    pub(crate) fn push(
-        &mut self,
-        prepared: &mut Prepared,
-        set: &TrackSet,
-        tracks: Range<usize>,
-    ) -> Result<(), InterpolationError> {
-        for index in tracks {
-            let track = set.track(index);
-            self.intervals(prepared, track, index, 0..track.keys.len() - 1)?;
-        }
-        self.flush(prepared)
-    }
-
-    /// Prepares some intervals of one track as a part, its first key as it is
-    /// stored; what the sign of the key after the last interval is then.
-    pub(crate) fn push_piece(
-        &mut self,
-        prepared: &mut Prepared,
-        track: Track,
-        index: usize,
-        intervals: Range<usize>,
-    ) -> Result<f32, InterpolationError> {
-        self.sign = 1.0;
-        self.intervals(prepared, track, index, intervals)?;
-        self.flush(prepared)?;
-        Ok(self.sign)
-    }
-
-    fn intervals(
+impl Prepare for ArcPreparation {
+    fn add(
         &mut self,
         prepared: &mut Prepared,
         track: Track,
@@ -261,6 +235,13 @@ impl ArcPreparation {
         Ok(())
     }
 
+    fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
+        self.flush(prepared)?;
+        Ok(self.sign)
+    }
+}
+
+impl ArcPreparation {
     fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
         in_lanes(&mut self.block);
         let block = &mut self.block;

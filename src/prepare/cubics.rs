@@ -7,13 +7,14 @@ use glam::Quat;
 
 use super::fitting::{Fitting, Place};
 use super::intervals::{Intervals, LANES, Steps, Stretch};
+use super::set::Prepare;
 use super::{NONE, Part, Prepared};
 use crate::cpu::in_lanes;
 use crate::frame_rate::FrameRate;
 use crate::method::{Cubics, Ends, Interpolation, InterpolationError};
 use crate::numeric::round_quat;
 use crate::schedule::FrameClock;
-use crate::tracks::{Track, TrackSet};
+use crate::tracks::Track;
 
 /// Lanes that a stretch needs beside those of its intervals.
 const CONTEXT: usize = 2;
@@ -47,45 +48,14 @@ impl CubicPreparation {
             frames: None,
         }
     }
+}
 
-    /// From now on only intervals that hold one of these frames are fitted.
-    pub(super) fn only_frames(&mut self, rate: FrameRate, start: f64) {
+impl Prepare for CubicPreparation {
+    fn only_frames(&mut self, rate: FrameRate, start: f64) {
         self.frames = Some((rate, start));
     }
 
-    /// Prepares whole tracks, one part for each.
-    pub(crate) fn push(
-        &mut self,
-        prepared: &mut Prepared,
-        set: &TrackSet,
-        tracks: Range<usize>,
-    ) -> Result<(), InterpolationError> {
-        for index in tracks {
-            let track = set.track(index);
-            self.intervals(prepared, track, index, 0..track.keys.len() - 1)?;
-        }
-        self.flush(prepared)?;
-        self.fitting.finish(prepared);
-        Ok(())
-    }
-
-    /// Prepares some intervals of one track as a part, its first key as it is
-    /// stored; what the sign of the key after the last interval is then.
-    pub(crate) fn push_piece(
-        &mut self,
-        prepared: &mut Prepared,
-        track: Track,
-        index: usize,
-        intervals: Range<usize>,
-    ) -> Result<f32, InterpolationError> {
-        self.sign = 1.0;
-        self.intervals(prepared, track, index, intervals)?;
-        self.flush(prepared)?;
-        self.fitting.finish(prepared);
-        Ok(self.sign as f32)
-    }
-
-    fn intervals(
+    fn add(
         &mut self,
         prepared: &mut Prepared,
         track: Track,
@@ -150,6 +120,14 @@ impl CubicPreparation {
         Ok(())
     }
 
+    fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
+        self.flush(prepared)?;
+        self.fitting.finish(prepared);
+        Ok(self.sign as f32)
+    }
+}
+
+impl CubicPreparation {
     fn neighbour(&mut self, track: Track, interval: Option<usize>) {
         match interval {
             Some(i) => self.intervals.push(track, i),

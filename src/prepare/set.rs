@@ -8,6 +8,7 @@ use super::arcs::ArcPreparation;
 use super::cubics::CubicPreparation;
 use super::{NONE, Prepared};
 use crate::clock::{Ticks, Timeline};
+use crate::frame_rate::FrameRate;
 use crate::method::{Curves, Ends, Interpolation, InterpolationError};
 use crate::numeric::canonical;
 use crate::tracks::{Track, TrackSet};
@@ -62,7 +63,7 @@ fn prepare_long(
     let piece = |i: usize| {
         let own = i * BATCH..((i + 1) * BATCH).min(intervals);
         let mut prepared = Prepared::new(interpolation);
-        let mut preparation = Preparation::new(interpolation);
+        let preparation = Preparation::new(interpolation);
         let sign = preparation.push_piece(&mut prepared, track, index, own)?;
         Ok((prepared, sign))
     };
@@ -97,30 +98,44 @@ fn negate(prepared: &mut Prepared, interpolation: &Interpolation) {
     }
 }
 
-/// Prepares whole tracks, with memory that serves many.
-pub(crate) enum Preparation {
-    Arcs(Box<ArcPreparation>),
-    Cubics(Box<CubicPreparation>),
+/// Makes segments from key intervals, in blocks that may hold several tracks'.
+pub(super) trait Prepare: Send {
+    /// Adds some intervals of a track, the `index`th of its set, as a part of their own.
+    fn add(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<(), InterpolationError>;
+
+    /// Finishes what was added; what the signs of the last track's keys make of the
+    /// next, if the first interval added has its key's sign as stored.
+    fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError>;
+
+    /// From now on only intervals that hold a frame need segments.
+    fn only_frames(&mut self, _rate: FrameRate, _start: f64) {}
 }
+
+/// Prepares whole tracks, with memory that serves many.
+pub(crate) struct Preparation(Box<dyn Prepare>);
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        match interpolation.method.curves {
-            Curves::Arcs => Self::Arcs(Box::new(ArcPreparation::new(interpolation))),
-            Curves::Cubics(cubics) => {
-                Self::Cubics(Box::new(CubicPreparation::new(interpolation, cubics)))
-            }
-        }
+        Self(match interpolation.method.curves {
+            Curves::Arcs => Box::new(ArcPreparation::new(interpolation)),
+            Curves::Cubics(cubics) => Box::new(CubicPreparation::new(interpolation, cubics)),
+        })
     }
 
     /// From now on intervals without a sample of that timeline need not be prepared,
     /// if that saves anything. What is prepared then serves no other.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        if let (Self::Cubics(cubics), Ticks::Frames { rate, start }) = (self, &timeline.ticks)
+        if let Ticks::Frames { rate, start } = timeline.ticks
             && timeline.len() < keys
         {
-            cubics.only_frames(*rate, *start);
+            self.0.only_frames(rate, start);
         }
     }
 
@@ -131,25 +146,25 @@ impl Preparation {
         set: &TrackSet,
         tracks: Range<usize>,
     ) -> Result<(), InterpolationError> {
-        match self {
-            Self::Arcs(arcs) => arcs.push(prepared, set, tracks),
-            Self::Cubics(cubics) => cubics.push(prepared, set, tracks),
+        for index in tracks {
+            let track = set.track(index);
+            let all = 0..track.keys.len() - 1;
+            self.0.add(prepared, track, index, all)?;
         }
+        self.0.finish(prepared).map(drop)
     }
 
     /// Prepares some intervals of one track as a part, its first key as it is
     /// stored; what the sign of the key after the last interval is then.
     fn push_piece(
-        &mut self,
+        mut self,
         prepared: &mut Prepared,
         track: Track,
         index: usize,
         intervals: Range<usize>,
     ) -> Result<f32, InterpolationError> {
-        match self {
-            Self::Arcs(arcs) => arcs.push_piece(prepared, track, index, intervals),
-            Self::Cubics(cubics) => cubics.push_piece(prepared, track, index, intervals),
-        }
+        self.0.add(prepared, track, index, intervals)?;
+        self.0.finish(prepared)
     }
 }
 
