@@ -8,9 +8,9 @@ mod support;
 use std::fs;
 
 use glam::Quat;
-use program::{command, finish, pendulum, sample_folder, succeed};
+use program::{command, finish, pendulum, run, sample_folder, succeed};
 use support::vulkan_devices;
-use tumble::{Device, Engine, Frames, Layout, TrackSet, method};
+use tumble::{Device, Encoding, Engine, Frames, Layout, TrackSet, method};
 
 fn set() -> TrackSet {
     let (times, keys) = pendulum();
@@ -103,6 +103,33 @@ fn csv_holds_the_library_s_bits() {
     assert_eq!(bits(found), bits(components));
     let last: Vec<&str> = lines.last().unwrap().split(',').take(2).collect();
     assert_eq!((last[0], last[1].parse()), ("20", Ok(2.0)));
+}
+
+#[test]
+fn half_size_results_are_what_the_library_encodes() {
+    let place = sample_folder();
+    let quats = expected(&Frames::fps(25), Layout::TrackMajor);
+    let rotations: Vec<[f32; 4]> = quats.iter().map(Quat::to_array).collect();
+    for (name, encoding) in [("f16", Encoding::F16), ("snorm16", Encoding::Snorm16)] {
+        let line = [
+            "eval",
+            "a.dat",
+            "-o",
+            "out.npy",
+            "--overwrite",
+            "--encoding",
+            name,
+        ];
+        succeed(place.path(), &line);
+        let file = fs::read(place.path().join("out.npy")).unwrap();
+        let mut bytes = vec![0; rotations.len() * encoding.bytes()];
+        encoding.encode(&rotations, &mut bytes);
+        assert!(file.ends_with(&bytes), "{name}");
+        assert!(file.len() - bytes.len() <= 128, "{name}: a header, no more");
+    }
+    let line = ["eval", "a.dat", "-o", "out.csv", "--encoding", "f16"];
+    let refused = run(place.path(), &line);
+    assert_eq!(refused.code, 2, "{}", refused.words);
 }
 
 #[test]

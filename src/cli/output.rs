@@ -10,7 +10,7 @@ use glam::Quat;
 use tumble::formats::csv::CsvWriter;
 use tumble::formats::npy::{ComponentOrder, NpyWriter};
 use tumble::formats::output::{Output, check_target};
-use tumble::{Chunk, Error, Layout, Timeline, TrackSet};
+use tumble::{Chunk, Encoding, Error, Layout, Timeline, TrackSet};
 
 use super::exit::{BROKEN_PIPE, Failure, OUTPUT};
 use super::progress::Progress;
@@ -175,11 +175,11 @@ impl Format {
         name.into()
     }
 
-    /// The least that a component takes.
-    fn component_bytes(self) -> f64 {
+    /// The least that a rotation takes.
+    fn rotation_bytes(self, encoding: Encoding) -> f64 {
         match self {
-            Self::Npy => size_of::<f32>() as f64,
-            Self::Csv | Self::Dat => 2.0, // a digit and a comma
+            Self::Npy => encoding.bytes() as f64,
+            Self::Csv | Self::Dat => 8.0, // four times a digit and a comma
         }
     }
 }
@@ -224,11 +224,12 @@ impl Target {
         name: &str,
         tracks: usize,
         samples: usize,
+        encoding: Encoding,
     ) -> Result<(), Failure> {
         if input::is_standard(&self.path) {
             return Ok(());
         }
-        let bytes = tracks as f64 * samples as f64 * 4.0 * self.format.component_bytes();
+        let bytes = tracks as f64 * samples as f64 * self.format.rotation_bytes(encoding);
         let folder = match self.path.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -268,7 +269,7 @@ impl Target {
         let (progress, measure): (_, fn(&[u8]) -> u64) = match self.format {
             Format::Csv => (Progress::new("writing", samples as u64 + 1), lines),
             Format::Npy | Format::Dat => {
-                let total = (tracks * samples * size_of::<Quat>()) as u64;
+                let total = (tracks * samples * result.encoding.bytes()) as u64;
                 (Progress::new("writing", total), length)
             }
         };
@@ -313,6 +314,7 @@ pub(crate) struct ResultShape<'a> {
     pub(crate) timeline: &'a Timeline,
     pub(crate) layout: Layout,
     pub(crate) order: ComponentOrder,
+    pub(crate) encoding: Encoding,
 }
 
 /// What takes the chunks of a result.
@@ -353,7 +355,8 @@ impl<'a> ResultWriter<'a, '_> {
                     Layout::TrackMajor => (tracks, samples),
                     Layout::FrameMajor => (samples, tracks),
                 };
-                Self::Npy(NpyWriter::new(out, rows, columns, result.order)?)
+                let (order, encoding) = (result.order, result.encoding);
+                Self::Npy(NpyWriter::new(out, rows, columns, order, encoding)?)
             }
             started => started,
         };

@@ -1,9 +1,12 @@
-//! NPY: float32, C order, shape `(tracks, frames, 4)` or `(frames, tracks, 4)`.
+//! NPY: float32 (or float16, or int16), C order, shape `(tracks, frames, 4)` or
+//! `(frames, tracks, 4)`.
 
 use std::io::{self, Write};
 
 use glam::Quat;
 use npyz::WriterBuilder;
+
+use crate::encoding::Encoding;
 
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -19,11 +22,13 @@ pub enum ComponentOrder {
 pub struct NpyWriter<W> {
     writer: W,
     order: ComponentOrder,
+    encoding: Encoding,
     missing: usize,
 }
 
 impl<W: Write> NpyWriter<W> {
-    /// Writes the header for `rows × columns` rotations.
+    /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is
+    /// int16, to be divided by 32767.
     ///
     /// # Errors
     /// When writing fails.
@@ -32,19 +37,21 @@ impl<W: Write> NpyWriter<W> {
         rows: usize,
         columns: usize,
         order: ComponentOrder,
+        encoding: Encoding,
     ) -> io::Result<Self> {
         let shape = [rows as u64, columns as u64, 4];
         let mut header = Vec::new();
         // The values are written below, whole slices at a time.
-        npyz::WriteOptions::<f32>::new()
-            .dtype(npyz::DType::Plain("<f4".parse().map_err(io::Error::other)?))
-            .shape(&shape)
-            .writer(&mut header)
-            .begin_nd()?;
+        match encoding {
+            Encoding::F32 => write_header::<f32>(&mut header, "<f4", &shape)?,
+            Encoding::F16 => write_header::<half::f16>(&mut header, "<f2", &shape)?,
+            Encoding::Snorm16 => write_header::<i16>(&mut header, "<i2", &shape)?,
+        }
         writer.write_all(&header)?;
         Ok(Self {
             writer,
             order,
+            encoding,
             missing: rows * columns,
         })
     }
@@ -61,19 +68,24 @@ impl<W: Write> NpyWriter<W> {
             ));
         };
         self.missing = missing;
-        if self.order == ComponentOrder::Xyzw && cfg!(target_endian = "little") {
+        let little = cfg!(target_endian = "little");
+        if self.order == ComponentOrder::Xyzw && self.encoding == Encoding::F32 && little {
             return self.writer.write_all(bytemuck::cast_slice(rotations));
         }
         const BLOCK: usize = 4096;
-        let mut bytes = Vec::with_capacity(BLOCK * size_of::<Quat>());
+        let mut ordered = Vec::with_capacity(BLOCK);
+        let mut bytes = Vec::new();
         for block in rotations.chunks(BLOCK) {
-            bytes.clear();
-            for q in block {
-                let components = match self.order {
-                    ComponentOrder::Xyzw => [q.x, q.y, q.z, q.w],
-                    ComponentOrder::Wxyz => [q.w, q.x, q.y, q.z],
-                };
-                bytes.extend(components.iter().flat_map(|c| c.to_le_bytes()));
+            ordered.clear();
+            ordered.extend(block.iter().map(|q| match self.order {
+                ComponentOrder::Xyzw => [q.x, q.y, q.z, q.w],
+                ComponentOrder::Wxyz => [q.w, q.x, q.y, q.z],
+            }));
+            bytes.resize(block.len() * self.encoding.bytes(), 0);
+            self.encoding.encode(&ordered, &mut bytes);
+            if !little {
+                let component = self.encoding.bytes() / 4;
+                bytes.chunks_exact_mut(component).for_each(<[u8]>::reverse);
             }
             self.writer.write_all(&bytes)?;
         }
@@ -95,6 +107,19 @@ impl<W: Write> NpyWriter<W> {
     }
 }
 
+fn write_header<T: npyz::Serialize>(
+    header: &mut Vec<u8>,
+    dtype: &str,
+    shape: &[u64],
+) -> io::Result<()> {
+    npyz::WriteOptions::<T>::new()
+        .dtype(npyz::DType::Plain(dtype.parse().map_err(io::Error::other)?))
+        .shape(shape)
+        .writer(header)
+        .begin_nd()
+        .map(drop)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,7 +128,7 @@ mod tests {
         let rotations: Vec<Quat> = (0..6)
             .map(|i| Quat::from_xyzw(i as f32, 0.25, -0.5, 1.0))
             .collect();
-        let mut writer = NpyWriter::new(Vec::new(), 2, 3, order).unwrap();
+        let mut writer = NpyWriter::new(Vec::new(), 2, 3, order, Encoding::F32).unwrap();
         writer.write(&rotations[..4]).unwrap();
         writer.write(&rotations[4..]).unwrap();
         writer.finish().unwrap()
@@ -125,8 +150,22 @@ mod tests {
     }
 
     #[test]
+    fn whole_numbers_are_16_bits() {
+        let mut file = Vec::new();
+        let (order, encoding) = (ComponentOrder::Wxyz, Encoding::Snorm16);
+        let mut writer = NpyWriter::new(&mut file, 1, 1, order, encoding).unwrap();
+        writer
+            .write(&[Quat::from_xyzw(0.0, 0.5, -1.0, 1.0)])
+            .unwrap();
+        writer.finish().unwrap();
+        let npy = npyz::NpyFile::new(&file[..]).unwrap();
+        assert_eq!(npy.into_vec::<i16>().unwrap(), [32767, 0, 16384, -32767]);
+    }
+
+    #[test]
     fn a_wrong_count_is_an_error() {
-        let mut writer = NpyWriter::new(Vec::new(), 1, 2, ComponentOrder::Xyzw).unwrap();
+        let order = ComponentOrder::Xyzw;
+        let mut writer = NpyWriter::new(Vec::new(), 1, 2, order, Encoding::F32).unwrap();
         assert!(writer.write(&[Quat::IDENTITY; 3]).is_err());
         writer.write(&[Quat::IDENTITY]).unwrap();
         assert!(writer.finish().is_err());
