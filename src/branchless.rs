@@ -44,6 +44,14 @@ pub(crate) fn sum(a: Vector, b: Vector) -> Vector {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+/// `a / b` for positive numbers, at most 1e150: between keys that are next to nothing
+/// apart tangents are meaningless, but they stay numbers.
+#[inline(always)]
+pub(crate) fn ratio(a: f64, b: f64) -> f64 {
+    let ratio = a / b;
+    if ratio < 1e150 { ratio } else { 1e150 }
+}
+
 /// The Hamilton product `a b`.
 #[inline(always)]
 pub(crate) fn product(a: Quaternion, b: Quaternion) -> Quaternion {

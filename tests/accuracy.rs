@@ -277,3 +277,56 @@ fn times_of_frames_are_within_rounding_of_frames() {
         }
     }
 }
+
+/// Catches infinities times zero: intervals at the end of what f64 can tell apart.
+#[test]
+fn keys_next_to_nothing_apart_give_unit_quaternions() {
+    let tiny = 5e-324;
+    let (a, b) = (Quat::from_rotation_x(0.3), Quat::from_rotation_y(2.0));
+    for times in [
+        [0.0, tiny, 1.0, 2.0],
+        [0.0, 1.0, 1.0 + f64::EPSILON, 2.0],
+        [0.0, tiny, 2.0 * tiny, 1e30],
+    ] {
+        for keys in [[a; 4], [a, b, b, a], [a, b, a, b]] {
+            let mut set = TrackSet::new();
+            set.push("", &times, &keys).unwrap();
+            let mut samples = times.to_vec();
+            samples.extend([0.1, 0.5, 0.9, 1.0 + 1e-9, 1.5, 1e20]);
+            for method in METHODS {
+                for ends in [Ends::Parabolic, Ends::Natural] {
+                    let interpolation = Interpolation {
+                        ends,
+                        ..method.into()
+                    };
+                    let clip = clip(&set, interpolation);
+                    let found = clip.evaluate(&Frames::at(samples.clone())).unwrap();
+                    for q in found.as_quats() {
+                        let what = format!("{method}, {ends:?}, {times:?}, {keys:?}: {q}");
+                        assert!((q.length() - 1.0).abs() < 1e-5, "{what}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn end_velocities_that_cannot_be_met_are_refused() {
+    let set = smooth_set(5, 0.0, 1.0);
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for bad in [f64::NAN, f64::INFINITY, 1e13] {
+        let ends = Ends::Clamped {
+            start: glam::DVec3::X * bad,
+            end: glam::DVec3::ZERO,
+        };
+        for method in METHODS {
+            let interpolation = Interpolation {
+                ends,
+                ..method.into()
+            };
+            let error = engine.upload(&set, interpolation).unwrap_err();
+            assert!(error.to_string().contains("end velocity"), "{error}");
+        }
+    }
+}

@@ -3,7 +3,7 @@
 
 use super::basis::BERNSTEIN;
 use super::{Cubics, Curves, Form, Method, ends};
-use crate::branchless::{Algebra, product, scaled, sum};
+use crate::branchless::{Algebra, product, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval};
 use crate::reference;
 
@@ -34,16 +34,19 @@ impl HandleRule for Rule {
         // only so does it equal Catmull-Rom on uniform keys.
         let left = scaled(
             algebra.log_of_step(before.step, before.log),
-            after.duration / before.duration,
+            ratio(after.duration, before.duration),
         );
         let right = scaled(
             algebra.log_of_step(after.step, after.log),
-            before.duration / after.duration,
+            ratio(before.duration, after.duration),
         );
         // The product's logarithm wraps: on its principal branch a long tangent would
         // point backwards.
         let turn = product(algebra.exp(left), algebra.exp(right));
-        let tangent = scaled(algebra.log_near(turn, sum(left, right)), 1.0 / (3.0 * both));
+        let tangent = scaled(
+            algebra.log_near(turn, sum(left, right)),
+            ratio(1.0, 3.0 * both),
+        );
         Handles {
             incoming: scaled(tangent, before.duration),
             outgoing: scaled(tangent, after.duration),

@@ -213,9 +213,20 @@ pub enum Ends {
 /// How far the last key of a loop may be from the first (half-angle, radians).
 const LOOP_TOLERANCE: f64 = 1e-3;
 
+/// Radians per second at an end; more is refused.
+const FASTEST: f64 = 1e12;
+
 impl Ends {
     /// Refuses a track, the `index`th of its set, that does not end as it must.
     pub(crate) fn check(self, track: Track, index: usize) -> Result<(), InterpolationError> {
+        if let Self::Clamped { start, end } = self {
+            for velocity in [start, end] {
+                // Written so that NaN does not pass.
+                if !(length(velocity.to_array()) <= FASTEST) {
+                    return Err(InterpolationError::EndVelocity { velocity });
+                }
+            }
+        }
         let (Self::Loop, [first, .., last]) = (self, track.keys) else {
             return Ok(());
         };
@@ -247,6 +258,15 @@ pub enum InterpolationError {
         track: usize,
         /// The first of the two keys.
         key: usize,
+    },
+    /// Under [`Ends::Clamped`] a velocity is no number, or too large.
+    #[error(
+        "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",
+        velocity.x, velocity.y, velocity.z
+    )]
+    EndVelocity {
+        /// What was given.
+        velocity: glam::DVec3,
     },
     /// Under [`Ends::Loop`] the last key must repeat the first.
     #[error(

@@ -149,8 +149,8 @@ impl FitBlock {
 
     /// Whether the polynomial of a lane is near enough to its curve.
     pub(super) fn fits(&self, lane: usize) -> bool {
-        // Written so that NaN does not pass.
-        self.tails[lane] <= TOLERANCE && self.reaches[lane] <= REACH * REACH
+        let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= REACH * REACH;
+        is_near && self.coefficients[0][lane].iter().all(|c| c.is_finite())
     }
 
     /// Writes the polynomial of a lane.
