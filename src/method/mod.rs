@@ -221,8 +221,8 @@ impl Ends {
     pub(crate) fn check(self, track: Track, index: usize) -> Result<(), InterpolationError> {
         if let Self::Clamped { start, end } = self {
             for velocity in [start, end] {
-                // Written so that NaN does not pass.
-                if !(length(velocity.to_array()) <= FASTEST) {
+                let speed = length(velocity.to_array());
+                if !speed.is_finite() || speed > FASTEST {
                     return Err(InterpolationError::EndVelocity { velocity });
                 }
             }
