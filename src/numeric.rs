@@ -1,7 +1,4 @@
-//! f64 arithmetic that reaches a kernel, the same on every machine.
-//!
-//! The platform's sine differs from libm to libm; ours is the `libm` crate's.
-//! Everything a kernel reads passes through [`canonical`], so that no driver
+//! Rounding on the way to a kernel, the same on every machine: everything a kernel reads passes through [`canonical`], so that no driver
 //! ever meets a subnormal.
 
 use glam::{DQuat, Quat};

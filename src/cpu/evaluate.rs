@@ -11,7 +11,10 @@ pub(super) const FEW: usize = 3;
 /// Samples whose components are kept before they are stored.
 pub(super) const CHUNK: usize = 4 * BLOCK;
 
-/// Room for the components of some samples, before they are put together.
+/// Room for the components of some samples, before they are put together. Aligned to
+/// the widest vector: where one lies across two cache lines, everything takes a sixth
+/// longer.
+#[repr(align(64))]
 pub(crate) struct Scratch {
     components: [[f32; CHUNK]; 4],
 }
