@@ -1,5 +1,5 @@
-//! Rounding on the way to a kernel, the same on every machine: everything a kernel reads passes through [`canonical`], so that no driver
-//! ever meets a subnormal.
+//! Rounding on the way to a kernel, the same on every machine: everything a kernel
+//! reads passes through [`canonical`], so that no driver ever meets a subnormal.
 
 use glam::{DQuat, Quat};
 
