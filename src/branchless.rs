@@ -151,7 +151,7 @@ const ARC_TANGENT: [f64; 11] = [
 
 /// The arc tangent of `t`, 0 <= t <= 1, within 5e-16 of it, relative.
 #[inline(always)]
-fn arc_tangent(t: f64) -> f64 {
+pub(crate) fn arc_tangent(t: f64) -> f64 {
     // That of half the angle, twice: a wild tangent multiplies an angle's error.
     let half = t / (1.0 + (1.0 + t * t).sqrt());
     let z = half * half;

@@ -53,6 +53,7 @@ mod device;
 mod encoding;
 mod engine;
 pub mod formats;
+mod formula;
 mod frame_rate;
 pub mod generate;
 mod gpu;
@@ -61,6 +62,7 @@ mod numeric;
 mod prepare;
 pub mod reference;
 mod rotations;
+mod scalar;
 mod schedule;
 mod segment;
 pub mod spirv;
@@ -77,10 +79,12 @@ pub use encoding::Encoding;
 pub use engine::{Engine, Error};
 pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
-pub use method::{Ends, Form, Interpolation, InterpolationError, METHODS, Method, Path};
+pub use method::{
+    Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
+};
 pub use rotations::{Layout, Rotations};
 pub use stream::Chunk;
-pub use tracks::{NORM_TOLERANCE, Track, TrackError, TrackSet};
+pub use tracks::{NORM_TOLERANCE, Tcb, Track, TrackError, TrackSet};
 
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]

@@ -5,9 +5,15 @@
 //! everything behind it trusts it: every track has at least one key, times are
 //! finite and strictly increasing, keys are unit quaternions.
 
+mod error;
+mod key_data;
+
 use std::ops::Range;
 
-use glam::{DQuat, Quat};
+pub use error::TrackError;
+use glam::{DQuat, DVec3, Quat};
+use key_data::KeyData;
+pub use key_data::Tcb;
 
 use crate::numeric::{canonical, to_f64, unit_f32};
 
@@ -35,6 +41,9 @@ pub struct TrackSet {
     tracks: Vec<TrackRange>,
     names: Vec<String>,
     box_length: Option<f64>,
+    velocities: KeyData<DVec3>,
+    tangents: KeyData<[Quat; 2]>,
+    tcb: KeyData<Tcb>,
     /// First and last key time over all tracks.
     span: Option<(f64, f64)>,
 }
@@ -57,6 +66,14 @@ pub struct Track<'a> {
     pub times: &'a [f64],
     /// Unit keys, one for each time.
     pub keys: &'a [Quat],
+    /// Angular velocities of the keys, rad/s in the body frame; empty where none were
+    /// given.
+    pub velocities: &'a [DVec3],
+    /// Tangents with which a curve arrives at each key and leaves it, `x y z w` a second;
+    /// empty where none were given.
+    pub tangents: &'a [[Quat; 2]],
+    /// Tension, continuity and bias of the keys; empty where none were given.
+    pub tcb: &'a [Tcb],
 }
 
 impl Track<'_> {
@@ -65,67 +82,12 @@ impl Track<'_> {
         Self {
             times: &self.times[first..=last],
             keys: &self.keys[first..=last],
+            velocities: self.velocities.get(first..=last).unwrap_or_default(),
+            tangents: self.tangents.get(first..=last).unwrap_or_default(),
+            tcb: self.tcb.get(first..=last).unwrap_or_default(),
             ..self
         }
     }
-}
-
-/// Why keys were refused. Places count from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrackError {
-    /// A track must have at least one key.
-    #[error("track {track} has no keys; give it at least one")]
-    Empty {
-        /// The track's place in the set.
-        track: usize,
-    },
-    /// Each key needs one time.
-    #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
-    LengthMismatch {
-        /// The track's place in the set.
-        track: usize,
-        /// Number of keys given.
-        keys: usize,
-        /// Number of times given.
-        times: usize,
-    },
-    /// A time is NaN or infinite.
-    #[error("track {track}, key {key}: time {time} is not finite")]
-    TimeNotFinite {
-        /// The track's place in the set.
-        track: usize,
-        /// The key's place in the track.
-        key: usize,
-        /// The offending time, seconds.
-        time: f64,
-    },
-    /// Times must increase strictly.
-    #[error(
-        "track {track}, key {key}: time {time} s does not come after {previous} s; sort the keys and remove duplicates"
-    )]
-    TimeNotIncreasing {
-        /// The track's place in the set.
-        track: usize,
-        /// The key's place in the track.
-        key: usize,
-        /// The offending time, seconds.
-        time: f64,
-        /// The time before it, seconds.
-        previous: f64,
-    },
-    /// The quaternion is not close to unit length.
-    #[error(
-        "track {track}, key {key}: quaternion norm is {norm}; a rotation has norm 1 (±{NORM_TOLERANCE})"
-    )]
-    NotUnit {
-        /// The track's place in the set.
-        track: usize,
-        /// The key's place in the track.
-        key: usize,
-        /// Its norm.
-        norm: f64,
-    },
 }
 
 impl TrackSet {
@@ -237,6 +199,9 @@ impl TrackSet {
                 .filter(|name| !name.is_empty()),
             times: &self.times[first_time..first_time + len],
             keys: &self.keys[first_key..first_key + len],
+            velocities: self.velocities.of(index, len),
+            tangents: self.tangents.of(index, len),
+            tcb: self.tcb.of(index, len),
         }
     }
 
@@ -271,6 +236,10 @@ impl TrackSet {
             let first_time = set.share_or_append(track.times);
             let first_key = set.keys.len();
             set.keys.extend_from_slice(track.keys);
+            let own = set.tracks.len();
+            set.velocities.set(own, track.velocities);
+            set.tangents.set(own, track.tangents);
+            set.tcb.set(own, track.tcb);
             if let Some(name) = track.name {
                 set.names.resize(set.tracks.len(), String::new());
                 set.names.push(name.to_owned());

@@ -168,13 +168,13 @@ struct TrackErrors {
 impl TrackErrors {
     fn measure(
         set: &TrackSet,
-        Interpolation { method, path, ends }: Interpolation,
+        interpolation: Interpolation,
         timeline: &Timeline,
         found: &Rotations,
         index: usize,
     ) -> Self {
         let track = set.track(index);
-        let curve = reference::Curve::new(method.reference, path, ends, track.times, track.keys);
+        let curve = reference::Curve::of(&interpolation, track);
         let samples = timeline.len();
         let row = &found.as_quats()[index * samples..(index + 1) * samples];
         let mut errors = Self {

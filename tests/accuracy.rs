@@ -4,11 +4,11 @@
 mod support;
 
 use glam::{DQuat, Quat};
-use support::{Random, hostile_set};
+use support::{Random, give_key_data, hostile_set};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Clip, Device, Ends, Engine, Form, FrameRate, Frames, Interpolation, METHODS, Path, Rotations,
-    TrackSet,
+    Track, TrackSet,
 };
 
 /// Largest and rms error in radians, largest | |q| - 1 |.
@@ -29,14 +29,18 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
     let timeline = clip.timeline(frames).unwrap();
     let rotations = clip.evaluate(frames).unwrap();
     let mut errors = Errors::default();
-    let Interpolation {
-        method, path, ends, ..
-    } = interpolation;
+    let mut undefined = 0;
+    let method = interpolation.method;
     for (t, track) in set.tracks().enumerate() {
-        let curve = Curve::new(method.reference, path, ends, track.times, track.keys);
+        let curve = Curve::of(&interpolation, track);
         for s in 0..rotations.samples() {
             let found = rotations.get(t, s).unwrap().as_dquat();
-            let error = angle_between(found, curve.rotation(timeline.time(t, s)));
+            let time = timeline.time(t, s);
+            let error = angle_between(found, curve.rotation(time));
+            if error > 1e-6 && !is_defined(&interpolation, track, time) {
+                undefined += 1;
+                continue;
+            }
             // `max` would swallow NaN.
             assert!(
                 error.is_finite(),
@@ -47,8 +51,33 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
             errors.norm = errors.norm.max((found.length() - 1.0).abs());
         }
     }
+    assert!(
+        undefined * 1000 <= rotations.as_quats().len(),
+        "{undefined} undefined"
+    );
     errors.rms = (errors.rms / rotations.as_quats().len() as f64).sqrt();
     errors
+}
+
+/// Whether there is a curve to compare with: not where the last bit of a key moves it by
+/// a thousandth of a radian, as between opposite control rotations.
+fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
+    let own = Curve::of(interpolation, track).rotation(time);
+    (0..track.keys.len()).all(|key| {
+        let mut keys = track.keys.to_vec();
+        let largest = keys[key]
+            .to_array()
+            .map(f32::abs)
+            .into_iter()
+            .fold(0.0, f32::max);
+        let nudge = Quat::from_xyzw(0.3, -0.7, 0.5, 0.4) * (largest * f32::EPSILON);
+        keys[key] = keys[key] + nudge;
+        let nudged = Track {
+            keys: &keys,
+            ..track
+        };
+        angle_between(own, Curve::of(interpolation, nudged).rotation(time)) < 1e-3
+    })
 }
 
 fn assert_within_bounds(set: &TrackSet, interpolation: Interpolation, frames: &Frames, what: &str) {
@@ -86,6 +115,7 @@ fn smooth_set(seed: u64, start: f64, step: f64) -> TrackSet {
         }
         set.push("", &times, &keys).unwrap();
     }
+    give_key_data(&mut set, seed);
     set
 }
 
@@ -247,7 +277,7 @@ fn end_values_are_held_outside_the_keys() {
         let clip = clip(&set, method.into());
         let frames = clip.evaluate(&Frames::fps(10).between(0.0, 9.0)).unwrap();
         let held = |a, b| bits(frames.get(0, a).unwrap()) == bits(frames.get(0, b).unwrap());
-        assert!(held(0, 9) && held(40, 90) && !held(9, 15), "{method}");
+        assert!(held(0, 9) && held(40, 90) && !held(9, 25), "{method}");
         for s in 0..frames.samples() {
             assert_eq!(bits(frames.get(1, s).unwrap()), bits(keys[1]), "{method}");
         }

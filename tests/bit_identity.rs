@@ -7,7 +7,7 @@ use glam::{DVec3, Quat};
 use support::{Random, first_difference, hostile_set, vulkan_devices};
 use tumble::{
     Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, TrackSet,
-    Transfer, VectorWidth,
+    Transfer, VectorWidth, method,
 };
 
 const ENDS: [Ends; 4] = [
@@ -271,8 +271,8 @@ fn reused_buffers_hold_nothing_of_older_results() {
     let set = hostile_set(3, 64);
     for device in vulkan_devices() {
         let vulkan = Engine::new(device).unwrap();
-        let clip = vulkan.upload(&set, METHODS[2]).unwrap();
-        let reference = cpu().upload(&set, METHODS[2]).unwrap();
+        let clip = vulkan.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+        let reference = cpu().upload(&set, method::BESSEL_OVERHAUSER).unwrap();
         for end in [30.0, 3.0, 20.0, 0.0, 29.0, 1.0] {
             let frames = Frames::fps(30).between(0.0, end);
             let expected = reference.evaluate(&frames).unwrap();
@@ -297,8 +297,8 @@ fn several_threads_share_an_engine() {
     let frames = Frames::fps(60).between(0.0, 10.0);
     for device in vulkan_devices() {
         let vulkan = Engine::new(device).unwrap();
-        let clip = vulkan.upload(&set, METHODS[1]).unwrap();
-        let expected = cpu().evaluate(&set, METHODS[1], &frames).unwrap();
+        let clip = vulkan.upload(&set, method::CATMULL_ROM).unwrap();
+        let expected = cpu().evaluate(&set, method::CATMULL_ROM, &frames).unwrap();
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
@@ -429,7 +429,7 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     }
     let mut set = TrackSet::new();
     set.push("", &times, &keys).unwrap();
-    let slerp = METHODS[0];
+    let slerp = method::SLERP;
     let clip = cpu().upload(&set, slerp).unwrap();
     for frames in [
         Frames::fps(7),

@@ -91,14 +91,21 @@ fn a_sink_that_fails_ends_the_stream() {
         let engine = Engine::new(device).unwrap();
         let mut taken = 0;
         let frames = Frames::fps(120).between(0.0, 10.0);
-        let result = engine.stream(&set, METHODS[0], &frames, Layout::TrackMajor, 1500, |_| {
-            taken += 1;
-            if taken == 3 {
-                Err(Stop::Enough)
-            } else {
-                Ok(())
-            }
-        });
+        let result = engine.stream(
+            &set,
+            method::SLERP,
+            &frames,
+            Layout::TrackMajor,
+            1500,
+            |_| {
+                taken += 1;
+                if taken == 3 {
+                    Err(Stop::Enough)
+                } else {
+                    Ok(())
+                }
+            },
+        );
         assert!(matches!(result, Err(Stop::Enough)));
         assert_eq!(taken, 3);
     }
@@ -110,7 +117,7 @@ fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
     let frames = Frames::at(vec![0.0, f64::NAN]);
     let result = engine.stream(
         &hostile_set(7, 4),
-        METHODS[0],
+        method::SLERP,
         &frames,
         Layout::TrackMajor,
         10,

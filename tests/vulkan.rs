@@ -5,7 +5,7 @@ mod support;
 use support::{first_difference, hostile_set, vulkan_devices};
 use tumble::{
     Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Transfer, VulkanBuffer,
-    VulkanError,
+    VulkanError, method,
 };
 
 #[test]
@@ -259,7 +259,7 @@ fn results_stay_in_an_applications_own_buffer() {
         }
     }
     let cpu = Engine::new(Device::Cpu).unwrap();
-    let clip = cpu.upload(&set, METHODS[0]).unwrap();
+    let clip = cpu.upload(&set, method::SLERP).unwrap();
     let nowhere = VulkanBuffer {
         buffer: ash::vk::Buffer::null(),
         offset: 0,

@@ -8,14 +8,9 @@ use tumble::{Ends, METHODS, Method, Path};
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct Manner {
-    /// What happens in the first and the last segment
-    #[arg(
-        long,
-        value_name = "ENDS",
-        default_value = "parabolic",
-        hide_default_value = true
-    )]
-    ends: EndsArgument,
+    /// What happens in the first and the last segment (default: the method's own)
+    #[arg(long, value_name = "ENDS")]
+    ends: Option<EndsArgument>,
     /// Which way round between neighbouring keys
     #[arg(
         long,
@@ -24,12 +19,28 @@ pub(crate) struct Manner {
         hide_default_value = true
     )]
     path: PathArgument,
+    /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
+    tension: f64,
+    /// kochanek-bartels: -1 makes corners at the keys
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
+    continuity: f64,
+    /// kochanek-bartels: 1 follows the interval before a key, -1 that behind it
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
+    bias: f64,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("not a finite number".to_owned()),
+    }
 }
 
 impl Manner {
     pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
         let still = DVec3::ZERO;
-        let ends = match self.ends {
+        let ends = self.ends.map(|ends| match ends {
             EndsArgument::Parabolic => Ends::Parabolic,
             EndsArgument::Natural => Ends::Natural,
             EndsArgument::Clamped => Ends::Clamped {
@@ -37,24 +48,36 @@ impl Manner {
                 end: still,
             },
             EndsArgument::Loop => Ends::Loop,
+            EndsArgument::Secant => Ends::Secant,
             EndsArgument::Frozen => Ends::Frozen,
-        };
+        });
         let path = match self.path {
             PathArgument::Shortest => Path::Shortest,
             PathArgument::AsAuthored => Path::AsAuthored,
         };
-        tumble::Interpolation { method, path, ends }
+        tumble::Interpolation {
+            method,
+            path: method.path.unwrap_or(path),
+            ends: ends.unwrap_or(method.ends),
+            tcb: tumble::Tcb {
+                tension: self.tension,
+                continuity: self.continuity,
+                bias: self.bias,
+            },
+        }
     }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum EndsArgument {
-    /// the parabola through the last three keys (default)
+    /// the parabola through the last three keys
     Parabolic,
     /// no angular acceleration
     Natural,
     /// start and end at rest
     Clamped,
+    /// the velocity of slerp between the last two keys
+    Secant,
     /// the last key repeats the first
     Loop,
     /// the first and the last segment stand still

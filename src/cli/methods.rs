@@ -24,7 +24,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "summary": method.summary,
                 "formula": method.formula,
                 "source": method.source,
-                "continuity": method.continuity,
+                "continuity": method.continuity.to_string(),
+                "continuity_on_even_keys": method.continuity_on_even_keys.to_string(),
                 "interpolates": method.interpolates,
             })
         });
@@ -37,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .unwrap_or(0);
     let smooth = METHODS
         .iter()
-        .map(|method| method.continuity.chars().count())
+        .map(|method| method.smoothness().len())
         .max()
         .unwrap_or(0);
     let mut text = String::new();
@@ -45,7 +46,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let _ = writeln!(
             text,
             "{:width$}  {:smooth$}  {}",
-            method.name, method.continuity, method.summary
+            method.name,
+            method.smoothness(),
+            method.summary
         );
     }
     words::listing(&text)

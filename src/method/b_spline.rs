@@ -1,35 +1,78 @@
-//! The cumulative uniform cubic B-spline.
+//! The cumulative cubic B-spline, with the key times as knots.
 
-use super::basis::B_SPLINE as BASIS;
-use super::{Cubics, Curves, Ends, Form, Method};
-use crate::branchless::{Vector, exp, product, scaled, sum};
+use super::ends::End;
+use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use crate::branchless::{Vector, exp, product, ratio, scaled, sum};
 use crate::cpu::in_lanes;
-use crate::prepare::{BetweenNeighbours, Intervals, Stretch};
+use crate::formula::Product;
+use crate::prepare::{BetweenNeighbours, Intervals, Shape, Stretch};
 use crate::reference;
+use crate::tracks::Track;
 
-/// The cumulative cubic B-spline: the smoothest, but it only nears its keys. The
-/// key times must be even for the curve to be smooth in time.
+/// The cumulative cubic B-spline: the smoothest, but it only nears its keys. Its knots
+/// are the key times, even or not; before the first and behind the last they go on in
+/// steps as long as the last.
 pub const B_SPLINE: Method = Method {
     name: "b-spline",
     summary: "continuous angular acceleration; passes near its keys, not through them",
-    formula: "q(t) = q_{i-1} Π exp(C_j(t) log(q_{i+j-2}⁻¹ q_{i+j-1})), j = 1, 2, 3",
-    source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
-    continuity: "C2 (uniform keys)",
+    formula: "q(t) = q_{i-1} Π exp(C_j(t) log(q_{i+j-2}⁻¹ q_{i+j-1})), j = 1, 2, 3, with C_j the sums of the last basis functions",
+    source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves; de Boor 1972",
+    continuity: Continuity::C2,
+    continuity_on_even_keys: Continuity::C2,
+    keeps_constant_velocity: Keys::Even,
     interpolates: false,
+    symmetric: false,
     form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
     reference: reference::Kind::BSpline,
-    curves: Curves::Cubics(Cubics {
-        basis: &BASIS,
-        curves,
-    }),
+    curves: Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing))),
 };
+
+/// The lengths of the two intervals before one, and of the two behind it, in its own.
+fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
+    let last = track.times.len() as isize - 2;
+    let closed = matches!(interpolation.ends, Ends::Loop);
+    let duration = |offset: isize| {
+        let i = interval as isize + offset;
+        let i = if closed {
+            i.rem_euclid(last + 1)
+        } else {
+            i.clamp(0, last)
+        } as usize;
+        track.times[i + 1] - track.times[i]
+    };
+    let own = duration(0);
+    let others = [-2, -1, 1, 2].map(|offset| ratio(duration(offset), own));
+    [others, [0.0; 4]]
+}
+
+/// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval
+/// of length 1, of whose neighbours the lengths are given.
+fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
+    let first = 1.0 / ((1.0 + before) * (1.0 + before + before_that));
+    let third = 1.0 / ((1.0 + after) * (1.0 + after + after_that));
+    let all = 1.0 + before + after;
+    let second = 1.0 / ((1.0 + before) * all);
+    let (c0, c1, c2) = (
+        before * before * second,
+        3.0 * before * second,
+        3.0 * second,
+    );
+    let at_end = 1.0 - after * after / ((1.0 + after) * all);
+    [
+        [1.0 - first, 3.0 * first, -3.0 * first, first],
+        [c0, c1, c2, at_end - c0 - c1 - c2],
+        [0.0, 0.0, 0.0, third],
+    ]
+}
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     for stretch in stretches {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the neighbours are those across the seam
         }
-        let alone = stretch.all == 1;
+        let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
         let (first, last) = (stretch.first(), stretch.last());
         let before = first.map(|lane| (lane - 1, before_first(intervals, lane, ends, alone)));
         let after = last.map(|lane| (lane + 1, after_last(intervals, lane, ends, alone)));
@@ -38,44 +81,63 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         }
     }
     in_lanes(&mut BetweenNeighbours(intervals));
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let basis = basis(intervals.outward(lane));
+        intervals.set_numbers(lane, Product::BASIS, basis.as_flattened());
+    }
 }
 
 /// The logarithm that continues the curve before the first interval.
 fn before_first(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
     let own = intervals.log(lane);
-    match ends {
-        _ if alone => own, // two keys: constant velocity
-        Ends::Parabolic => sum(scaled(own, 2.0), scaled(intervals.log(lane + 1), -1.0)),
-        Ends::Clamped { start, .. } => {
-            // B₁' = B₂' = 1/2 and B₂ = 1/6 at t = 0.
-            let target = scaled(start.to_array(), intervals.duration(lane));
-            rotate(scaled(own, 1.0 / 6.0), sum(target, scaled(own, -1.0)))
-        }
-        Ends::Natural | Ends::Loop | Ends::Frozen => own,
+    if alone {
+        return own; // two keys: constant velocity
     }
+    let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(intervals.outward(lane));
+    let turn = match ends.start() {
+        End::Parabolic => return extrapolated(intervals, lane, lane + 1),
+        // B₁'' = -2 B₁' at t = 0.
+        End::Natural => return scaled(own, bend2 / slope1),
+        End::Secant => own,
+        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+    };
+    let rest = sum(turn, scaled(own, -slope2));
+    rotate(scaled(own, value2), scaled(rest, 1.0 / slope1))
 }
 
 /// The logarithm that continues the curve behind the last interval.
 fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
     let own = intervals.log(lane);
-    match ends {
-        _ if alone => own,
-        Ends::Parabolic => sum(scaled(own, 2.0), scaled(intervals.log(lane - 1), -1.0)),
-        Ends::Clamped { end, .. } => {
-            // B₂' = B₃' = 1/2 and B₃ = 1/6 at t = 1: the unknown also turns the frame.
-            let target = scaled(end.to_array(), intervals.duration(lane));
-            let start = sum(target, scaled(own, -1.0));
-            (0..END_ITERATIONS).fold(start, |step, _| {
-                let turned = rotate(scaled(step, -1.0 / 6.0), own);
-                sum(target, scaled(turned, -1.0))
-            })
-        }
-        Ends::Natural | Ends::Loop | Ends::Frozen => own,
+    if alone {
+        return own;
     }
+    let [_, [_, c1, c2, c3], [.., value3]] = basis(intervals.outward(lane));
+    let slope3 = 3.0 * value3;
+    let turn = match ends.end() {
+        End::Parabolic => return extrapolated(intervals, lane, lane - 1),
+        End::Natural => return scaled(own, -(c2 + 3.0 * c3) / slope3),
+        End::Secant => own,
+        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+    };
+    // The unknown also turns the frame in which the own slope is seen.
+    let own_slope = c1 + 2.0 * c2 + 3.0 * c3;
+    (0..END_ITERATIONS).fold(own, |step, _| {
+        let turned = rotate(scaled(step, -value3), own);
+        let rest = sum(turn, scaled(turned, -own_slope));
+        scaled(rest, 1.0 / slope3)
+    })
 }
 
-/// Each iteration shrinks the error by a third of the step's half-angle or more.
-const END_ITERATIONS: usize = 48;
+/// The parabola through the last three keys, one interval further.
+fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
+    let (own, other) = (intervals.log(lane), intervals.log(next));
+    let (h, next_h) = (intervals.duration(lane), intervals.duration(next));
+    let change = sum(scaled(other, ratio(h, next_h)), scaled(own, -1.0));
+    sum(own, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
+}
+
+/// Each iteration shrinks the error by at least a fifth, by more than half as a rule.
+const END_ITERATIONS: usize = 120;
 
 /// `exp(a) v exp(-a)`.
 fn rotate(a: Vector, v: Vector) -> Vector {

@@ -1,10 +1,9 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use super::basis::BERNSTEIN;
-use super::{Cubics, Curves, Form, Method, ends};
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, ratio, scaled, sum};
-use crate::prepare::{HandleRule, Handles, Interval};
+use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
@@ -14,14 +13,16 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",
     formula: "t_i = ((s⁻)^h_i (s⁺)^h_{i-1})^(1/(h_{i-1}+h_i)), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3)",
     source: "Overhauser 1968; on rotations in the form of Kim, Kim, Shin 1995",
-    continuity: "C1",
+    continuity: Continuity::C1,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Any,
     interpolates: true,
+    symmetric: false,
     form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
     reference: reference::Kind::BesselOverhauser,
-    curves: Curves::Cubics(Cubics {
-        basis: &BERNSTEIN,
-        curves: ends::curves::<Rule>,
-    }),
+    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)),
 };
 
 struct Rule;

@@ -1,9 +1,8 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use super::basis::BERNSTEIN;
-use super::{Cubics, Curves, Form, Method, ends};
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, scaled, sum};
-use crate::prepare::{HandleRule, Handles, Interval};
+use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps: on
@@ -14,14 +13,16 @@ pub const CATMULL_ROM: Method = Method {
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",
     formula: "a_i = q_i (q_{i-1}⁻¹ q_{i+1})^(1/6), b_i = q_i (q_{i-1}⁻¹ q_{i+1})^(-1/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
-    continuity: "C1 (uniform keys)",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Even,
     interpolates: true,
+    symmetric: false,
     form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
     reference: reference::Kind::CatmullRom,
-    curves: Curves::Cubics(Cubics {
-        basis: &BERNSTEIN,
-        curves: ends::curves::<Rule>,
-    }),
+    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)),
 };
 
 struct Rule;

@@ -1,15 +1,37 @@
-//! Interpolating cubics: handles at the keys become curves. A method says what the
-//! handles of an inner key are; this says what happens at the ends.
+//! Curves by handles: a method says what the handles of an inner key are; this says what
+//! happens at the ends, and makes curves of them.
 
 use std::marker::PhantomData;
 
 use super::Ends;
-use crate::branchless::{Vector, exp, log, product, scaled, sum};
+use crate::branchless::{Vector, exp, log, product, scaled};
 use crate::cpu::in_lanes;
-use crate::prepare::{BetweenHandles, HandleRule, Intervals, KeyHandles, Stretch};
+use crate::prepare::{
+    BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, Intervals, KeyHandles,
+    Stretch,
+};
 
-/// The curves of a block of intervals, for a method with that rule for handles.
-pub(super) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+/// Curves in cumulative form, for a method with that rule for handles.
+pub(super) fn products<R: HandleRule>(
+    intervals: &mut Intervals,
+    stretches: &[Stretch],
+    ends: Ends,
+) {
+    handles::<R>(intervals, stretches, ends);
+    in_lanes(&mut BetweenHandles(intervals));
+}
+
+/// Curves by control rotations, for a method with that rule for handles.
+pub(super) fn controls<R: HandleRule>(
+    intervals: &mut Intervals,
+    stretches: &[Stretch],
+    ends: Ends,
+) {
+    handles::<R>(intervals, stretches, ends);
+    in_lanes(&mut ControlRotations(intervals));
+}
+
+fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     in_lanes(&mut KeyHandles::<R> {
         intervals,
         rule: PhantomData,
@@ -18,55 +40,87 @@ pub(super) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stre
         let (first, last) = (stretch.first(), stretch.last());
         if let (Some(lane), 1) = (first, stretch.all) {
             // Two keys: the handles of constant velocity.
-            let third = scaled(intervals.log(lane), 1.0 / 3.0);
-            intervals.set_outgoing(lane, third);
-            intervals.set_incoming(lane + 1, third);
+            let log = intervals.log(lane);
+            let alone = EndInterval {
+                log,
+                other: [0.0; 3],
+                rest: [0.0; 3],
+            };
+            let handle = R::end(alone, EndHandle::Turn(log));
+            intervals.set_outgoing(lane, handle);
+            intervals.set_incoming(lane + 1, handle);
             continue;
         }
         if matches!(ends, Ends::Loop) {
             continue;
         }
         if let Some(lane) = first {
-            let handle = first_handle(intervals, lane, ends);
+            let other = intervals.incoming(lane + 1);
+            let rest = product(intervals.step(lane), exp(scaled(other, -1.0)));
+            let handle = end_handle::<R>(intervals, lane, other, log(rest), ends.start());
             intervals.set_outgoing(lane, handle);
         }
         if let Some(lane) = last {
-            let handle = last_handle(intervals, lane, ends);
+            let other = intervals.outgoing(lane);
+            let rest = product(exp(scaled(other, -1.0)), intervals.step(lane));
+            let handle = end_handle::<R>(intervals, lane, other, log(rest), ends.end());
             intervals.set_incoming(lane + 1, handle);
         }
     }
-    in_lanes(&mut BetweenHandles(intervals));
 }
 
-/// The handle of the first key towards its interval, that in `lane`.
-fn first_handle(intervals: &Intervals, lane: usize, ends: Ends) -> Vector {
-    let incoming = intervals.incoming(lane + 1);
-    match ends {
-        Ends::Clamped { start, .. } => scaled(start.to_array(), intervals.duration(lane) / 6.0),
-        Ends::Natural => {
-            // No acceleration: a lies half way between the key and b.
-            let to_b = product(intervals.step(lane), exp(scaled(incoming, -1.0)));
-            scaled(log(to_b), 0.5)
+/// What happens at one end.
+#[derive(Clone, Copy)]
+pub(super) enum End {
+    Parabolic,
+    Natural,
+    Secant,
+    /// Half of an angular velocity, radians per second.
+    Clamped(Vector),
+}
+
+impl Ends {
+    /// What happens at the first key.
+    pub(super) fn start(self) -> End {
+        match self {
+            Self::Clamped { start, .. } => End::Clamped(scaled(start.to_array(), 0.5)),
+            _ => self.either(),
         }
-        Ends::Parabolic | Ends::Loop | Ends::Frozen => sum(
-            scaled(intervals.log(lane), 2.0 / 3.0),
-            scaled(incoming, -1.0),
-        ),
+    }
+
+    /// What happens at the last key.
+    pub(super) fn end(self) -> End {
+        match self {
+            Self::Clamped { end, .. } => End::Clamped(scaled(end.to_array(), 0.5)),
+            _ => self.either(),
+        }
+    }
+
+    fn either(self) -> End {
+        match self {
+            Self::Natural => End::Natural,
+            Self::Secant => End::Secant,
+            Self::Parabolic | Self::Clamped { .. } | Self::Loop | Self::Frozen => End::Parabolic,
+        }
     }
 }
 
-/// The handle of the last key towards its interval, that in `lane`.
-fn last_handle(intervals: &Intervals, lane: usize, ends: Ends) -> Vector {
-    let outgoing = intervals.outgoing(lane);
-    match ends {
-        Ends::Clamped { end, .. } => scaled(end.to_array(), intervals.duration(lane) / 6.0),
-        Ends::Natural => {
-            let from_a = product(exp(scaled(outgoing, -1.0)), intervals.step(lane));
-            scaled(log(from_a), 0.5)
-        }
-        Ends::Parabolic | Ends::Loop | Ends::Frozen => sum(
-            scaled(intervals.log(lane), 2.0 / 3.0),
-            scaled(outgoing, -1.0),
-        ),
-    }
+/// The handle of an end's key towards the interval in `lane`, whose other handle is
+/// given, and what it leaves of the interval.
+fn end_handle<R: HandleRule>(
+    intervals: &Intervals,
+    lane: usize,
+    other: Vector,
+    rest: Vector,
+    end: End,
+) -> Vector {
+    let log = intervals.log(lane);
+    let interval = EndInterval { log, other, rest };
+    let handle = match end {
+        End::Parabolic => EndHandle::Parabolic,
+        End::Natural => EndHandle::Natural,
+        End::Secant => EndHandle::Turn(log),
+        End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.duration(lane))),
+    };
+    R::end(interval, handle)
 }

@@ -5,28 +5,65 @@
 //! are what the kernels evaluate ([`Form`]). [`METHODS`] lists them all.
 
 mod b_spline;
-mod basis;
 mod bessel_overhauser;
+mod bessel_overhauser_mean;
+mod c2;
 mod catmull_rom;
 mod ends;
+mod gltf_cubic;
+mod hermite;
+mod kochanek_bartels;
+mod nlerp;
+mod shoemake;
+mod shoemake_1985;
+mod shoemake_2;
 mod slerp;
+mod squad;
+mod step;
 
 pub use b_spline::B_SPLINE;
-pub(crate) use basis::Basis;
 pub use bessel_overhauser::BESSEL_OVERHAUSER;
+pub use bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
+pub use c2::C2;
 pub use catmull_rom::CATMULL_ROM;
+pub use gltf_cubic::GLTF_CUBIC;
+pub use hermite::HERMITE;
+pub use kochanek_bartels::KOCHANEK_BARTELS;
+pub use nlerp::NLERP;
+pub use shoemake::SHOEMAKE;
+pub use shoemake_2::SHOEMAKE_2;
+pub use shoemake_1985::SHOEMAKE_1985;
 pub use slerp::SLERP;
+pub use squad::SQUAD;
+pub use step::STEP;
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
-use crate::branchless::{self, length, log, unit};
-use crate::prepare::{Intervals, Stretch};
+use crate::branchless::{self, Vector, length, log, unit};
+use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
-use crate::tracks::Track;
+use crate::tracks::{Tcb, Track};
 
 /// Every method, in the order in which help and reports list them.
-pub static METHODS: [Method; 4] = [SLERP, CATMULL_ROM, BESSEL_OVERHAUSER, B_SPLINE];
+pub static METHODS: [Method; 15] = [
+    STEP,
+    NLERP,
+    SLERP,
+    SHOEMAKE,
+    SHOEMAKE_2,
+    SHOEMAKE_1985,
+    SQUAD,
+    CATMULL_ROM,
+    BESSEL_OVERHAUSER,
+    BESSEL_OVERHAUSER_MEAN,
+    B_SPLINE,
+    HERMITE,
+    KOCHANEK_BARTELS,
+    GLTF_CUBIC,
+    C2,
+];
 
 /// A method of interpolation: one of [`METHODS`].
 ///
@@ -46,12 +83,23 @@ pub struct Method {
     pub formula: &'static str,
     /// Where the formula comes from.
     pub source: &'static str,
-    /// How smooth it is where segments meet.
-    pub continuity: &'static str,
+    /// How smooth it is where segments meet, whatever the key times.
+    pub continuity: Continuity,
+    /// How smooth it is where keys are evenly spaced in time.
+    pub continuity_on_even_keys: Continuity,
+    /// For which keys a rotation at constant velocity stays one.
+    pub keeps_constant_velocity: Keys,
     /// Whether it passes through its keys.
     pub interpolates: bool,
+    /// Whether it takes the same way when the keys are given backwards in time (with
+    /// tangents and bias the other way round).
+    pub symmetric: bool,
     /// What the kernels evaluate for it.
     pub form: Form,
+    /// What it does at the ends where nothing else is asked for.
+    pub ends: Ends,
+    /// The path that it always takes, where that is a part of its definition.
+    pub path: Option<Path>,
     /// Its textbook definition in f64.
     pub reference: reference::Kind,
     /// How its curves follow from the keys.
@@ -61,19 +109,47 @@ pub struct Method {
 /// What lies between two keys.
 #[derive(Clone, Copy)]
 pub(crate) enum Curves {
+    /// The first of them.
+    Steps,
     /// The great circle, at constant speed.
     Arcs,
-    /// Cubics in cumulative form.
-    Cubics(Cubics),
+    /// A curve with a formula.
+    Smooth(Smooth),
 }
 
-/// A rule for cubics.
+/// How a method's curves follow from the keys.
 #[derive(Clone, Copy)]
-pub(crate) struct Cubics {
-    pub(crate) basis: &'static Basis,
-    /// Gives every interval of a block its base and its three vectors, with those
-    /// ends where a track ends.
+pub(crate) struct Smooth {
+    pub(crate) shape: &'static Shape,
+    /// Gives every interval of a block the numbers of its curve, with those ends where a
+    /// track ends.
     pub(crate) curves: fn(&mut Intervals, &[Stretch], Ends),
+    pub(crate) given: Given,
+}
+
+/// What a method knows of an interval beside its two keys.
+#[derive(Clone, Copy)]
+pub(crate) enum Given {
+    Nothing,
+    /// Numbers for the key that it starts with, and for that which it ends with.
+    Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
+    /// The angular velocity at every key of some intervals (rad/s, body frame), where
+    /// each depends on all keys.
+    Velocities(fn(Track, Range<usize>, &Interpolation) -> Vec<Vector>),
+}
+
+impl Smooth {
+    const fn new(shape: &'static Shape, curves: fn(&mut Intervals, &[Stretch], Ends)) -> Self {
+        Self {
+            shape,
+            curves,
+            given: Given::Nothing,
+        }
+    }
+
+    const fn with(self, given: Given) -> Self {
+        Self { given, ..self }
+    }
 }
 
 /// What a kernel evaluates. Many methods share one form.
@@ -85,7 +161,51 @@ pub enum Form {
     Polynomial,
 }
 
+/// How smooth a curve is where its segments meet. With given tangents, tension or
+/// continuity of their own, keys may be less smooth than the method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Continuity {
+    /// The rotation jumps.
+    Jumps,
+    /// The rotation is continuous.
+    C0,
+    /// So is the angular velocity.
+    C1,
+    /// So is the angular acceleration.
+    C2,
+}
+
+impl fmt::Display for Continuity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Jumps => "jumps",
+            Self::C0 => "C0",
+            Self::C1 => "C1",
+            Self::C2 => "C2",
+        })
+    }
+}
+
+/// Key times of which something holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Keys {
+    /// None.
+    Never,
+    /// Those evenly spaced.
+    Even,
+    /// All.
+    Any,
+}
+
 impl Method {
+    /// How smooth it is, in words.
+    pub fn smoothness(&self) -> String {
+        match (self.continuity, self.continuity_on_even_keys) {
+            (any, even) if any == even => any.to_string(),
+            (any, even) => format!("{any}, {even} on even keys"),
+        }
+    }
+
     /// The method with that name.
     pub fn named(name: &str) -> Option<Self> {
         METHODS.iter().copied().find(|method| method.name == name)
@@ -144,14 +264,17 @@ pub struct Interpolation {
     pub path: Path,
     /// What happens at the first and the last key.
     pub ends: Ends,
+    /// For [`KOCHANEK_BARTELS`], where a track has none of its own.
+    pub tcb: Tcb,
 }
 
 impl From<Method> for Interpolation {
     fn from(method: Method) -> Self {
         Self {
             method,
-            path: Path::default(),
-            ends: Ends::default(),
+            path: method.path.unwrap_or_default(),
+            ends: method.ends,
+            tcb: Tcb::default(),
         }
     }
 }
@@ -204,6 +327,9 @@ pub enum Ends {
         /// At the last key.
         end: glam::DVec3,
     },
+    /// The angular velocity of slerp between the last two keys: constant velocity stays
+    /// constant too. [`C2`]'s own ends.
+    Secant,
     /// The last key repeats the first; neighbours are taken across the seam.
     Loop,
     /// The first and the last segment stand still, as in the original program.

@@ -1,6 +1,6 @@
 //! Spherical linear interpolation.
 
-use super::{Curves, Form, Method};
+use super::{Continuity, Curves, Ends, Form, Keys, Method};
 use crate::reference;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.
@@ -9,9 +9,14 @@ pub const SLERP: Method = Method {
     summary: "constant angular velocity between keys; velocity jumps at each key",
     formula: "q(t) = q0 (q0⁻¹ q1)^t",
     source: "Shoemake 1985, Animating rotation with quaternion curves",
-    continuity: "C0",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C0,
+    keeps_constant_velocity: Keys::Any,
     interpolates: true,
+    symmetric: true,
     form: Form::Arc,
+    ends: Ends::Parabolic,
+    path: None,
     reference: reference::Kind::Slerp,
     curves: Curves::Arcs,
 };

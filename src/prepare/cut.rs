@@ -2,16 +2,15 @@
 
 use bytemuck::Zeroable;
 
-use super::cubic::Cubic;
+use super::curve::Curve;
 use super::fit::{FitBlock, Tier};
 use super::intervals::LANES;
-use crate::cpu::in_lanes;
-use crate::method::Basis;
+use super::shape::Shape;
 use crate::segment::PolynomialSegment;
 
 /// Cuts curves; what it needs for that is kept.
 pub(super) struct Cutter {
-    basis: &'static Basis,
+    shape: &'static Shape,
     /// Made when there is something to cut.
     block: Option<Box<FitBlock>>,
     waiting: Vec<Part>,
@@ -24,15 +23,15 @@ pub(super) struct Cutter {
 pub(super) struct Part {
     /// The interval that the curve is of.
     pub(super) interval: usize,
-    pub(super) cubic: Cubic,
+    pub(super) curve: Curve,
     /// Nothing where even the finest does not fit.
     pub(super) segment: Option<PolynomialSegment>,
 }
 
 impl Cutter {
-    pub(super) fn new(basis: &'static Basis) -> Self {
+    pub(super) fn new(shape: &'static Shape) -> Self {
         Self {
-            basis,
+            shape,
             block: None,
             waiting: Vec::new(),
             parts: Vec::new(),
@@ -40,11 +39,11 @@ impl Cutter {
     }
 
     /// Adds the curve of an interval: at least two parts will come of it.
-    pub(super) fn push(&mut self, interval: usize, cubic: Cubic) {
-        for piece in cubic.piece.halves() {
+    pub(super) fn push(&mut self, interval: usize, curve: Curve) {
+        for piece in curve.piece.halves() {
             self.waiting.push(Part {
                 interval,
-                cubic: Cubic { piece, ..cubic },
+                curve: Curve { piece, ..curve },
                 segment: None,
             });
         }
@@ -58,27 +57,27 @@ impl Cutter {
             let now = self.waiting.split_off(first);
             let mut block = match self.block.take() {
                 Some(block) => block,
-                None => Box::new(FitBlock::new(self.basis, Tier::Full)),
+                None => Box::new(FitBlock::new(self.shape, Tier::Full)),
             };
             block.clear();
-            now.iter().for_each(|part| block.push(&part.cubic));
-            in_lanes(&mut *block);
+            now.iter().for_each(|part| block.push(&part.curve));
+            (self.shape.fit)(&mut block);
             for (lane, part) in now.into_iter().enumerate() {
                 if block.fits(lane) {
                     let mut segment = PolynomialSegment::zeroed();
                     block.write(lane, &mut segment);
                     let segment = Some(segment);
                     self.parts.push(Part { segment, ..part });
-                } else if part.cubic.piece.is_finest() {
+                } else if part.curve.piece.is_finest() {
                     self.parts.push(part);
                 } else {
-                    self.push(part.interval, part.cubic);
+                    self.push(part.interval, part.curve);
                 }
             }
             self.block = Some(block);
         }
         self.parts
-            .sort_unstable_by_key(|part| (part.interval, part.cubic.piece.from));
+            .sort_unstable_by_key(|part| (part.interval, part.curve.piece.from));
         &self.parts
     }
 }

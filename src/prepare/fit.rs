@@ -6,12 +6,11 @@
 //! them. Powers come last: a Chebyshev coefficient's rounding error stays small in
 //! their sum, that of a power found directly would not.
 
-use super::cubic::{Cubic, Piece};
+use super::curve::{Curve, Piece};
 use super::intervals::{Intervals, LANES};
-use super::nodes::{EVEN_POWERS, FULL_NODES, GENTLE_NODES, Nodes, ODD_POWERS};
-use super::sample::{Differences, Expanded};
-use crate::cpu::InLanes;
-use crate::method::Basis;
+use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
+use super::shape::Shape;
+use crate::formula::{NUMBERS, Numbers};
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 
@@ -59,10 +58,9 @@ pub(super) fn tier(energy: f64) -> Option<Tier> {
 
 /// Curves that wait, and their polynomials.
 pub(super) struct FitBlock {
-    pub(super) basis: &'static Basis,
+    pub(super) shape: &'static Shape,
     tier: Tier,
-    pub(super) bases: [Lane64; 4],
-    pub(super) vectors: [[Lane64; 3]; 3],
+    pub(super) numbers: [Lane64; NUMBERS],
     /// The middle of the piece to fit, and its width.
     pub(super) middles: Lane64,
     pub(super) widths: Lane64,
@@ -75,14 +73,33 @@ pub(super) struct FitBlock {
     pub(super) reaches: Lane64,
 }
 
-impl FitBlock {
-    pub(super) fn new(basis: &'static Basis, tier: Tier) -> Self {
+/// The rotations at a block's nodes: that of the middle, and differences from it at each
+/// pair of nodes, their mean and half of what they differ by.
+pub(super) struct Samples<const PAIRS: usize> {
+    pub(super) middle: [Lane32; 4],
+    pub(super) even: [[Lane32; 4]; PAIRS],
+    pub(super) odd: [[Lane32; 4]; PAIRS],
+}
+
+impl<const PAIRS: usize> Samples<PAIRS> {
+    #[inline(always)]
+    pub(super) fn new() -> Self {
         let lane = [0.0; LANES];
         Self {
-            basis,
+            middle: [lane; 4],
+            even: [[lane; 4]; PAIRS],
+            odd: [[lane; 4]; PAIRS],
+        }
+    }
+}
+
+impl FitBlock {
+    pub(super) fn new(shape: &'static Shape, tier: Tier) -> Self {
+        let lane = [0.0; LANES];
+        Self {
+            shape,
             tier,
-            bases: [lane; 4],
-            vectors: [[lane; 3]; 3],
+            numbers: shape.shared.map(|number| [number; LANES]),
             middles: lane,
             widths: lane,
             count: 0,
@@ -90,6 +107,10 @@ impl FitBlock {
             tails: [0.0; LANES],
             reaches: lane,
         }
+    }
+
+    pub(super) fn tier(&self) -> Tier {
+        self.tier
     }
 
     pub(super) fn is_full(&self) -> bool {
@@ -100,27 +121,27 @@ impl FitBlock {
         self.count = 0;
     }
 
-    /// Adds a piece of a cubic; the block is not full.
-    pub(super) fn push(&mut self, cubic: &Cubic) {
+    /// Lanes to work out: whole vectors, or those left over would be done one by one.
+    #[inline(always)]
+    pub(super) fn whole(&self) -> usize {
+        self.count.next_multiple_of(16).min(LANES)
+    }
+
+    /// Adds a piece of a curve; the block is not full.
+    pub(super) fn push(&mut self, curve: &Curve) {
         let lane = self.count;
-        for (lanes, component) in self.bases.iter_mut().zip(cubic.base) {
-            lanes[lane] = component;
+        let own = self.shape.own;
+        for (lanes, &number) in self.numbers[..own].iter_mut().zip(&curve.numbers) {
+            lanes[lane] = number;
         }
-        let vectors = self.vectors.as_flattened_mut().iter_mut();
-        for (lanes, &component) in vectors.zip(cubic.vectors.as_flattened()) {
-            lanes[lane] = component;
-        }
-        self.push_piece(cubic.piece);
+        self.push_piece(curve.piece);
     }
 
     /// Adds the curve in a lane of `intervals`; the block is not full.
     pub(super) fn push_from(&mut self, intervals: &Intervals, from: usize) {
         let lane = self.count;
-        for (lanes, curves) in self.bases.iter_mut().zip(&intervals.bases) {
-            lanes[lane] = curves[from];
-        }
-        let vectors = self.vectors.as_flattened_mut().iter_mut();
-        for (lanes, curves) in vectors.zip(intervals.vectors.as_flattened()) {
+        let own = self.shape.own;
+        for (lanes, curves) in self.numbers[..own].iter_mut().zip(&intervals.numbers) {
             lanes[lane] = curves[from];
         }
         self.push_piece(Piece::WHOLE);
@@ -133,16 +154,17 @@ impl FitBlock {
         self.count += 1;
     }
 
+    /// The numbers of a lane.
+    #[inline(always)]
+    pub(super) fn numbers_of(&self, lane: usize) -> Numbers {
+        std::array::from_fn(|i| self.numbers[i][lane])
+    }
+
     /// The whole curve in a lane.
-    pub(super) fn cubic(&self, lane: usize) -> Cubic {
-        let at = |lanes: &Lane64| lanes[lane];
-        Cubic {
-            base: self.bases.each_ref().map(at),
-            vectors: self
-                .vectors
-                .each_ref()
-                .map(|vector| vector.each_ref().map(at)),
-            basis: self.basis,
+    pub(super) fn curve(&self, lane: usize) -> Curve {
+        Curve {
+            shape: self.shape,
+            numbers: self.numbers_of(lane),
             piece: Piece::WHOLE,
         }
     }
@@ -153,55 +175,23 @@ impl FitBlock {
         is_near && self.coefficients[0][lane].iter().all(|c| c.is_finite())
     }
 
-    /// Writes the polynomial of a lane.
+    /// Writes the polynomial of a lane. Powers above the tier's stay 0.
     #[inline]
     pub(super) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
         for (power, coefficients) in segment.coefficients.iter_mut().enumerate() {
             *coefficients = self.coefficients[power][lane];
         }
     }
-}
-
-impl InLanes for FitBlock {
-    #[inline(always)]
-    fn run(&mut self) {
-        match self.tier {
-            _ if self.count == 0 => {}
-            Tier::Gentle => self.fit(&GENTLE_NODES),
-            Tier::Full => self.fit(&FULL_NODES),
-        }
-    }
-}
-
-impl FitBlock {
-    #[inline(always)]
-    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
-        // Whole vectors: lanes left over would be worked out one by one.
-        let count = self.count.next_multiple_of(16).min(LANES);
-        let lane = [0.0; LANES];
-        let mut expanded = Expanded {
-            terms: [[lane; 4]; 8],
-            squares: [lane; 3],
-            powers: [[lane; 3]; 3],
-        };
-        self.expand(count, &mut expanded);
-        let mut differences = Differences {
-            even: [[lane; 4]; PAIRS],
-            odd: [[lane; 4]; PAIRS],
-        };
-        expanded.sample(count, nodes, &mut differences);
-        self.interpolate(count, nodes, &expanded, &differences);
-    }
 
     /// From the differences at the nodes to the coefficients.
     #[inline(always)]
-    fn interpolate<const PAIRS: usize>(
+    pub(super) fn interpolate<const PAIRS: usize>(
         &mut self,
         count: usize,
         nodes: &Nodes<PAIRS>,
-        expanded: &Expanded,
-        Differences { even, odd }: &Differences<PAIRS>,
+        Samples { middle, even, odd }: &Samples<PAIRS>,
     ) {
+        let entire = self.shape.entire;
         let mut tails = [0.0; LANES];
         let mut found_even = [[[0.0f32; LANES]; 4]; PAIRS];
         let mut found_odd = [[[0.0f32; LANES]; 4]; PAIRS];
@@ -225,7 +215,13 @@ impl FitBlock {
                     found_even[power][c][lane] = canonical(e);
                     found_odd[power][c][lane] = canonical(o);
                 }
-                let tail = means[PAIRS - 1].abs() + 0.125 * halves[PAIRS - 1].abs();
+                let (last_even, last_odd) = (means[PAIRS - 1].abs(), halves[PAIRS - 1].abs());
+                let before_last = means[PAIRS - 2].abs() + halves[PAIRS - 2].abs();
+                let tail = if entire {
+                    last_even + 0.125 * last_odd
+                } else {
+                    last_even + last_odd + 0.25 * before_last
+                };
                 tails[lane] = if tail > tails[lane] {
                     tail
                 } else {
@@ -235,7 +231,7 @@ impl FitBlock {
         }
         self.tails = tails;
         let stored = &mut self.coefficients;
-        let [x, y, z, w] = &expanded.terms[0];
+        let [x, y, z, w] = middle;
         for lane in 0..count {
             stored[0][lane] = [x[lane], y[lane], z[lane], w[lane]].map(canonical);
         }

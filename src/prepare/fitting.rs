@@ -6,14 +6,13 @@ use bytemuck::Zeroable;
 use super::cut::{Cutter, Part as CurvePart};
 use super::fit::{FitBlock, Tier, tier};
 use super::intervals::Intervals;
+use super::shape::Shape;
 use super::{NONE, Prepared, Source};
-use crate::cpu::in_lanes;
-use crate::method::Basis;
 use crate::segment::{PolynomialSegment, Segments};
 
 /// Fits curves; what it needs for that is kept.
 pub(super) struct Fitting {
-    basis: &'static Basis,
+    shape: &'static Shape,
     gentle: Queue,
     full: Queue,
     cutter: Cutter,
@@ -53,12 +52,12 @@ struct Queue {
 }
 
 impl Fitting {
-    pub(super) fn new(basis: &'static Basis) -> Self {
+    pub(super) fn new(shape: &'static Shape) -> Self {
         Self {
-            basis,
+            shape,
             gentle: Queue::default(),
             full: Queue::default(),
-            cutter: Cutter::new(basis),
+            cutter: Cutter::new(shape),
             intervals: Vec::new(),
         }
     }
@@ -79,7 +78,7 @@ impl Fitting {
     ) {
         let interval = self.intervals.len();
         let Some(tier) = tier(curves.energies[lane]) else {
-            self.cutter.push(interval, curves.cubic(lane, self.basis));
+            self.cutter.push(interval, curves.curve(lane, self.shape));
             let source = CurveSource::Parts(None);
             self.intervals.push(Fitted { place, source });
             return;
@@ -93,7 +92,7 @@ impl Fitting {
             Tier::Full => &mut self.full,
         };
         queue.intervals.push(interval);
-        let new = || Box::new(FitBlock::new(self.basis, tier));
+        let new = || Box::new(FitBlock::new(self.shape, tier));
         let block = queue.block.get_or_insert_with(new);
         block.push_from(curves, lane);
         if block.is_full() {
@@ -110,18 +109,19 @@ impl Fitting {
         let Some(block) = &mut queue.block else {
             return;
         };
-        in_lanes(&mut **block);
+        (self.shape.fit)(block);
+        let trusted = tier == Tier::Gentle && self.shape.entire;
         let segments = polynomials(prepared);
         for (lane, interval) in queue.intervals.drain(..).enumerate() {
             let source = &mut self.intervals[interval].source;
             let CurveSource::Segment(segment) = *source else {
                 continue;
             };
-            if tier == Tier::Gentle || block.fits(lane) {
+            if trusted || block.fits(lane) {
                 block.write(lane, &mut segments[segment as usize]);
             } else {
                 *source = CurveSource::Parts(Some(segment));
-                self.cutter.push(interval, block.cubic(lane));
+                self.cutter.push(interval, block.curve(lane));
             }
         }
         block.clear();
@@ -146,7 +146,7 @@ impl Fitting {
                     let is_own = |part: &&CurvePart| part.interval == interval;
                     let own = parts.iter().take_while(is_own).count();
                     for part in parts.split_off(..own).unwrap_or_default() {
-                        let (from, _) = part.cubic.piece.extent();
+                        let (from, _) = part.curve.piece.extent();
                         let start = start + (place.end - start) * from;
                         let key = if from == 0.0 { key } else { NONE };
                         let source = prepared.part_source(part, &mut spare);
@@ -165,7 +165,7 @@ impl Fitting {
 impl Prepared {
     fn part_source(&mut self, part: &CurvePart, spare: &mut Option<u32>) -> Source {
         let Some(segment) = part.segment else {
-            self.exact.push(part.cubic);
+            self.exact.push(part.curve);
             return Source::Exact(self.exact.len() as u32 - 1);
         };
         let segments = polynomials(self);

@@ -4,24 +4,29 @@
 
 mod arcs;
 mod clip_data;
-mod cubic;
-mod cubics;
+mod curve;
 mod cut;
 mod fit;
 mod fitting;
 mod intervals;
 mod nodes;
+mod passes;
 mod sample;
 mod set;
+mod shape;
+mod smooth;
+mod steps;
 
 pub(crate) use arcs::{arc, signed};
 pub(crate) use clip_data::{ClipData, PartRef};
-pub(crate) use cubic::Cubic;
-pub(crate) use intervals::{
-    BetweenHandles, BetweenNeighbours, HandleRule, Handles, Interval, Intervals, KeyHandles,
-    Stretch,
+pub(crate) use curve::Curve;
+pub(crate) use intervals::{Intervals, Stretch};
+pub(crate) use passes::{
+    BetweenHandles, BetweenNeighbours, ControlRotations, EndHandle, EndInterval, HandleRule,
+    Handles, Interval, KeyHandles,
 };
 pub(crate) use set::Preparation;
+pub(crate) use shape::Shape;
 
 use std::ops::Range;
 
@@ -37,8 +42,8 @@ pub(crate) struct Prepared {
     pub(crate) segments: Segments,
     /// Rotations that are stored as they are: keys, end values.
     pub(crate) constants: Vec<[f32; 4]>,
-    /// Cubics too wild for the kernels.
-    pub(crate) exact: Vec<Cubic>,
+    /// Curves too wild for the kernels.
+    pub(crate) exact: Vec<Curve>,
     pub(crate) spans: Spans,
     pub(crate) parts: Vec<Part>,
 }

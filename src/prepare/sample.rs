@@ -2,11 +2,13 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use super::fit::{FitBlock, Lane32, Lane64};
+use super::fit::{FitBlock, Lane32, Lane64, Samples};
 use super::intervals::LANES;
 use super::nodes::Nodes;
+use super::shape::Sampling;
 use crate::branchless::{self, Algebra, Near, product, scaled};
 use crate::cpu::sine_and_fall;
+use crate::formula::Product;
 
 /// A cubic about the middle of its piece, expanded: with `c_j` the cosine of the j-th
 /// angle and `s_j` its sine divided by the length of its vector,
@@ -19,11 +21,26 @@ pub(super) struct Expanded {
     pub(super) powers: [[Lane32; 3]; 3],
 }
 
-/// Differences from the middle at each pair of nodes, for each component: their
-/// mean, and half of what they differ by.
-pub(super) struct Differences<const PAIRS: usize> {
-    pub(super) even: [[Lane32; 4]; PAIRS],
-    pub(super) odd: [[Lane32; 4]; PAIRS],
+/// By the expanded cubic, in f32.
+pub(super) struct Expansion;
+
+impl Sampling for Expansion {
+    #[inline(always)]
+    fn sample<const PAIRS: usize>(
+        block: &mut FitBlock,
+        count: usize,
+        nodes: &Nodes<PAIRS>,
+        samples: &mut Samples<PAIRS>,
+    ) {
+        let lane = [0.0; LANES];
+        let mut expanded = Expanded {
+            terms: [[lane; 4]; 8],
+            squares: [lane; 3],
+            powers: [[lane; 3]; 3],
+        };
+        block.expand(count, &mut expanded);
+        expanded.sample(count, nodes, samples);
+    }
 }
 
 impl FitBlock {
@@ -37,10 +54,23 @@ impl FitBlock {
         let mut reaches = [0.0; LANES];
         // What each rotation has reached at the middle.
         let mut reached = [[[0.0; LANES]; 4]; 3];
-        for (j, [c0, c1, c2, c3]) in self.basis.iter().copied().enumerate() {
+        let (base, rest) = self.numbers.split_at(Product::VECTORS);
+        for j in 0..3 {
             let mut holds = [0.0; LANES];
-            let [vx, vy, vz] = &self.vectors[j];
+            let [vx, vy, vz] = &rest[3 * j..][..3] else {
+                unreachable!("three of them")
+            };
+            let basis = &self.numbers[Product::BASIS + 4 * j..][..4];
+            let at = |lane: usize| {
+                [
+                    basis[0][lane],
+                    basis[1][lane],
+                    basis[2][lane],
+                    basis[3][lane],
+                ]
+            };
             for lane in 0..count {
+                let [c0, c1, c2, c3] = at(lane);
                 let (middle, width) = (self.middles[lane], self.widths[lane]);
                 let [x, y, z] = [vx[lane], vy[lane], vz[lane]];
                 let square = x * x + y * y + z * z;
@@ -66,6 +96,7 @@ impl FitBlock {
             }
             for lane in (0..count).filter(|&lane| holds[lane] == 0.0) {
                 let middle = self.middles[lane];
+                let [c0, c1, c2, c3] = at(lane);
                 let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
                 let turn = branchless::exp(scaled([vx[lane], vy[lane], vz[lane]], weight));
                 for c in 0..4 {
@@ -80,8 +111,8 @@ impl FitBlock {
                 let [x, y, z, w]: &[Lane64; 4] = &reached[j];
                 [x[lane], y[lane], z[lane], w[lane]]
             };
-            let [x, y, z, w] = &self.bases;
-            let first = product([x[lane], y[lane], z[lane], w[lane]], turn(0));
+            let start = [base[0][lane], base[1][lane], base[2][lane], base[3][lane]];
+            let first = product(start, turn(0));
             let second = product(first, turn(1));
             let third = product(second, turn(2));
             for c in 0..4 {
@@ -100,8 +131,8 @@ impl FitBlock {
                 [x[lane], y[lane], z[lane], w[lane]].map(|c| c as f32)
             };
             let vector = |j: usize| {
-                let [x, y, z]: &[Lane64; 3] = &self.vectors[j];
-                [x[lane], y[lane], z[lane]].map(|c| c as f32)
+                let v = &rest[3 * j..][..3];
+                [v[0][lane], v[1][lane], v[2][lane]].map(|c| c as f32)
             };
             let (v1, v2, v3) = (vector(0), vector(1), vector(2));
             let (r2, r3) = (turn(1), turn(2));
@@ -156,8 +187,9 @@ impl Expanded {
         &self,
         count: usize,
         nodes: &Nodes<PAIRS>,
-        Differences { even, odd }: &mut Differences<PAIRS>,
+        Samples { middle, even, odd }: &mut Samples<PAIRS>,
     ) {
+        *middle = self.terms[0];
         for (k, &node) in nodes.at.iter().enumerate() {
             let mut before = [[0.0; LANES]; 4];
             for lane in 0..count {

@@ -5,7 +5,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::arcs::ArcPreparation;
-use super::cubics::CubicPreparation;
+use super::smooth::SmoothPreparation;
+use super::steps::StepPreparation;
 use super::{NONE, Prepared};
 use crate::clock::{Ticks, Timeline};
 use crate::frame_rate::FrameRate;
@@ -85,8 +86,8 @@ fn prepare_long(
 /// The same rotations with the other sign, but for those that are the keys' own.
 fn negate(prepared: &mut Prepared, interpolation: &Interpolation) {
     prepared.segments.negate();
-    for cubic in &mut prepared.exact {
-        cubic.negate();
+    for curve in &mut prepared.exact {
+        curve.negate();
     }
     let frozen = matches!(interpolation.ends, Ends::Frozen);
     if !interpolation.method.interpolates && !frozen {
@@ -124,7 +125,8 @@ impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self(match interpolation.method.curves {
             Curves::Arcs => Box::new(ArcPreparation::new(interpolation)),
-            Curves::Cubics(cubics) => Box::new(CubicPreparation::new(interpolation, cubics)),
+            Curves::Steps => Box::new(StepPreparation::new(interpolation)),
+            Curves::Smooth(smooth) => Box::new(SmoothPreparation::new(interpolation, smooth)),
         })
     }
 
@@ -180,7 +182,7 @@ mod tests {
     /// The bytes of every span's segment; parts of curves may lie in another order.
     fn curves(prepared: &Prepared) -> Vec<&[u8]> {
         let bytes = prepared.segments.as_bytes();
-        let size = bytes.len() / prepared.segments.len();
+        let size = bytes.len() / prepared.segments.len().max(1);
         let segment = |source: &Source| match *source {
             Source::Segment(i) => &bytes[i as usize * size..][..size],
             _ => &[],

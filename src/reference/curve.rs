@@ -1,22 +1,49 @@
-//! The rotation and the angular velocity of one track at any time.
+//! The rotation, the angular velocity and the angular acceleration of one track at any
+//! time.
 
 use glam::{DQuat, DVec3, Quat};
 
-use super::quaternion::{exponential, invert, logarithm, multiply, slerp, vector};
+use super::b_spline::b_spline;
+use super::c2;
+use super::quaternion::{exponential, invert, logarithm, multiply};
+use super::segment::{Basis, Segment};
 use super::tangents::Track;
-use crate::method::{Ends, Path};
+use crate::method::{Ends, Interpolation, Path};
+use crate::tracks;
 
 /// Which textbook curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
+    /// Keys that are held.
+    Step,
+    /// Straight lines between keys, normalised.
+    Nlerp,
     /// Great arcs between keys.
     Slerp,
+    /// Bézier curves, their control rotations the bisectors.
+    Shoemake,
+    /// Bézier curves, their control rotations half way to the bisectors.
+    Shoemake2,
+    /// Bézier curves, their control rotations a third of the way to the bisectors.
+    Shoemake1985,
+    /// Spherical quadrangles.
+    Squad,
     /// Cumulative cubic with tangents from the neighbouring keys.
     CatmullRom,
     /// Cumulative cubic with tangents of the parabola through three keys.
     BesselOverhauser,
-    /// Cumulative uniform cubic B-spline.
+    /// Bézier curves with the mean of the logarithms of the slopes.
+    BesselOverhauserMean,
+    /// Cumulative cubic B-spline.
     BSpline,
+    /// Cumulative cubic with given velocities.
+    Hermite,
+    /// Bézier curves with tension, continuity and bias.
+    KochanekBartels,
+    /// Cubics in the components, with given tangents, normalised.
+    GltfCubic,
+    /// Cubic rotation vectors with continuous angular acceleration.
+    C2,
 }
 
 /// One track's curve.
@@ -25,57 +52,38 @@ pub struct Curve {
     segments: Vec<Segment>,
 }
 
-/// The curve between two keys.
-#[derive(Clone, Copy)]
-enum Segment {
-    Hold(DQuat),
-    Arc(DQuat, DQuat),
-    /// `base Π exp(w_j B_j(t))` (Kim, Kim, Shin 1995).
-    Product {
-        base: DQuat,
-        w: [DVec3; 3],
-        basis: Basis,
-    },
-}
-
-#[derive(Clone, Copy)]
-enum Basis {
-    Bernstein,
-    BSpline,
-}
-
-impl Basis {
-    fn values(self, t: f64) -> [f64; 3] {
-        match self {
-            Self::Bernstein => [1.0 - (1.0 - t).powi(3), t * t * (3.0 - 2.0 * t), t * t * t],
-            Self::BSpline => [
-                (5.0 + 3.0 * t - 3.0 * t * t + t * t * t) / 6.0,
-                (1.0 + 3.0 * t + 3.0 * t * t - 2.0 * t * t * t) / 6.0,
-                t * t * t / 6.0,
-            ],
-        }
-    }
-
-    fn derivatives(self, t: f64) -> [f64; 3] {
-        match self {
-            Self::Bernstein => [
-                3.0 * (1.0 - t) * (1.0 - t),
-                6.0 * t * (1.0 - t),
-                3.0 * t * t,
-            ],
-            Self::BSpline => [0.5 * (1.0 - t) * (1.0 - t), 0.5 + t - t * t, 0.5 * t * t],
-        }
-    }
-}
-
 impl Curve {
-    /// The curve through (or near) `keys` at `times` (seconds). Keys are taken as
-    /// unit quaternions: normalised in f64. A track that [`Ends::Loop`] closes must
-    /// repeat its first key at its end.
+    /// The curve through (or near) `keys` at `times` (seconds), which carry nothing
+    /// beside their rotations. Keys are taken as unit quaternions: normalised in f64. A
+    /// track that [`Ends::Loop`] closes must repeat its first key at its end.
     pub fn new(kind: Kind, path: Path, ends: Ends, times: &[f64], keys: &[Quat]) -> Self {
-        let track = Track::new(path, times, keys);
+        Self::build(kind, ends, Track::new(path, times, keys))
+    }
+
+    /// The curve of a track of a set.
+    pub fn of(interpolation: &Interpolation, track: tracks::Track<'_>) -> Self {
+        let kind = interpolation.method.reference;
+        let path = match kind {
+            Kind::GltfCubic => Path::AsAuthored,
+            _ => interpolation.path,
+        };
+        let mut own = Track::new(path, track.times, track.keys);
+        own.velocities = track.velocities.to_vec();
+        own.tangents = track.tangents.to_vec();
+        own.tcb = match track.tcb {
+            [] => vec![interpolation.tcb; track.keys.len()],
+            given => given.to_vec(),
+        };
+        Self::build(kind, interpolation.ends, own)
+    }
+
+    fn build(kind: Kind, ends: Ends, track: Track) -> Self {
+        let velocities = match kind {
+            Kind::C2 => c2::velocities(&track, ends),
+            _ => Vec::new(),
+        };
         let segments = (0..track.last())
-            .map(|i| segment(&track, kind, ends, i))
+            .map(|i| segment(&track, kind, ends, i, &velocities))
             .collect();
         Self { track, segments }
     }
@@ -97,21 +105,35 @@ impl Curve {
         self.segments[i].rotation(t)
     }
 
-    /// The angular velocity in the body frame, radians per second, by the product
-    /// rule; zero outside the keys. At a key it is that of the later segment.
+    /// The angular velocity in the body frame, radians per second; zero outside the
+    /// keys. At a key it is that of the later segment.
     pub fn velocity(&self, time: f64) -> DVec3 {
-        let times = &self.track.times;
-        if self.track.last() == 0 || time < times[0] || time > times[self.track.last()] {
-            return DVec3::ZERO;
-        }
-        let (i, t) = self.locate(time);
-        self.segments[i].velocity(t) / self.track.step(i)
+        self.inside(time)
+            .map_or(DVec3::ZERO, |(i, t)| self.segment_velocity(i, t))
+    }
+
+    /// The angular acceleration in the body frame, radians per second squared; zero
+    /// outside the keys. At a key it is that of the later segment.
+    pub fn acceleration(&self, time: f64) -> DVec3 {
+        self.inside(time)
+            .map_or(DVec3::ZERO, |(i, t)| self.segment_acceleration(i, t))
     }
 
     /// The angular velocity at parameter `t` of segment `i`; both sides of a key
     /// can be asked for.
     pub fn segment_velocity(&self, i: usize, t: f64) -> DVec3 {
         self.segments[i].velocity(t) / self.track.step(i)
+    }
+
+    /// As [`Curve::segment_velocity`], the angular acceleration.
+    pub fn segment_acceleration(&self, i: usize, t: f64) -> DVec3 {
+        self.segments[i].acceleration(t) / self.track.step(i).powi(2)
+    }
+
+    fn inside(&self, time: f64) -> Option<(usize, f64)> {
+        let times = &self.track.times;
+        let last = self.track.last();
+        (last > 0 && (times[0]..=times[last]).contains(&time)).then(|| self.locate(time))
     }
 
     fn locate(&self, time: f64) -> (usize, f64) {
@@ -122,130 +144,118 @@ impl Curve {
     }
 }
 
-impl Segment {
-    fn rotation(self, t: f64) -> DQuat {
-        match self {
-            Self::Hold(key) => key,
-            Self::Arc(from, to) => slerp(from, to, t),
-            Self::Product { base, w, basis } => {
-                let b = basis.values(t);
-                (0..3).fold(base, |q, j| multiply(q, exponential(w[j] * b[j])))
-            }
-        }
-    }
-
-    /// Twice the derivative of `t`, in the body frame.
-    fn velocity(self, t: f64) -> DVec3 {
-        match self {
-            Self::Hold(_) => DVec3::ZERO,
-            Self::Arc(from, to) => 2.0 * logarithm(multiply(invert(from), to)),
-            Self::Product { w, basis, .. } => {
-                let (b, slopes) = (basis.values(t), basis.derivatives(t));
-                (0..3).fold(DVec3::ZERO, |velocity, j| {
-                    let factor = exponential(w[j] * b[j]);
-                    let moved = DQuat::from_xyzw(velocity.x, velocity.y, velocity.z, 0.0);
-                    let seen = multiply(multiply(invert(factor), moved), factor);
-                    vector(seen) + 2.0 * w[j] * slopes[j]
-                })
-            }
-        }
-    }
-}
-
-fn segment(track: &Track, kind: Kind, ends: Ends, i: usize) -> Segment {
+fn segment(track: &Track, kind: Kind, ends: Ends, i: usize, velocities: &[DVec3]) -> Segment {
     let last = track.last() - 1;
     let at_end = i == 0 || i == last;
-    if kind == Kind::Slerp || last == 0 {
-        Segment::Arc(track.keys[i], track.keys[i + 1])
-    } else if ends == Ends::Frozen && at_end {
-        Segment::Hold(track.keys[i])
-    } else if kind == Kind::BSpline {
-        b_spline(track, ends, i)
-    } else {
-        handles(track, kind, ends, i)
+    let (from, to) = (track.keys[i], track.keys[i + 1]);
+    match kind {
+        Kind::Step => Segment::Hold(from),
+        Kind::Slerp => Segment::Arc(from, to),
+        _ if ends == Ends::Frozen && at_end && last > 0 => Segment::Hold(from),
+        Kind::Nlerp => Segment::Line(from, to),
+        Kind::GltfCubic => {
+            let tangent = |key: usize, side: usize| match track.tangents.get(key) {
+                Some(both) => both[side].as_dquat() * track.step(i),
+                None => DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+            };
+            Segment::Cubic([from, tangent(i, 1), tangent(i + 1, 0), to])
+        }
+        Kind::Hermite => {
+            let handle = |key: usize| {
+                let velocity = track.velocities.get(key).copied().unwrap_or_default();
+                velocity / 2.0 * track.step(i) / 3.0
+            };
+            cumulative(track, i, handle(i), handle(i + 1))
+        }
+        _ if last == 0 && kind != Kind::BSpline => Segment::Arc(from, to),
+        Kind::BSpline => b_spline(track, ends, i),
+        Kind::C2 => c2::segment(track, velocities, i),
+        _ => by_handles(track, kind, ends, i),
     }
 }
 
-/// An interpolating cubic: control rotations `q, q exp(out), r exp(-in), r`.
-fn handles(track: &Track, kind: Kind, ends: Ends, i: usize) -> Segment {
+/// A curve whose control rotations are `q, q exp(out), r exp(-in), r`.
+fn by_handles(track: &Track, kind: Kind, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let closed = ends == Ends::Loop;
     let out = (closed || i > 0).then(|| track.handles(kind, i).1);
     let incoming = (closed || i < last).then(|| track.handles(kind, i + 1).0);
     let (q, r) = (track.keys[i], track.keys[i + 1]);
     let whole = logarithm(track.difference(i));
-    let w = match (out, incoming, ends) {
-        (Some(out), Some(incoming), _) => between(track, i, out, incoming),
-        (None, Some(incoming), Ends::Natural) => {
-            let b = multiply(r, exponential(-incoming));
-            let half = logarithm(multiply(invert(q), b)) / 2.0;
-            [half, half, incoming]
-        }
-        (Some(out), None, Ends::Natural) => {
-            let a = multiply(q, exponential(out));
-            let half = logarithm(multiply(invert(a), r)) / 2.0;
-            [out, half, half]
-        }
-        (None, Some(incoming), Ends::Clamped { start, .. }) => {
-            between(track, i, start / 2.0 * track.step(i) / 3.0, incoming)
-        }
-        (Some(out), None, Ends::Clamped { end, .. }) => {
-            between(track, i, out, end / 2.0 * track.step(i) / 3.0)
-        }
-        (None, Some(incoming), _) => {
-            between(track, i, (2.0 * whole - 3.0 * incoming) / 3.0, incoming)
-        }
-        (Some(out), None, _) => between(track, i, out, (2.0 * whole - 3.0 * out) / 3.0),
-        (None, None, _) => [whole / 3.0; 3],
+    // Half of the angle that an end turns by in the whole interval.
+    let half_turn = |start: bool| match ends {
+        Ends::Secant => Some(whole),
+        Ends::Clamped { start: w, .. } if start => Some(w / 2.0 * track.step(i)),
+        Ends::Clamped { end: w, .. } => Some(w / 2.0 * track.step(i)),
+        _ => None,
     };
-    Segment::Product {
-        base: q,
-        w,
-        basis: Basis::Bernstein,
+    let (out, incoming) = match (out, incoming) {
+        (None, Some(incoming)) => {
+            let rest = || {
+                let b = multiply(r, exponential(-incoming));
+                logarithm(multiply(invert(q), b))
+            };
+            (
+                end_handle(kind, ends, whole, incoming, half_turn(true), rest),
+                incoming,
+            )
+        }
+        (Some(out), None) => {
+            let rest = || {
+                let a = multiply(q, exponential(out));
+                logarithm(multiply(invert(a), r))
+            };
+            (
+                out,
+                end_handle(kind, ends, whole, out, half_turn(false), rest),
+            )
+        }
+        (out, incoming) => (out.unwrap_or_default(), incoming.unwrap_or_default()),
+    };
+    if matches!(kind, Kind::CatmullRom | Kind::BesselOverhauser) {
+        return cumulative(track, i, out, incoming);
+    }
+    let controls = [
+        q,
+        multiply(q, exponential(out)),
+        multiply(r, exponential(-incoming)),
+        r,
+    ];
+    match kind {
+        Kind::Squad => Segment::Squad(controls),
+        _ => Segment::Bezier(controls),
     }
 }
 
-fn between(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> [DVec3; 3] {
+/// The handle of the key at an end of the track, where `other` is that at the other end
+/// of its interval.
+fn end_handle(
+    kind: Kind,
+    ends: Ends,
+    whole: DVec3,
+    other: DVec3,
+    half_turn: Option<DVec3>,
+    rest: impl Fn() -> DVec3,
+) -> DVec3 {
+    match (kind, half_turn) {
+        // A squad starts with log(q0⁻¹ q1) + 2 log(q0⁻¹ s0).
+        (Kind::Squad, Some(turn)) => (turn - whole) / 2.0,
+        (_, Some(turn)) => turn / 3.0,
+        (Kind::Squad, None) if ends == Ends::Natural => -other / 2.0,
+        (Kind::Squad, None) => -other,
+        _ if ends == Ends::Natural => rest() / 2.0,
+        (Kind::Shoemake, None) => 2.0 * whole - other,
+        (Kind::Shoemake2, None) => whole - other,
+        _ => 2.0 / 3.0 * whole - other,
+    }
+}
+
+fn cumulative(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
     let a = multiply(track.keys[i], exponential(out));
     let b = multiply(track.keys[i + 1], exponential(-incoming));
-    [out, logarithm(multiply(invert(a), b)), incoming]
-}
-
-/// `exp(by) v exp(-by)`.
-fn turned(v: DVec3, by: DVec3) -> DVec3 {
-    let v = DQuat::from_xyzw(v.x, v.y, v.z, 0.0);
-    vector(multiply(multiply(exponential(by), v), exponential(-by)))
-}
-
-fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
-    let last = track.last() - 1;
-    let step = |i: usize| logarithm(track.difference(i));
-    let before = match ends {
-        _ if i > 0 => step(i - 1),
-        Ends::Loop => step(last),
-        // ω h = exp(-w₂/6) w₁ exp(w₂/6) + w₂ at t = 0, solved for w₁.
-        Ends::Clamped { start, .. } => turned(start * track.step(0) - step(0), step(0) / 6.0),
-        Ends::Parabolic => 2.0 * step(0) - step(1),
-        _ => step(0),
-    };
-    let after = match ends {
-        _ if i < last => step(i + 1),
-        Ends::Loop => step(0),
-        // ω h = exp(-w₃/6) w₂ exp(w₃/6) + w₃ at t = 1: w₃ by iteration.
-        Ends::Clamped { end, .. } => {
-            let mut w = DVec3::ZERO;
-            for _ in 0..60 {
-                w = end * track.step(last) - turned(step(last), -w / 6.0);
-            }
-            w
-        }
-        Ends::Parabolic => 2.0 * step(last) - step(last - 1),
-        _ => step(last),
-    };
-    let base = multiply(track.keys[i], exponential(-before));
     Segment::Product {
-        base,
-        w: [before, step(i), after],
-        basis: Basis::BSpline,
+        base: track.keys[i],
+        w: [out, logarithm(multiply(invert(a), b)), incoming],
+        basis: Basis::Bernstein,
     }
 }

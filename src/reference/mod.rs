@@ -4,8 +4,11 @@
 //! them, one rotation at a time, with the platform's own sine and cosine. Slow, and
 //! accurate to about 1e-15.
 
+mod b_spline;
+mod c2;
 mod curve;
 mod quaternion;
+mod segment;
 mod tangents;
 
 pub use curve::{Curve, Kind};

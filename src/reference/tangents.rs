@@ -3,8 +3,11 @@
 use glam::{DQuat, DVec3, Quat};
 
 use super::Kind;
-use super::quaternion::{exponential, inner, invert, logarithm, logarithm_or, multiply, normalise};
+use super::quaternion::{
+    exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,
+};
 use crate::method::Path;
+use crate::tracks::Tcb;
 
 /// Below this, a dot product's sign is the rounding of f32 keys and says nothing.
 const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
@@ -13,6 +16,9 @@ const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
 pub(super) struct Track {
     pub(super) times: Vec<f64>,
     pub(super) keys: Vec<DQuat>,
+    pub(super) velocities: Vec<DVec3>,
+    pub(super) tangents: Vec<[Quat; 2]>,
+    pub(super) tcb: Vec<Tcb>,
 }
 
 impl Track {
@@ -26,7 +32,10 @@ impl Track {
         }
         Self {
             times: times.to_vec(),
+            tcb: vec![Tcb::default(); aligned.len()],
             keys: aligned,
+            velocities: Vec::new(),
+            tangents: Vec::new(),
         }
     }
 
@@ -60,16 +69,70 @@ impl Track {
     pub(super) fn handles(&self, kind: Kind, i: usize) -> (DVec3, DVec3) {
         let (before, h_before) = self.side(i, true);
         let (after, h_after) = self.side(i, false);
-        if kind == Kind::CatmullRom {
-            let direction = logarithm(before) + logarithm(after);
-            let sixth = logarithm_or(multiply(before, after), direction) / 6.0;
-            return (sixth, sixth);
+        let (l, r) = (logarithm(before), logarithm(after));
+        let both = h_before + h_after;
+        match kind {
+            Kind::CatmullRom => {
+                let sixth = logarithm_or(multiply(before, after), l + r) / 6.0;
+                (sixth, sixth)
+            }
+            Kind::Squad => ((r - l) / 4.0, (l - r) / 4.0),
+            Kind::Shoemake | Kind::Shoemake2 | Kind::Shoemake1985 => {
+                let q = self.keys[i];
+                let (p, next) = (multiply(q, invert(before)), multiply(q, after));
+                let bisector = bisect(double(p, q), next, q);
+                let a = match kind {
+                    Kind::Shoemake => bisector,
+                    Kind::Shoemake2 => bisect(q, bisector, q),
+                    _ => slerp(q, bisector, 1.0 / 3.0),
+                };
+                let b = double(a, q);
+                let to = |control: DQuat| logarithm(multiply(invert(q), control));
+                (-to(b), to(a))
+            }
+            Kind::BesselOverhauserMean => {
+                let mean = (l * (h_after / h_before) + r * (h_before / h_after)) / both;
+                (mean * (h_before / 3.0), mean * (h_after / 3.0))
+            }
+            Kind::KochanekBartels => {
+                let Tcb {
+                    tension,
+                    continuity,
+                    bias,
+                } = self.tcb[i];
+                let tight = 1.0 - tension;
+                // The names are Geier's.
+                let a = tight * (1.0 + continuity) * (1.0 + bias);
+                let b = tight * (1.0 - continuity) * (1.0 - bias);
+                let c = tight * (1.0 - continuity) * (1.0 + bias);
+                let d = tight * (1.0 + continuity) * (1.0 - bias);
+                let (rate_in, rate_out) = (l / h_before, r / h_after);
+                let mean =
+                    |u: f64, v: f64| (u * h_after * rate_in + v * h_before * rate_out) / both;
+                (mean(c, d) * h_before / 3.0, mean(a, b) * h_after / 3.0)
+            }
+            _ => {
+                let (left, right) = (l * (h_after / h_before), r * (h_before / h_after));
+                let product = multiply(exponential(left), exponential(right));
+                let tangent = nearest_branch(product, left + right) / both;
+                (tangent * (h_before / 3.0), tangent * (h_after / 3.0))
+            }
         }
-        let left = logarithm(before) * (h_after / h_before);
-        let right = logarithm(after) * (h_before / h_after);
-        let product = multiply(exponential(left), exponential(right));
-        let tangent = nearest_branch(product, left + right) / (h_before + h_after);
-        (tangent * (h_before / 3.0), tangent * (h_after / 3.0))
+    }
+}
+
+/// `2 (p·q) q - p`: as far beyond `q` as `p` is before it (Shoemake 1985).
+fn double(p: DQuat, q: DQuat) -> DQuat {
+    q * (2.0 * inner(p, q)) - p
+}
+
+/// `(p + q)/|p + q|`; `or` where there is none.
+fn bisect(p: DQuat, q: DQuat, or: DQuat) -> DQuat {
+    let sum = p + q;
+    if inner(sum, sum).sqrt() > 1e-12 {
+        normalise(sum)
+    } else {
+        or
     }
 }
 

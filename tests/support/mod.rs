@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Device, TrackSet};
+use tumble::{Device, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.
@@ -97,7 +97,36 @@ pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
         set.push("", &times, &quats)
             .expect("unit keys at increasing times");
     }
+    give_key_data(&mut set, seed);
     set
+}
+
+/// Velocities, tangents, tension, continuity and bias for the keys of most tracks.
+pub fn give_key_data(set: &mut TrackSet, seed: u64) {
+    let mut random = Random(seed ^ 0xdada);
+    for index in (0..set.track_count()).filter(|index| index % 7 != 3) {
+        let keys = set.track(index).keys.to_vec();
+        let velocities: Vec<_> = (keys.iter())
+            .map(|_| random.direction() * random.between(0.0, 2.0))
+            .collect();
+        let tangent = |key: Quat, velocity: DVec3| {
+            let [x, y, z] = (velocity * 0.5).to_array();
+            (key.as_dquat() * DQuat::from_xyzw(x, y, z, 0.0)).as_quat()
+        };
+        let tangents: Vec<_> = (keys.iter().zip(&velocities))
+            .map(|(&key, &velocity)| [tangent(key, velocity), tangent(key, velocity * 0.7)])
+            .collect();
+        let tcb: Vec<_> = (keys.iter())
+            .map(|_| Tcb {
+                tension: random.between(-1.0, 1.0),
+                continuity: random.between(-1.0, 1.0),
+                bias: random.between(-1.0, 1.0),
+            })
+            .collect();
+        set.set_velocities(index, &velocities).unwrap();
+        set.set_tangents(index, &tangents).unwrap();
+        set.set_tcb(index, &tcb).unwrap();
+    }
 }
 
 fn hostile_key(random: &mut Random, rotation: DQuat) -> Quat {

@@ -1,4 +1,4 @@
-//! Cubics from keys: intervals of as many tracks as it takes to fill the lanes, made
+//! Smooth curves from keys: intervals of as many tracks as it takes to fill the lanes, made
 //! into curves by the method.
 
 use std::ops::Range;
@@ -6,12 +6,14 @@ use std::ops::Range;
 use glam::Quat;
 
 use super::fitting::{Fitting, Place};
-use super::intervals::{Intervals, LANES, Steps, Stretch};
+use super::intervals::{Intervals, LANES, Stretch};
+use super::passes::Steps;
 use super::set::Prepare;
 use super::{NONE, Part, Prepared};
+use crate::branchless::Vector;
 use crate::cpu::in_lanes;
 use crate::frame_rate::FrameRate;
-use crate::method::{Cubics, Ends, Interpolation, InterpolationError};
+use crate::method::{Ends, Given, Interpolation, InterpolationError, Smooth};
 use crate::numeric::round_quat;
 use crate::schedule::FrameClock;
 use crate::tracks::Track;
@@ -23,10 +25,10 @@ const CONTEXT: usize = 2;
 /// it is all that is left of its track.
 const SHORTEST: usize = 8;
 
-/// Prepares cubics; its blocks are made once for many tracks.
-pub(crate) struct CubicPreparation {
+/// Prepares smooth curves; its blocks are made once for many tracks.
+pub(crate) struct SmoothPreparation {
     interpolation: Interpolation,
-    cubics: Cubics,
+    smooth: Smooth,
     intervals: Intervals,
     stretches: Vec<Stretch>,
     fitting: Fitting,
@@ -36,21 +38,25 @@ pub(crate) struct CubicPreparation {
     frames: Option<(FrameRate, f64)>,
 }
 
-impl CubicPreparation {
-    pub(crate) fn new(interpolation: &Interpolation, cubics: Cubics) -> Self {
+impl SmoothPreparation {
+    pub(crate) fn new(interpolation: &Interpolation, smooth: Smooth) -> Self {
+        let path = interpolation.method.path.unwrap_or(interpolation.path);
         Self {
-            interpolation: *interpolation,
-            cubics,
-            intervals: Intervals::new(interpolation.path.flips_below()),
+            interpolation: Interpolation {
+                path,
+                ..*interpolation
+            },
+            smooth,
+            intervals: Intervals::new(path.flips_below()),
             stretches: Vec::new(),
-            fitting: Fitting::new(cubics.basis),
+            fitting: Fitting::new(smooth.shape),
             sign: 1.0,
             frames: None,
         }
     }
 }
 
-impl Prepare for CubicPreparation {
+impl Prepare for SmoothPreparation {
     fn only_frames(&mut self, rate: FrameRate, start: f64) {
         self.frames = Some((rate, start));
     }
@@ -87,6 +93,10 @@ impl Prepare for CubicPreparation {
         // Two keys are joined by constant velocity, whatever lies beside them.
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
+        let velocities = match self.smooth.given {
+            Given::Velocities(solve) => solve(track, intervals.clone(), &self.interpolation),
+            _ => Vec::new(),
+        };
         let mut from = intervals.start;
         while from < intervals.end {
             let left = intervals.end - from;
@@ -110,7 +120,8 @@ impl Prepare for CubicPreparation {
                 },
             });
             for i in from..to {
-                self.intervals.push(track, i);
+                let given = self.given(track, i, velocities.get(i - intervals.start..));
+                self.intervals.push(track, i, given);
             }
             if context > 0 {
                 self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
@@ -127,11 +138,31 @@ impl Prepare for CubicPreparation {
     }
 }
 
-impl CubicPreparation {
+impl SmoothPreparation {
     fn neighbour(&mut self, track: Track, interval: Option<usize>) {
         match interval {
-            Some(i) => self.intervals.push(track, i),
+            Some(i) => {
+                let given = self.given(track, i, None);
+                self.intervals.push(track, i, given);
+            }
             None => self.intervals.push_nothing(),
+        }
+    }
+
+    /// The method's own numbers for an interval; `velocities` start with that of its
+    /// first key.
+    fn given(
+        &self,
+        track: Track,
+        interval: usize,
+        velocities: Option<&[Vector]>,
+    ) -> Option<[[f64; 4]; 2]> {
+        match (self.smooth.given, velocities) {
+            (Given::Numbers(numbers), _) => Some(numbers(track, interval, &self.interpolation)),
+            (Given::Velocities(_), Some([first, second, ..])) => {
+                Some([first, second].map(|&[x, y, z]| [x, y, z, 0.0]))
+            }
+            _ => None,
         }
     }
 
@@ -144,7 +175,9 @@ impl CubicPreparation {
             }
             for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
                 let dot = self.intervals.dots[lane];
-                if self.interpolation.path.refuses(dot) {
+                // A method that takes its own path has its own way between opposites.
+                let refuses = self.interpolation.method.path.is_none();
+                if refuses && self.interpolation.path.refuses(dot) {
                     let track = stretch.track;
                     return Err(InterpolationError::Antipodal { track, key });
                 }
@@ -154,8 +187,11 @@ impl CubicPreparation {
                 }
             }
         }
-        let ends = self.interpolation.ends;
-        (self.cubics.curves)(&mut self.intervals, &self.stretches, ends);
+        (self.smooth.curves)(
+            &mut self.intervals,
+            &self.stretches,
+            self.interpolation.ends,
+        );
         for stretch in std::mem::take(&mut self.stretches) {
             self.end_values(prepared, &stretch);
             let latest = prepared.parts[stretch.part].end;
@@ -213,8 +249,8 @@ impl CubicPreparation {
             let value = if self.is_frozen() {
                 self.intervals.keys(lane)[end]
             } else {
-                let cubic = self.intervals.cubic(lane, self.cubics.basis);
-                round_quat(cubic.rotation(end as f64))
+                let curve = self.intervals.curve(lane, self.smooth.shape);
+                round_quat(curve.rotation(end as f64))
             };
             prepared.constant(value)
         };

@@ -1,15 +1,14 @@
-//! A cubic in f64, and the part of it that is fitted.
+//! A curve in f64, and the part of it that is fitted.
 
-use crate::branchless::{Quaternion, Vector, exp, product, scaled};
-use crate::method::Basis;
+use super::shape::Shape;
+use crate::branchless::{Quaternion, dot};
+use crate::formula::Numbers;
 
-/// A cubic in cumulative form: `base · exp(v₁ B₁(t)) · exp(v₂ B₂(t)) · exp(v₃ B₃(t))`.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Cubic {
-    pub(super) base: Quaternion,
-    /// Half-rotation vectors.
-    pub(super) vectors: [Vector; 3],
-    pub(super) basis: &'static Basis,
+/// What lies between two keys, or a part of it.
+#[derive(Clone, Copy)]
+pub(crate) struct Curve {
+    pub(super) shape: &'static Shape,
+    pub(super) numbers: Numbers,
     pub(super) piece: Piece,
 }
 
@@ -27,8 +26,8 @@ impl Piece {
         length: 16,
     };
 
-    /// Whether it is cut no further: half-angles of dozens of radians within one
-    /// interval are computed on the host in f64, for every device.
+    /// Whether it is cut no further: what turns by dozens of radians within one
+    /// interval is computed on the host in f64, for every device.
     pub(super) fn is_finest(self) -> bool {
         self.length == 1
     }
@@ -45,21 +44,30 @@ impl Piece {
     }
 }
 
-impl Cubic {
+impl Curve {
     /// The rotation at `t`, 0 to 1 over its piece, in f64.
     pub(crate) fn rotation(&self, t: f64) -> Quaternion {
         let (start, width) = self.piece.extent();
         let t = start + width * t;
-        let mut q = self.base;
-        for (&vector, [c0, c1, c2, c3]) in self.vectors.iter().zip(self.basis) {
-            let weight = ((c3 * t + c2) * t + c1) * t + c0;
-            q = product(q, exp(scaled(vector, weight)));
+        let rotation = (self.shape.rotation)(&self.numbers, t);
+        if dot(rotation, rotation) > 0.5 {
+            return rotation;
         }
-        q
+        // Straight through the middle, where there is no rotation: that just behind it.
+        (self.shape.rotation)(&self.numbers, t + 1e-9)
     }
 
     /// The same rotations with the other sign.
     pub(super) fn negate(&mut self) {
-        self.base = self.base.map(|component| -component);
+        self.numbers = self.shape.negated(&self.numbers);
+    }
+}
+
+impl std::fmt::Debug for Curve {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Curve")
+            .field("numbers", &&self.numbers[..self.shape.own])
+            .field("piece", &self.piece)
+            .finish_non_exhaustive()
     }
 }

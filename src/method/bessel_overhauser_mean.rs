@@ -1,0 +1,44 @@
+//! Bessel-Overhauser by the mean of the slopes: the parabola through three keys, in
+//! logarithms.
+
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::branchless::{Algebra, ratio, scaled, sum};
+use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::reference;
+
+/// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
+/// curve is the same forwards and backwards in time.
+///
+/// The Python package `splines` calls it (non-uniform) Catmull-Rom.
+pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
+    name: "bessel-overhauser-mean",
+    summary: "smooth through keys at any times, the same in both directions of time",
+    formula: "log t_i = (h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3), de Casteljau",
+    source: "Overhauser 1968; Shoemake 1985; Geier, splines 0.3 (Python)",
+    continuity: Continuity::C1,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Any,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::BesselOverhauserMean,
+    curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>)),
+};
+
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        let left = scaled(before.log, ratio(after.duration, before.duration));
+        let right = scaled(after.log, ratio(before.duration, after.duration));
+        let both = before.duration + after.duration;
+        let tangent = scaled(sum(left, right), ratio(1.0, 3.0 * both));
+        Handles {
+            incoming: scaled(tangent, before.duration),
+            outgoing: scaled(tangent, after.duration),
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! The interpolating spline with continuous angular acceleration.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec3};
+
+use super::ends::End;
+use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use crate::branchless::{self, Vector, log, scaled, sine_cosine, sum};
+use crate::prepare::{Intervals, Shape, Stretch};
+use crate::reference;
+use crate::tracks::Track;
+
+/// The curve of SciPy's `RotationSpline`: the rotation vector from each key is a cubic,
+/// and the angular velocities at the keys are such that the angular acceleration is
+/// continuous. Every key moves all of the curve, less and less with distance.
+///
+/// Backwards in time it is another curve: a cubic seen from one key is none seen from the
+/// next.
+///
+/// Where it would pass a key faster than a turn per interval, as at a short interval
+/// beside a long one, only its velocity is continuous.
+pub const C2: Method = Method {
+    name: "c2",
+    summary: "continuous angular acceleration through keys at any times",
+    formula: "q(t) = q_i exp(θ(t)/2), θ cubic, θ(0) = 0, θ(1) = 2 log(q_i⁻¹ q_{i+1}), angular velocity and acceleration continuous",
+    source: "Mayorov 2019, Smooth attitude interpolation (SciPy's RotationSpline)",
+    continuity: Continuity::C2,
+    continuity_on_even_keys: Continuity::C2,
+    keeps_constant_velocity: Keys::Any,
+    interpolates: true,
+    symmetric: false,
+    form: Form::Polynomial,
+    ends: Ends::Secant,
+    path: None,
+    reference: reference::Kind::C2,
+    curves: Curves::Smooth(
+        Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities)),
+    ),
+};
+
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let half = 0.5 * intervals.duration(lane).max(SHORTEST);
+        let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
+        let log = intervals.log(lane);
+        let turn = Turn::new(DVec3::from_array(scaled(log, 2.0)));
+        // Half of θ' at both ends.
+        let start = scaled([x, y, z], half);
+        let end = scaled((turn.to_rate * DVec3::new(u, v, w)).to_array(), half);
+        let both = sum(start, end);
+        let second = sum(
+            scaled(log, 3.0),
+            sum(scaled(start, -1.0), scaled(both, -1.0)),
+        );
+        let third = sum(both, scaled(log, -2.0));
+        intervals.set_numbers(lane, 0, &intervals.key(lane));
+        intervals.set_numbers(lane, 4, [start, second, third].as_flattened());
+        intervals.set_energy(lane, [start, second, third]);
+    }
+}
+
+/// Keys solved for together. Where such a window ends and the track goes on, [`MARGIN`]
+/// more keys are: their influence fades to a quarter from key to key.
+const WINDOW: usize = 1024;
+const MARGIN: usize = 64;
+
+/// The angular velocities at the keys of some intervals. They do not depend on which
+/// intervals are asked for together: windows lie where they lie.
+fn velocities(track: Track, intervals: Range<usize>, interpolation: &Interpolation) -> Vec<Vector> {
+    let mut velocities = Vec::with_capacity(intervals.len() + 1);
+    let mut key = intervals.start;
+    while key <= intervals.end {
+        let window = key / WINDOW * WINDOW;
+        let from = window as isize - MARGIN as isize;
+        let to = (window + WINDOW + MARGIN) as isize;
+        let (first, solved) = solve(track, from..to, interpolation);
+        while key <= intervals.end && key < window + WINDOW {
+            let place = (key as isize - first) as usize;
+            velocities.push(solved[place].to_array());
+            key += 1;
+        }
+    }
+    velocities
+}
+
+/// The velocities at a window of keys, and which key is the first of them.
+fn solve(track: Track, window: Range<isize>, interpolation: &Interpolation) -> (isize, Vec<DVec3>) {
+    let all = track.keys.len() as isize - 1;
+    let closed = matches!(interpolation.ends, Ends::Loop) && all > 1;
+    let (first, last) = if closed {
+        (window.start, window.end)
+    } else {
+        (window.start.max(0), window.end.min(all))
+    };
+    let noise = interpolation.path.flips_below();
+    let steps: Vec<Step> = (first..last)
+        .map(|i| Step::new(track, i.rem_euclid(all.max(1)) as usize, noise))
+        .collect();
+    let end_at = |at_end: bool, end: End| if at_end { end } else { End::Secant };
+    let start = end_at(!closed && first == 0, interpolation.ends.start());
+    let end = end_at(!closed && last == all, interpolation.ends.end());
+    (first, Spline::new(&steps, [start, end]).velocities())
+}
+
+/// Seconds; what is shorter counts as this long, so that rates stay numbers.
+const SHORTEST: f64 = 1e-150;
+
+/// One interval.
+struct Step {
+    /// Its length, seconds.
+    duration: f64,
+    turn: Turn,
+}
+
+impl Step {
+    fn new(track: Track, i: usize, noise: f64) -> Self {
+        let [from, to] = [i, i + 1].map(|key| branchless::unit(track.keys[key].to_array()));
+        let step = branchless::step(from, to);
+        let sign = if step[3] < noise { -1.0 } else { 1.0 };
+        Self {
+            duration: (track.times[i + 1] - track.times[i]).max(SHORTEST),
+            turn: Turn::new(DVec3::from_array(scaled(log(step.map(|c| c * sign)), 2.0))),
+        }
+    }
+
+    /// The angular velocity of slerp.
+    fn secant(&self) -> DVec3 {
+        self.turn.vector / self.duration
+    }
+}
+
+/// A rotation vector, with how velocities are seen at its end.
+struct Turn {
+    vector: DVec3,
+    /// From the angular velocity to the vector's rate of change, and back.
+    to_rate: DMat3,
+    from_rate: DMat3,
+}
+
+impl Turn {
+    fn new(vector: DVec3) -> Self {
+        let square = vector.dot(vector);
+        let angle = square.sqrt();
+        let (sine, cosine) = sine_cosine(angle);
+        let (half_sine, half_cosine) = sine_cosine(0.5 * angle);
+        let (k, k1, k2) = if angle > 0.05 {
+            (
+                (1.0 - 0.5 * angle * half_cosine / half_sine) / square,
+                (1.0 - cosine) / square,
+                (angle - sine) / (square * angle),
+            )
+        } else {
+            (
+                1.0 / 12.0 + square / 720.0 + square * square / 30_240.0,
+                0.5 - square / 24.0 + square * square / 720.0,
+                1.0 / 6.0 - square / 120.0 + square * square / 5_040.0,
+            )
+        };
+        let cross = skew(vector);
+        let twice = cross * cross;
+        Self {
+            vector,
+            to_rate: DMat3::IDENTITY + cross * 0.5 + twice * k,
+            from_rate: DMat3::IDENTITY - cross * k1 + twice * k2,
+        }
+    }
+
+    /// What of the angular acceleration depends on the vector's rate of change alone.
+    fn bend(&self, rate: DVec3) -> DVec3 {
+        let square = self.vector.dot(self.vector);
+        let angle = square.sqrt();
+        let (sine, cosine) = sine_cosine(angle);
+        let (k1, k2, k3) = if angle > 0.2 {
+            (
+                (2.0 - 2.0 * cosine - angle * sine) / (square * square),
+                (3.0 * sine - 2.0 * angle - angle * cosine) / (square * square * angle),
+                (angle - sine) / (square * angle),
+            )
+        } else {
+            let fourth = square * square;
+            (
+                1.0 / 12.0 - square / 180.0 + fourth / 6_720.0,
+                -1.0 / 60.0 + square / 1_260.0 - fourth / 60_480.0,
+                1.0 / 6.0 - square / 120.0 + fourth / 5_040.0,
+            )
+        };
+        let across = self.vector.cross(rate);
+        let along = self.vector.dot(rate);
+        (across * k1 + self.vector.cross(across) * k2) * along + rate.cross(across) * k3
+    }
+}
+
+/// The matrix of `v ×`.
+fn skew(v: DVec3) -> DMat3 {
+    DMat3::from_cols(
+        DVec3::new(0.0, v.z, -v.y),
+        DVec3::new(-v.z, 0.0, v.x),
+        DVec3::new(v.y, -v.x, 0.0),
+    )
+}
+
+/// The equations for the velocities: for each key three, which hold its own velocity and
+/// its neighbours'. Linear, but for [`Turn::bend`], which is iterated.
+struct Spline<'a> {
+    steps: &'a [Step],
+    /// Eliminated from the first key on: what is left of the upper blocks, and the
+    /// inverses of those on the diagonal.
+    lower: Vec<DMat3>,
+    upper: Vec<DMat3>,
+    inverse: Vec<DMat3>,
+    /// The right sides without the bends, and what bends count.
+    given: Vec<DVec3>,
+    scales: Vec<f64>,
+    /// Which equations may have a bend of the step before them.
+    bent: Range<usize>,
+}
+
+/// Radians an interval: where a key is passed faster, the bend is left out, and the
+/// acceleration is continuous only as it would be in flat space. With it there may be no
+/// solution, or none that iteration finds.
+const FASTEST: f64 = std::f64::consts::TAU;
+
+/// Sweeps at most; a dozen do where steps are below a right angle.
+const SWEEPS: usize = 100;
+
+impl<'a> Spline<'a> {
+    fn new(steps: &'a [Step], [start, end]: [End; 2]) -> Self {
+        let keys = steps.len() + 1;
+        let mut spline = Self {
+            steps,
+            lower: vec![DMat3::ZERO; keys],
+            upper: vec![DMat3::ZERO; keys],
+            inverse: vec![DMat3::IDENTITY; keys],
+            given: vec![DVec3::ZERO; keys],
+            scales: vec![0.0; keys],
+            bent: 1..keys,
+        };
+        let mut diagonal = vec![DMat3::IDENTITY; keys];
+        if let ([first, ..], [.., last]) = (steps, steps) {
+            let given = |end: End, step: &Step, next: Option<&Step>| match (end, next) {
+                (End::Clamped(half), _) => Some(DVec3::from_array(half) * 2.0),
+                (End::Secant, _) | (_, None) => Some(step.secant()),
+                // The parabola through three keys, in logarithms.
+                (End::Parabolic, Some(next)) => {
+                    let bend = (next.secant() - step.secant()) * step.duration;
+                    Some(step.secant() - bend / (step.duration + next.duration))
+                }
+                (End::Natural, Some(_)) => None,
+            };
+            match given(start, first, steps.get(1)) {
+                Some(velocity) => spline.given[0] = velocity,
+                None => {
+                    diagonal[0] = DMat3::IDENTITY * 2.0;
+                    spline.upper[0] = first.turn.to_rate;
+                    spline.given[0] = first.secant() * 3.0;
+                }
+            }
+            let before_last = steps.len().checked_sub(2).map(|i| &steps[i]);
+            match given(end, last, before_last) {
+                Some(velocity) => {
+                    spline.given[keys - 1] = velocity;
+                    spline.bent = 1..keys - 1;
+                }
+                None => {
+                    diagonal[keys - 1] = DMat3::IDENTITY * 4.0;
+                    spline.lower[keys - 1] = last.turn.from_rate * 2.0;
+                    spline.given[keys - 1] = last.secant() * 6.0;
+                    spline.scales[keys - 1] = last.duration;
+                }
+            }
+        }
+        for (i, pair) in (1..).zip(steps.windows(2)) {
+            let (h, next_h) = (pair[0].duration, pair[1].duration);
+            // Divided by 1/h + 1/next_h: no number is too large then.
+            let (left, right) = (next_h / (h + next_h), h / (h + next_h));
+            spline.lower[i] = pair[0].turn.from_rate * (2.0 * left);
+            spline.upper[i] = pair[1].turn.to_rate * (2.0 * right);
+            diagonal[i] = DMat3::IDENTITY * 4.0;
+            spline.given[i] = pair[0].secant() * (6.0 * left) + pair[1].secant() * (6.0 * right);
+            spline.scales[i] = left * h;
+        }
+        spline.inverse[0] = diagonal[0].inverse();
+        for i in 1..keys {
+            let above = spline.inverse[i - 1] * spline.upper[i - 1];
+            spline.inverse[i] = (diagonal[i] - spline.lower[i] * above).inverse();
+        }
+        spline
+    }
+
+    fn velocities(&self) -> Vec<DVec3> {
+        let mut velocities = self.given.clone();
+        self.sweep(self.given.clone(), &mut velocities);
+        let rate = |i: usize, velocity: DVec3| self.steps[i - 1].turn.to_rate * velocity;
+        let fast = |&i: &usize| {
+            let turn = rate(i, velocities[i]) * self.steps[i - 1].duration;
+            turn.length() <= FASTEST
+        };
+        let bent: Vec<usize> = self.bent.clone().filter(fast).collect();
+        for _ in 0..SWEEPS {
+            let mut sides = self.given.clone();
+            for &i in &bent {
+                let bend = self.steps[i - 1].turn.bend(rate(i, velocities[i]));
+                sides[i] -= bend * self.scales[i];
+            }
+            if self.sweep(sides, &mut velocities) < 1e-14 {
+                break;
+            }
+        }
+        velocities
+    }
+
+    /// Solves for those right sides; by how much, relatively, the velocities change.
+    fn sweep(&self, mut sides: Vec<DVec3>, velocities: &mut [DVec3]) -> f64 {
+        for i in 0..sides.len() {
+            let above = match i {
+                0 => DVec3::ZERO,
+                _ => self.lower[i] * sides[i - 1],
+            };
+            sides[i] = self.inverse[i] * (sides[i] - above);
+        }
+        let mut change = 0.0f64;
+        for i in (0..sides.len()).rev() {
+            let below = match velocities.get(i + 1) {
+                Some(&below) => self.inverse[i] * (self.upper[i] * below),
+                None => DVec3::ZERO,
+            };
+            let velocity = sides[i] - below;
+            let moved = (velocity - velocities[i]).length() / (1e-30 + velocity.length());
+            change = change.max(moved);
+            velocities[i] = velocity;
+        }
+        change
+    }
+}

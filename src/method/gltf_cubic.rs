@@ -1,0 +1,63 @@
+//! The cubic spline of glTF.
+
+use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Path, Smooth};
+use crate::branchless::{Quaternion, Vector, length};
+use crate::prepare::{Intervals, Shape, Stretch};
+use crate::reference;
+use crate::tracks::Track;
+
+/// glTF's CUBICSPLINE: a cubic in each component, with given tangents
+/// ([`TrackSet::set_tangents`](crate::TrackSet::set_tangents)), normalised. Keys count
+/// with the signs that they are stored with, as the specification has it, whatever the
+/// path asked for. Without tangents they are 0.
+pub const GLTF_CUBIC: Method = Method {
+    name: "gltf-cubic",
+    summary: "glTF's CUBICSPLINE, exactly as specified, with given tangents",
+    formula: "p(t) = (2t³-3t²+1) q0 + h (t³-2t²+t) out0 + (3t²-2t³) q1 + h (t³-t²) in1, q = p/|p|",
+    source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
+    continuity: Continuity::C1,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: Some(Path::AsAuthored),
+    reference: reference::Kind::GltfCubic,
+    curves: Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers))),
+};
+
+/// The tangent with which an interval leaves its first key, and that with which it
+/// arrives at its last.
+fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
+    let tangent = |key: usize, side: usize| {
+        let tangents = track.tangents.get(key);
+        tangents.map_or([0.0; 4], |both| both[side].to_array().map(f64::from))
+    };
+    [tangent(interval, 1), tangent(interval + 1, 0)]
+}
+
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let duration = intervals.duration(lane);
+        let outgoing = intervals.outward(lane).map(|c| c * duration);
+        let incoming = intervals.inward(lane + 1).map(|c| c * duration);
+        let (start, end) = (intervals.key(lane), intervals.end_key(lane));
+        intervals.set_numbers(lane, 0, &start);
+        intervals.set_numbers(lane, 4, &outgoing);
+        intervals.set_numbers(lane, 8, &incoming);
+        intervals.set_numbers(lane, 12, &end);
+        // About how far it turns: what the tangents have along their keys only changes
+        // the length.
+        let log = intervals.log(lane);
+        let across = [across(start, outgoing), log, across(end, incoming)];
+        intervals.set_energy(lane, across);
+    }
+}
+
+/// As long as what is left of a tangent across its key.
+fn across(key: Quaternion, tangent: Quaternion) -> Vector {
+    let along: f64 = key.iter().zip(tangent).map(|(k, t)| k * t).sum();
+    let rest: [f64; 4] = std::array::from_fn(|c| tangent[c] - key[c] * along);
+    [rest[0], rest[1], length([rest[2], rest[3], 0.0])]
+}

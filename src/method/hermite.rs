@@ -1,0 +1,45 @@
+//! Given angular velocities at the keys.
+
+use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use crate::branchless::scaled;
+use crate::cpu::in_lanes;
+use crate::prepare::{BetweenHandles, Intervals, Shape, Stretch};
+use crate::reference;
+use crate::tracks::Track;
+
+/// Hermite: the rotation and the angular velocity of every key are given
+/// ([`TrackSet::set_velocities`](crate::TrackSet::set_velocities)); without them every
+/// key is at rest.
+pub const HERMITE: Method = Method {
+    name: "hermite",
+    summary: "given angular velocities at the keys; without them each key is at rest",
+    formula: "a_i = q_i exp(ω_i h_i/6), b_i = q_i exp(-ω_i h_{i-1}/6)",
+    source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
+    continuity: Continuity::C1,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: false,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Hermite,
+    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers))),
+};
+
+fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
+    [interval, interval + 1].map(|key| {
+        let velocity = track.velocities.get(key).copied().unwrap_or_default();
+        [velocity.x, velocity.y, velocity.z, 0.0]
+    })
+}
+
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let sixth = intervals.duration(lane) / 6.0;
+        let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
+        intervals.set_outgoing(lane, scaled([x, y, z], sixth));
+        intervals.set_incoming(lane + 1, scaled([u, v, w], sixth));
+    }
+    in_lanes(&mut BetweenHandles(intervals));
+}

@@ -1,0 +1,62 @@
+//! Kochanek-Bartels: tension, continuity and bias at each key.
+
+use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends};
+use crate::branchless::{Algebra, Vector, ratio, scaled, sum};
+use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::reference;
+use crate::tracks::Track;
+
+/// Kochanek-Bartels, with [`Tcb`](crate::Tcb) for each key
+/// ([`TrackSet::set_tcb`](crate::TrackSet::set_tcb)) or for all
+/// ([`Interpolation::tcb`]). With zeros it is
+/// [`BESSEL_OVERHAUSER_MEAN`](super::BESSEL_OVERHAUSER_MEAN).
+pub const KOCHANEK_BARTELS: Method = Method {
+    name: "kochanek-bartels",
+    summary: "an animator's curve: tension, continuity and bias at each key",
+    formula: "log in = h_{i-1}/3 (c h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + d h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), log out alike with h_i, a, b; a, d = (1-T)(1+C)(1±B), c, b = (1-T)(1-C)(1±B), de Casteljau",
+    source: "Kochanek, Bartels 1984, Interpolating splines with local tension, continuity, and bias control; Geier, splines 0.3 (Python)",
+    continuity: Continuity::C1,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Any,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::KochanekBartels,
+    curves: Curves::Smooth(
+        Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),
+    ),
+};
+
+/// Tension, continuity and bias of the key that an interval starts with.
+fn numbers(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
+    let tcb = track
+        .tcb
+        .get(interval)
+        .copied()
+        .unwrap_or(interpolation.tcb);
+    [[tcb.tension, tcb.continuity, tcb.bias, 0.0], [0.0; 4]]
+}
+
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        let [tension, continuity, bias, _] = after.key;
+        let tight = 1.0 - tension;
+        let left = scaled(before.log, ratio(after.duration, before.duration));
+        let right = scaled(after.log, ratio(before.duration, after.duration));
+        let both = before.duration + after.duration;
+        let handle = |corner: f64, duration: f64| -> Vector {
+            let left = scaled(left, tight * (1.0 + corner) * (1.0 + bias));
+            let right = scaled(right, tight * (1.0 - corner) * (1.0 - bias));
+            scaled(sum(left, right), ratio(1.0, 3.0 * both) * duration)
+        };
+        Handles {
+            incoming: handle(-continuity, before.duration),
+            outgoing: handle(continuity, after.duration),
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Normalised linear interpolation.
+
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::branchless::{Algebra, Vector};
+use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::reference;
+
+/// Nlerp: the straight line between neighbouring keys, brought back to the sphere. It
+/// takes the way of slerp at another speed, slower near the keys: by up to 8° where keys
+/// are 180° apart.
+pub const NLERP: Method = Method {
+    name: "nlerp",
+    summary: "slerp's way at uneven speed, as many games have it",
+    formula: "q(t) = ((1-t) q0 + t q1) / |(1-t) q0 + t q1|",
+    source: "Blow 2004, Understanding slerp, then not using it",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C0,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Nlerp,
+    curves: Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>)),
+};
+
+/// No handles.
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(_: &mut impl Algebra, _: Interval, _: Interval) -> Handles {
+        Handles {
+            incoming: [0.0; 3],
+            outgoing: [0.0; 3],
+        }
+    }
+
+    fn end(_: EndInterval, _: EndHandle) -> Vector {
+        [0.0; 3]
+    }
+}

@@ -1,0 +1,67 @@
+//! Shoemake's first approach, as lectured, and the rule of all three.
+
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::branchless::{Algebra, Vector, dot, scaled, sum};
+use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::reference;
+
+/// Approach I of the lecture: the control rotation is the bisector itself. It passes its
+/// keys three times too fast, and overshoots; for comparison.
+/// [`SHOEMAKE_1985`](super::SHOEMAKE_1985) is its cure.
+pub const SHOEMAKE: Method = Method {
+    name: "shoemake",
+    summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
+    formula: "a_i = Bisect(Double(q_{i-1}, q_i), q_{i+1}), b_i = Double(a_i, q_i), de Casteljau",
+    source: "Shoemake 1985 as lectured, approach I",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Shoemake,
+    curves: Curves::Smooth(Smooth::new(
+        Shape::DE_CASTELJAU,
+        ends::controls::<Bisector<1>>,
+    )),
+};
+
+/// Handles that are a part, one `PART`th, of the way to the bisector.
+///
+/// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Seen from `q_i`,
+/// `Double(q_{i-1}, q_i)` is the step before the key once more.
+pub(super) struct Bisector<const PART: u8>;
+
+impl<const PART: u8> HandleRule for Bisector<PART> {
+    #[inline(always)]
+    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        let (a, b) = (before.step, after.step);
+        let both = [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
+        let norm = dot(both, both).sqrt();
+        // Half a turn there and back: no bisector, no handle.
+        let exists = norm > 1e-12;
+        let scale = if exists { 1.0 / norm } else { 0.0 };
+        let w = if exists { both[3] * scale } else { 1.0 };
+        let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];
+        let toward = sum(before.log, after.log);
+        let handle = scaled(algebra.log_toward(bisector, toward), 1.0 / f64::from(PART));
+        Handles {
+            incoming: handle,
+            outgoing: handle,
+        }
+    }
+
+    fn end(EndInterval { log, other, rest }: EndInterval, handle: EndHandle) -> Vector {
+        match handle {
+            EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
+            // Such handles are too long by 3/PART, everywhere alike.
+            EndHandle::Parabolic => {
+                let whole = scaled(log, 2.0 / f64::from(PART));
+                sum(whole, scaled(other, -1.0))
+            }
+            EndHandle::Natural => scaled(rest, 0.5),
+        }
+    }
+}

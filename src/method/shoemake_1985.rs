@@ -1,0 +1,28 @@
+//! Shoemake's construction, as published.
+
+use super::shoemake::Bisector;
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::prepare::Shape;
+use crate::reference;
+
+/// Shoemake's own construction: the handle is a third of the bisector's. It ignores the
+/// time steps: on uneven keys its velocity jumps.
+pub const SHOEMAKE_1985: Method = Method {
+    name: "shoemake-1985",
+    summary: "Bezier curves of rotations as their author has them; smooth through evenly spaced keys",
+    formula: "a_i = slerp(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1}), 1/3), b_i = Double(a_i, q_i), de Casteljau",
+    source: "Shoemake 1985, Animating rotation with quaternion curves, section 4.4",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Even,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Shoemake1985,
+    curves: Curves::Smooth(Smooth::new(
+        Shape::DE_CASTELJAU,
+        ends::controls::<Bisector<3>>,
+    )),
+};

@@ -1,0 +1,28 @@
+//! Shoemake's second approach, as lectured.
+
+use super::shoemake::Bisector;
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::prepare::Shape;
+use crate::reference;
+
+/// Approach II of the lecture: the handle is half of the bisector's. It passes its keys
+/// one and a half times too fast; [`SHOEMAKE_1985`](super::SHOEMAKE_1985) is its cure.
+pub const SHOEMAKE_2: Method = Method {
+    name: "shoemake-2",
+    summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",
+    formula: "a_i = Bisect(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1})), b_i = Double(a_i, q_i), de Casteljau",
+    source: "Shoemake 1985 as lectured, approach II",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Shoemake2,
+    curves: Curves::Smooth(Smooth::new(
+        Shape::DE_CASTELJAU,
+        ends::controls::<Bisector<2>>,
+    )),
+};

@@ -1,0 +1,47 @@
+//! Spherical quadrangle interpolation.
+
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use crate::branchless::{Algebra, Vector, scaled, sum};
+use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::reference;
+
+/// Squad. It ignores the time steps: on uneven keys its velocity jumps.
+pub const SQUAD: Method = Method {
+    name: "squad",
+    summary: "smooth through evenly spaced keys, as many engines have it",
+    formula: "slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t)), s_i = q_i exp(-(log(q_i⁻¹ q_{i+1}) + log(q_i⁻¹ q_{i-1}))/4)",
+    source: "Shoemake 1987, Quaternion calculus and fast animation",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Even,
+    interpolates: true,
+    symmetric: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Squad,
+    curves: Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>)),
+};
+
+/// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
+struct Rule;
+
+impl HandleRule for Rule {
+    #[inline(always)]
+    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+        let bend = sum(after.log, scaled(before.log, -1.0));
+        Handles {
+            incoming: scaled(bend, 0.25),
+            outgoing: scaled(bend, -0.25),
+        }
+    }
+
+    /// At its ends a squad turns by `log + 2 outgoing` and by `log + 2 incoming`.
+    fn end(EndInterval { log, other, .. }: EndInterval, handle: EndHandle) -> Vector {
+        match handle {
+            EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),
+            EndHandle::Parabolic => scaled(other, -1.0),
+            EndHandle::Natural => scaled(other, -0.5),
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Keys that are held.
+
+use super::{Continuity, Curves, Ends, Form, Keys, Method};
+use crate::reference;
+
+/// The key at or before the time: for what switches and does not move.
+pub const STEP: Method = Method {
+    name: "step",
+    summary: "holds each key until the next; for what switches",
+    formula: "q(t) = q0",
+    source: "glTF 2.0, section 3.11, STEP",
+    continuity: Continuity::Jumps,
+    continuity_on_even_keys: Continuity::Jumps,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: false,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    reference: reference::Kind::Step,
+    curves: Curves::Steps,
+};

@@ -1,0 +1,151 @@
+//! Formulas as values: what the preparation does with a curve, whatever its formula.
+
+use std::marker::PhantomData;
+
+use super::fit::{FitBlock, Samples, Tier};
+use super::intervals::LANES;
+use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
+use super::sample::Expansion;
+use crate::branchless::Quaternion;
+use crate::cpu::{InLanes, in_lanes};
+use crate::formula::{
+    DeCasteljau, Formula, Hermite, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
+};
+
+/// A formula, and how its curves are sampled.
+pub(crate) struct Shape {
+    /// How many of the numbers are each curve's own.
+    pub(super) own: usize,
+    /// The others, the same for all.
+    pub(super) shared: Numbers,
+    /// Quaternions that change sign with the rotation: how many, from the first number on.
+    signed: usize,
+    /// Whether it is made of exponentials alone, whose Chebyshev coefficients fall ever
+    /// faster: a gentle curve's fit then needs no check.
+    pub(super) entire: bool,
+    pub(super) rotation: fn(&Numbers, f64) -> Quaternion,
+    pub(super) fit: fn(&mut FitBlock),
+}
+
+impl Shape {
+    const fn of<F: Formula>(own: usize, signed: usize) -> Self {
+        Self {
+            own,
+            shared: [0.0; NUMBERS],
+            signed,
+            entire: false,
+            rotation: F::rotation::<f64>,
+            fit: fit::<Directly<F>>,
+        }
+    }
+
+    /// The numbers of the same rotations with the other sign.
+    pub(super) fn negated(&self, numbers: &Numbers) -> Numbers {
+        let mut negated = *numbers;
+        for number in &mut negated[..4 * self.signed] {
+            *number = -*number;
+        }
+        negated
+    }
+}
+
+impl Shape {
+    /// [`Product`] with Bernstein's basis.
+    pub(crate) const BERNSTEIN: &'static Self = &Self {
+        own: Product::BASIS,
+        shared: Product::BERNSTEIN,
+        entire: true,
+        fit: fit::<Expansion>,
+        ..Self::of::<Product>(NUMBERS, 1)
+    };
+    /// [`Product`] with a basis of each curve's own.
+    pub(crate) const PRODUCT: &'static Self = &Self {
+        entire: true,
+        fit: fit::<Expansion>,
+        ..Self::of::<Product>(NUMBERS, 1)
+    };
+    /// [`DeCasteljau`].
+    pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16, 4);
+    /// [`Squad`].
+    pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16, 4);
+    /// [`Linear`].
+    pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16, 4);
+    /// [`Hermite`].
+    pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16, 4);
+    /// [`RotationVector`].
+    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13, 1);
+}
+
+/// A way to sample the curves of a block.
+pub(super) trait Sampling: 'static {
+    fn sample<const PAIRS: usize>(
+        block: &mut FitBlock,
+        count: usize,
+        nodes: &Nodes<PAIRS>,
+        samples: &mut Samples<PAIRS>,
+    );
+}
+
+/// Fits the curves of a block.
+fn fit<S: Sampling>(block: &mut FitBlock) {
+    in_lanes(&mut Fit::<S>(block, PhantomData));
+}
+
+struct Fit<'a, S>(&'a mut FitBlock, PhantomData<S>);
+
+impl<S: Sampling> InLanes for Fit<'_, S> {
+    #[inline(always)]
+    fn run(&mut self) {
+        match self.0.tier() {
+            _ if self.0.whole() == 0 => {}
+            Tier::Gentle => self.fit(&GENTLE_NODES),
+            Tier::Full => self.fit(&FULL_NODES),
+        }
+    }
+}
+
+impl<S: Sampling> Fit<'_, S> {
+    #[inline(always)]
+    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+        let count = self.0.whole();
+        let mut samples = Samples::new();
+        S::sample(self.0, count, nodes, &mut samples);
+        self.0.interpolate(count, nodes, &samples);
+    }
+}
+
+/// By the formula itself, in f64.
+struct Directly<F>(PhantomData<F>);
+
+impl<F: Formula> Sampling for Directly<F> {
+    #[inline(always)]
+    fn sample<const PAIRS: usize>(
+        block: &mut FitBlock,
+        count: usize,
+        nodes: &Nodes<PAIRS>,
+        Samples { middle, even, odd }: &mut Samples<PAIRS>,
+    ) {
+        let mut middles = [[0.0; LANES]; 4];
+        for lane in 0..count {
+            let rotation = F::rotation(&block.numbers_of(lane), block.middles[lane]);
+            for c in 0..4 {
+                middles[c][lane] = rotation[c];
+                middle[c][lane] = rotation[c] as f32;
+            }
+        }
+        for (k, &node) in nodes.at.iter().enumerate() {
+            let node = f64::from(node);
+            for lane in 0..count {
+                let numbers = block.numbers_of(lane);
+                let reach = node * block.widths[lane];
+                let before = F::rotation(&numbers, block.middles[lane] - reach);
+                let after = F::rotation(&numbers, block.middles[lane] + reach);
+                for c in 0..4 {
+                    let middle = middles[c][lane];
+                    even[k][c][lane] = (((after[c] - middle) + (before[c] - middle)) * 0.5) as f32;
+                    odd[k][c][lane] = ((after[c] - before[c]) * 0.5) as f32;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Keys that are held until the next: nothing is evaluated, every sample is a key.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use super::set::Prepare;
+use super::{NONE, Part, Prepared, Source};
+use crate::method::{Interpolation, InterpolationError};
+use crate::tracks::Track;
+
+/// Prepares tracks whose keys are held.
+pub(crate) struct StepPreparation {
+    interpolation: Interpolation,
+}
+
+impl StepPreparation {
+    pub(crate) fn new(interpolation: &Interpolation) -> Self {
+        Self {
+            interpolation: *interpolation,
+        }
+    }
+}
+
+impl Prepare for StepPreparation {
+    fn add(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<(), InterpolationError> {
+        self.interpolation.ends.check(track, index)?;
+        let first = prepared.constants.len() as u32;
+        let last = first + intervals.len() as u32;
+        let keys = track.keys[intervals.start..=intervals.end].iter();
+        prepared.constants.extend(keys.map(Quat::to_array));
+        let first_span = prepared.spans.len();
+        let all = track.keys.len() - 1;
+        prepared.parts.push(Part {
+            track: index,
+            spans: first_span..first_span + intervals.len(),
+            end: track.times[intervals.end],
+            before: if intervals.start == 0 { first } else { NONE },
+            after: if intervals.end == all { last } else { NONE },
+        });
+        for (i, constant) in intervals.zip(first..last) {
+            prepared.push_span(track.times[i], 0.0, Source::Constant(constant), NONE);
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, _: &mut Prepared) -> Result<f32, InterpolationError> {
+        Ok(1.0)
+    }
+}

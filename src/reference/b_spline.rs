@@ -1,0 +1,120 @@
+//! The cumulative B-spline, with the key times as knots.
+
+use glam::{DQuat, DVec3};
+
+use super::quaternion::{exponential, invert, logarithm, multiply, vector};
+use super::segment::{Basis, Segment};
+use super::tangents::Track;
+use crate::method::Ends;
+
+pub(super) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
+    let last = track.last() - 1;
+    let step = |i: usize| logarithm(track.difference(i));
+    let basis = Basis::Knots(knots(track, ends, i));
+    let before = if i > 0 {
+        step(i - 1)
+    } else {
+        match ends {
+            _ if last == 0 => step(0),
+            Ends::Loop => step(last),
+            Ends::Parabolic => parabola(track, 0, 1),
+            Ends::Natural => {
+                // The second derivatives of the first two basis functions cancel.
+                let second = bends(basis, 0.0);
+                step(0) * (-second[1] / second[0])
+            }
+            Ends::Clamped { start, .. } => first(basis, start * track.step(0) / 2.0, step(0)),
+            Ends::Secant => first(basis, step(0), step(0)),
+            Ends::Frozen => step(0),
+        }
+    };
+    let after = if i < last {
+        step(i + 1)
+    } else {
+        match ends {
+            _ if last == 0 => step(0),
+            Ends::Loop => step(0),
+            Ends::Parabolic => parabola(track, last, last - 1),
+            Ends::Natural => {
+                let second = bends(basis, 1.0);
+                step(last) * (-second[1] / second[2])
+            }
+            Ends::Clamped { end, .. } => third(basis, end * track.step(last) / 2.0, step(last)),
+            Ends::Secant => third(basis, step(last), step(last)),
+            Ends::Frozen => step(last),
+        }
+    };
+    Segment::Product {
+        base: multiply(track.keys[i], exponential(-before)),
+        w: [before, step(i), after],
+        basis,
+    }
+}
+
+/// The six knots about interval `i`; beyond the ends they go on in steps of the last
+/// interval, or across the seam.
+fn knots(track: &Track, ends: Ends, i: usize) -> [f64; 6] {
+    let last = track.last() as isize - 1;
+    let step = |j: isize| {
+        let j = if ends == Ends::Loop {
+            j.rem_euclid(last + 1)
+        } else {
+            j.clamp(0, last)
+        };
+        track.step(j as usize)
+    };
+    let i = i as isize;
+    let mut knots = [0.0; 6];
+    for j in 1..6 {
+        knots[j] = knots[j - 1] + step(i - 3 + j as isize);
+    }
+    knots
+}
+
+/// The key after the end of the parabola through three keys, as far as the interval at
+/// the end is long.
+fn parabola(track: &Track, end: usize, next: usize) -> DVec3 {
+    let rate = |i: usize| logarithm(track.difference(i)) / track.step(i);
+    let (h, next_h) = (track.step(end), track.step(next));
+    let second_difference = (rate(next) - rate(end)) / (h + next_h);
+    (rate(end) - second_difference * 2.0 * h) * h
+}
+
+/// Second derivatives of the basis functions at an end, from their slopes, which are
+/// parabolas.
+fn bends(basis: Basis, t: f64) -> [f64; 3] {
+    let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| basis.derivatives(t));
+    std::array::from_fn(|j| {
+        let (a, b, c) = (start[j], middle[j], end[j]);
+        if t == 0.0 {
+            -3.0 * a + 4.0 * b - c
+        } else {
+            a - 4.0 * b + 3.0 * c
+        }
+    })
+}
+
+/// `w₁` such that the curve starts with `turn = exp(-w₂ B₂) w₁ B₁' exp(w₂ B₂) + w₂ B₂'`.
+fn first(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
+    let (values, slopes) = (basis.values(0.0), basis.derivatives(0.0));
+    turned(turn - own * slopes[1], own * values[1]) / slopes[0]
+}
+
+/// `w₃` such that the curve ends with `turn = exp(-w₃ B₃) w₂ B₂' exp(w₃ B₃) + w₃ B₃'`.
+fn third(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
+    let (values, slopes) = (basis.values(1.0), basis.derivatives(1.0));
+    let mut w = own;
+    for _ in 0..200 {
+        w = (turn - turned(own * slopes[1], -w * values[2])) / slopes[2];
+    }
+    w
+}
+
+/// `exp(by) v exp(-by)`.
+fn turned(v: DVec3, by: DVec3) -> DVec3 {
+    let v = DQuat::from_xyzw(v.x, v.y, v.z, 0.0);
+    vector(multiply(
+        multiply(exponential(by), v),
+        invert(exponential(by)),
+    ))
+}

@@ -1,0 +1,206 @@
+//! The curve between two keys, as the papers write it.
+
+use glam::{DQuat, DVec3};
+
+use super::quaternion::{
+    exponential, invert, logarithm, multiply, nlerp, normalise, slerp, vector,
+};
+
+/// A curve over `t` from 0 to 1.
+#[derive(Clone, Copy)]
+pub(super) enum Segment {
+    Hold(DQuat),
+    Arc(DQuat, DQuat),
+    Line(DQuat, DQuat),
+    /// `base Π exp(w_j B_j(t))` (Kim, Kim, Shin 1995).
+    Product {
+        base: DQuat,
+        w: [DVec3; 3],
+        basis: Basis,
+    },
+    /// De Casteljau's construction on the sphere (Shoemake 1985).
+    Bezier([DQuat; 4]),
+    /// `q0 s0 s1 q1` (Shoemake 1987).
+    Squad([DQuat; 4]),
+    /// Keys and tangents of each component (glTF 2.0, appendix C.5): `p0 m0 m1 p1`, the
+    /// tangents times the interval's length.
+    Cubic([DQuat; 4]),
+    /// `base exp(a t + b t² + c t³)`.
+    RotationVector {
+        base: DQuat,
+        powers: [DVec3; 3],
+    },
+}
+
+/// Cumulative basis functions.
+#[derive(Clone, Copy)]
+pub(super) enum Basis {
+    Bernstein,
+    /// Cubic B-spline with these knots; the interval lies between the third and the
+    /// fourth.
+    Knots([f64; 6]),
+}
+
+impl Basis {
+    pub(super) fn values(self, t: f64) -> [f64; 3] {
+        match self {
+            Self::Bernstein => [1.0 - (1.0 - t).powi(3), t * t * (3.0 - 2.0 * t), t * t * t],
+            Self::Knots(knots) => {
+                let [_, n1, n2, n3] = b_spline(knots, 3, knots[2] + t * (knots[3] - knots[2]));
+                [n1 + n2 + n3, n2 + n3, n3]
+            }
+        }
+    }
+
+    pub(super) fn derivatives(self, t: f64) -> [f64; 3] {
+        match self {
+            Self::Bernstein => [
+                3.0 * (1.0 - t) * (1.0 - t),
+                6.0 * t * (1.0 - t),
+                3.0 * t * t,
+            ],
+            Self::Knots(knots) => {
+                // N_j' = 3 (N_{j,2}/(u_{j+3}-u_j) - N_{j+1,2}/(u_{j+4}-u_{j+1})): in the
+                // sums of the last ones all but one term cancel.
+                let length = knots[3] - knots[2];
+                let [_, n1, n2, n3] = b_spline(knots, 2, knots[2] + t * length);
+                let n = [n1, n2, n3];
+                std::array::from_fn(|j| 3.0 * length * n[j] / (knots[j + 3] - knots[j]))
+            }
+        }
+    }
+}
+
+/// The four basis functions up to cubic that are not zero between `knots[2]` and
+/// `knots[3]`, by the recursion of Cox and de Boor; of those of lower degree the last.
+fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
+    let mut n = [0.0, 0.0, 0.0, 1.0];
+    for k in 1..=degree {
+        let mut next = [0.0; 4];
+        for j in 3 - k..4 {
+            // N_j of degree k starts at knot j - 1, seen from the first of the six.
+            let knot = |place: usize| knots[(place + j).saturating_sub(1)];
+            if n[j] != 0.0 {
+                next[j] += (u - knot(0)) / (knot(k) - knot(0)) * n[j];
+            }
+            if j < 3 && n[j + 1] != 0.0 {
+                next[j] += (knot(k + 1) - u) / (knot(k + 1) - knot(1)) * n[j + 1];
+            }
+        }
+        n = next;
+    }
+    n
+}
+
+impl Segment {
+    pub(super) fn rotation(self, t: f64) -> DQuat {
+        match self {
+            Self::Hold(key) => key,
+            Self::Arc(from, to) => slerp(from, to, t),
+            Self::Line(from, to) => nlerp(from, to, t),
+            Self::Product { base, w, basis } => {
+                let b = basis.values(t);
+                (0..3).fold(base, |q, j| multiply(q, exponential(w[j] * b[j])))
+            }
+            Self::Bezier([q0, a, b, q1]) => {
+                let (first, second, third) = (slerp(q0, a, t), slerp(a, b, t), slerp(b, q1, t));
+                slerp(slerp(first, second, t), slerp(second, third, t), t)
+            }
+            Self::Squad([q0, s0, s1, q1]) => {
+                slerp(slerp(q0, q1, t), slerp(s0, s1, t), 2.0 * t * (1.0 - t))
+            }
+            Self::Cubic([p0, m0, m1, p1]) => {
+                let (t2, t3) = (t * t, t * t * t);
+                normalise(
+                    p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
+                        + m0 * (t3 - 2.0 * t2 + t)
+                        + p1 * (-2.0 * t3 + 3.0 * t2)
+                        + m1 * (t3 - t2),
+                )
+            }
+            Self::RotationVector { base, powers } => {
+                let v = powers[0] * t + powers[1] * (t * t) + powers[2] * (t * t * t);
+                multiply(base, exponential(v))
+            }
+        }
+    }
+
+    /// Twice the derivative of `t`, in the body frame.
+    pub(super) fn velocity(self, t: f64) -> DVec3 {
+        match self {
+            Self::Hold(_) => DVec3::ZERO,
+            Self::Arc(from, to) => 2.0 * logarithm(multiply(invert(from), to)),
+            Self::Product { w, basis, .. } => {
+                let (b, slopes) = (basis.values(t), basis.derivatives(t));
+                (0..3).fold(DVec3::ZERO, |velocity, j| {
+                    let factor = exponential(w[j] * b[j]);
+                    let moved = DQuat::from_xyzw(velocity.x, velocity.y, velocity.z, 0.0);
+                    let seen = multiply(multiply(invert(factor), moved), factor);
+                    vector(seen) + 2.0 * w[j] * slopes[j]
+                })
+            }
+            _ => {
+                let slope = differences(|t| self.rotation(t), t, FIRST);
+                2.0 * vector(multiply(invert(self.rotation(t)), slope))
+            }
+        }
+    }
+
+    /// Twice the second derivative of `t`, in the body frame.
+    pub(super) fn acceleration(self, t: f64) -> DVec3 {
+        // Central differences of the velocity: also of the formula beyond its interval.
+        let velocity = |t: f64| self.velocity(t).extend(0.0);
+        let slope = differences(|t| DQuat::from_vec4(velocity(t)), t, FIRST);
+        vector(slope)
+    }
+}
+
+/// Central differences of the eighth order.
+const FIRST: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+
+fn differences(of: impl Fn(f64) -> DQuat, t: f64, weights: [f64; 4]) -> DQuat {
+    let h = 0.01;
+    let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+    for (k, weight) in (1..).map(f64::from).zip(weights) {
+        sum = sum + (of(t + k * h) - of(t - k * h)) * (weight / h);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches a knot too far to the left.
+    #[test]
+    fn even_knots_give_the_uniform_basis_and_any_knots_a_smooth_one() {
+        let even = Basis::Knots([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        for i in 0..=10 {
+            let t = f64::from(i) / 10.0;
+            let uniform = [
+                (5.0 + 3.0 * t - 3.0 * t * t + t * t * t) / 6.0,
+                (1.0 + 3.0 * t + 3.0 * t * t - 2.0 * t * t * t) / 6.0,
+                t * t * t / 6.0,
+            ];
+            for (found, expected) in even.values(t).into_iter().zip(uniform) {
+                assert!((found - expected).abs() < 1e-15);
+            }
+        }
+        let all = [0.0, 0.4, 1.0, 1.1, 2.0, 4.0, 4.5];
+        let left = Basis::Knots(std::array::from_fn(|i| all[i]));
+        let right = Basis::Knots(std::array::from_fn(|i| all[i + 1]));
+        // The last function of one interval is the one before it in the next.
+        let (ends, starts) = (left.values(1.0), right.values(0.0));
+        assert!((ends[1] - starts[0]).abs() < 1e-15 && (ends[2] - starts[1]).abs() < 1e-15);
+        let (ends, starts) = (left.derivatives(1.0), right.derivatives(0.0));
+        assert!((ends[1] / 0.1 - starts[0] / 0.9).abs() < 1e-14);
+        assert!((ends[2] / 0.1 - starts[1] / 0.9).abs() < 1e-14);
+        for t in [0.1, 0.5, 0.9] {
+            let h = 1e-6;
+            let (after, before) = (left.values(t + h), left.values(t - h));
+            for (j, slope) in left.derivatives(t).into_iter().enumerate() {
+                assert!((slope - (after[j] - before[j]) / (2.0 * h)).abs() < 1e-9);
+            }
+        }
+    }
+}

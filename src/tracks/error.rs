@@ -1,0 +1,91 @@
+//! Why a set refuses keys.
+
+use super::NORM_TOLERANCE;
+
+/// Why keys were refused. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrackError {
+    /// A track must have at least one key.
+    #[error("track {track} has no keys; give it at least one")]
+    Empty {
+        /// The track's place in the set.
+        track: usize,
+    },
+    /// Each key needs one time.
+    #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
+    LengthMismatch {
+        /// The track's place in the set.
+        track: usize,
+        /// Number of keys given.
+        keys: usize,
+        /// Number of times given.
+        times: usize,
+    },
+    /// A time is NaN or infinite.
+    #[error("track {track}, key {key}: time {time} is not finite")]
+    TimeNotFinite {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// The offending time, seconds.
+        time: f64,
+    },
+    /// Times must increase strictly.
+    #[error(
+        "track {track}, key {key}: time {time} s does not come after {previous} s; sort the keys and remove duplicates"
+    )]
+    TimeNotIncreasing {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// The offending time, seconds.
+        time: f64,
+        /// The time before it, seconds.
+        previous: f64,
+    },
+    /// The quaternion is not close to unit length.
+    #[error(
+        "track {track}, key {key}: quaternion norm is {norm}; a rotation has norm 1 (±{NORM_TOLERANCE})"
+    )]
+    NotUnit {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// Its norm.
+        norm: f64,
+    },
+    /// There is no track at that place.
+    #[error("there is no track {track}; the set has {tracks}")]
+    NoSuchTrack {
+        /// The place asked for.
+        track: usize,
+        /// How many there are.
+        tracks: usize,
+    },
+    /// What keys carry beside their rotations, they all carry.
+    #[error("track {track} has {keys} keys but {given} values of {what}; give one for each key")]
+    DataLength {
+        /// The track's place in the set.
+        track: usize,
+        /// What was given.
+        what: &'static str,
+        /// Number of its keys.
+        keys: usize,
+        /// Number of values given.
+        given: usize,
+    },
+    /// A value beside a rotation is NaN or infinite.
+    #[error("track {track}, key {key}: the {what} is not finite")]
+    DataNotFinite {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// What was given.
+        what: &'static str,
+    },
+}
