@@ -372,7 +372,7 @@ impl Engine {
             Backend::Cpu(_) => None,
         };
         let limit = budget.unwrap_or(usize::MAX);
-        let key_bytes = segment_size(interpolation.method.form) + size_of::<Quat>();
+        let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
         let mut pieces = Vec::new();
         let (mut start, mut bytes) = (0, 0usize);
         for (index, track) in set.tracks().enumerate() {

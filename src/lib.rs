@@ -80,7 +80,8 @@ pub use engine::{Engine, Error};
 pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
 pub use method::{
-    Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
+    Axes, Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
+    Quantity,
 };
 pub use rotations::{Layout, Rotations};
 pub use stream::Chunk;

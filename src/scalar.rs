@@ -194,7 +194,8 @@ mod tests {
     /// Catches a wrong derivative, and a series that is left too late.
     #[test]
     fn derivatives_are_those_of_the_values() {
-        let functions: [(fn(Jet) -> Jet, fn(f64) -> f64); 4] = [
+        type Function = (fn(Jet) -> Jet, fn(f64) -> f64);
+        let functions: [Function; 4] = [
             (|x| x.waves().0, |x| x.waves().0),
             (|x| x.waves().1, |x| x.waves().1),
             (Jet::arc_square, f64::arc_square),

@@ -104,7 +104,7 @@ impl Prepared {
                 (timeline.time(track, sample) - start) / seconds
             }
         };
-        round_quat(self.exact[index as usize].rotation(t))
+        round_quat(self.exact[index as usize].value(t))
     }
 
     #[inline(always)]
@@ -196,7 +196,12 @@ impl Prepared {
         }
         if part.after != NONE {
             let end = clock.boundary(part.end);
-            clip(end.first as usize, usize::MAX, &samples, part.after, emit);
+            let mut first = end.first as usize;
+            if part.at_end != NONE && first as f64 == end.frame {
+                clip(first, first + 1, &samples, part.at_end, emit);
+                first += 1;
+            }
+            clip(first, usize::MAX, &samples, part.after, emit);
         }
         Ok(())
     }
@@ -231,6 +236,8 @@ impl Prepared {
                     let source = self.time_source(part.spans.start + i, end);
                     (open..end, Some(source))
                 }
+            } else if time == part.end && part.at_end != NONE {
+                (time..time.next_up(), constant_source(part.at_end))
             } else if time >= part.end {
                 (part.end..f64::INFINITY, constant_source(part.after))
             } else {

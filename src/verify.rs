@@ -139,7 +139,7 @@ pub fn verify(
             .filter(|_| rotations > 0)
             .map(|(track, errors)| place(track * timeline.len() + errors.worst)),
         max_norm_error: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
-        error_bound: error_bound(interpolation.method.form),
+        error_bound: error_bound(interpolation.form()),
         norm_bound: NORM_BOUND,
     })
 }

@@ -71,7 +71,7 @@ fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
             .into_iter()
             .fold(0.0, f32::max);
         let nudge = Quat::from_xyzw(0.3, -0.7, 0.5, 0.4) * (largest * f32::EPSILON);
-        keys[key] = keys[key] + nudge;
+        keys[key] += nudge;
         let nudged = Track {
             keys: &keys,
             ..track

@@ -4,7 +4,7 @@ mod support;
 
 use glam::Quat;
 use support::{first_difference, hostile_set, vulkan_devices};
-use tumble::{Device, Engine, Error, Frames, Layout, METHODS};
+use tumble::{Device, Engine, Error, Frames, Layout, METHODS, method};
 
 fn devices() -> Vec<Device> {
     [vec![Device::Cpu], vulkan_devices()].concat()

@@ -370,7 +370,7 @@ fn natural_ends_have_no_angular_acceleration() {
 
 /// Methods that ask what to do at the ends.
 fn with_ends() -> impl Iterator<Item = Method> {
-    free().filter(|&method| method != method::NLERP && method != method::SLERP)
+    METHODS.into_iter().filter(|method| method.uses_neighbours)
 }
 
 #[test]

@@ -59,6 +59,7 @@ impl Manner {
             method,
             path: method.path.unwrap_or(path),
             ends: ends.unwrap_or(method.ends),
+            quantity: tumble::Quantity::Rotation,
             tcb: tumble::Tcb {
                 tension: self.tension,
                 continuity: self.continuity,

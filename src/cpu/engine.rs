@@ -10,7 +10,7 @@ use super::sampled::{SampledArcs, Stretch};
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::encoding::Encoding;
 use crate::engine::Error;
-use crate::method::{Curves, Interpolation};
+use crate::method::{Form, Interpolation};
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
 use crate::rotations::Layout;
 use crate::schedule::FrameClock;
@@ -316,7 +316,7 @@ pub(crate) fn is_sampled(
     interpolation: &Interpolation,
     timeline: &Timeline,
 ) -> bool {
-    let arcs = matches!(interpolation.method.curves, Curves::Arcs);
+    let arcs = interpolation.form() == Form::Arc;
     arcs && timeline.len() * set.track_count() < set.key_count()
 }
 

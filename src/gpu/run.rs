@@ -148,7 +148,7 @@ impl VulkanEngine {
             },
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
-        let pipeline = self.pipeline(clip.interpolation.method.form, timeline, encoding)?;
+        let pipeline = self.pipeline(clip.interpolation.form(), timeline, encoding)?;
         let mut first_item = 0;
         for list in &lists {
             let item_count = list.item_count() as u32;

@@ -22,6 +22,7 @@ pub const B_SPLINE: Method = Method {
     keeps_constant_velocity: Keys::Even,
     interpolates: false,
     symmetric: false,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -18,6 +18,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     keeps_constant_velocity: Keys::Any,
     interpolates: true,
     symmetric: false,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -20,6 +20,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     keeps_constant_velocity: Keys::Any,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -30,6 +30,7 @@ pub const C2: Method = Method {
     keeps_constant_velocity: Keys::Any,
     interpolates: true,
     symmetric: false,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Secant,
     path: None,
@@ -281,9 +282,9 @@ impl<'a> Spline<'a> {
             spline.scales[i] = left * h;
         }
         spline.inverse[0] = diagonal[0].inverse();
-        for i in 1..keys {
+        for (i, &own) in diagonal.iter().enumerate().skip(1) {
             let above = spline.inverse[i - 1] * spline.upper[i - 1];
-            spline.inverse[i] = (diagonal[i] - spline.lower[i] * above).inverse();
+            spline.inverse[i] = (own - spline.lower[i] * above).inverse();
         }
         spline
     }

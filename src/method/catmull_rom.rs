@@ -18,6 +18,7 @@ pub const CATMULL_ROM: Method = Method {
     keeps_constant_velocity: Keys::Even,
     interpolates: true,
     symmetric: false,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -20,6 +20,7 @@ pub const GLTF_CUBIC: Method = Method {
     keeps_constant_velocity: Keys::Never,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: false,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: Some(Path::AsAuthored),

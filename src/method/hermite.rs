@@ -20,6 +20,7 @@ pub const HERMITE: Method = Method {
     keeps_constant_velocity: Keys::Never,
     interpolates: true,
     symmetric: false,
+    uses_neighbours: false,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -94,6 +94,9 @@ pub struct Method {
     /// Whether it takes the same way when the keys are given backwards in time (with
     /// tangents and bias the other way round).
     pub symmetric: bool,
+    /// Whether its curves depend on keys beyond the two that they join: then [`Ends`]
+    /// matter.
+    pub uses_neighbours: bool,
     /// What the kernels evaluate for it.
     pub form: Form,
     /// What it does at the ends where nothing else is asked for.
@@ -111,8 +114,8 @@ pub struct Method {
 pub(crate) enum Curves {
     /// The first of them.
     Steps,
-    /// The great circle, at constant speed.
-    Arcs,
+    /// The great circle, at constant speed; and as a formula.
+    Arcs(Smooth),
     /// A curve with a formula.
     Smooth(Smooth),
 }
@@ -266,6 +269,42 @@ pub struct Interpolation {
     pub ends: Ends,
     /// For [`KOCHANEK_BARTELS`], where a track has none of its own.
     pub tcb: Tcb,
+    /// What of the rotation is asked for.
+    pub quantity: Quantity,
+}
+
+impl Interpolation {
+    /// What the kernels evaluate for it.
+    pub fn form(&self) -> Form {
+        match self.quantity {
+            Quantity::Rotation => self.method.form,
+            _ => Form::Polynomial,
+        }
+    }
+}
+
+/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations
+/// are vectors, `x y z` and 0 in the place of `w`; by the derivative of the formula. On
+/// a key they are those of the segment behind it, on the last key those of the last
+/// segment; before the first key and behind the last nothing moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Quantity {
+    /// The rotation, a unit quaternion.
+    #[default]
+    Rotation,
+    /// The angular velocity, radians per second.
+    Velocity(Axes),
+    /// The angular acceleration, radians per second squared.
+    Acceleration(Axes),
+}
+
+/// Whose axes a vector is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Axes {
+    /// Those of what turns.
+    Body,
+    /// Those of what it turns in: of the parent, in a chain.
+    World,
 }
 
 impl From<Method> for Interpolation {
@@ -275,6 +314,7 @@ impl From<Method> for Interpolation {
             path: method.path.unwrap_or_default(),
             ends: method.ends,
             tcb: Tcb::default(),
+            quantity: Quantity::Rotation,
         }
     }
 }

@@ -18,6 +18,7 @@ pub const NLERP: Method = Method {
     keeps_constant_velocity: Keys::Never,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: false,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

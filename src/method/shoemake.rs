@@ -18,6 +18,7 @@ pub const SHOEMAKE: Method = Method {
     keeps_constant_velocity: Keys::Never,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

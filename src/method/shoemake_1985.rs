@@ -17,6 +17,7 @@ pub const SHOEMAKE_1985: Method = Method {
     keeps_constant_velocity: Keys::Even,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

@@ -1,6 +1,7 @@
 //! Spherical linear interpolation.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method};
+use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth};
+use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.
@@ -14,9 +15,20 @@ pub const SLERP: Method = Method {
     keeps_constant_velocity: Keys::Any,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: false,
     form: Form::Arc,
     ends: Ends::Parabolic,
     path: None,
     reference: reference::Kind::Slerp,
-    curves: Curves::Arcs,
+    curves: Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves)),
 };
+
+/// For what follows from the derivatives: `q0 exp(t log(q0⁻¹ q1))`.
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let log = intervals.log(lane);
+        intervals.set_numbers(lane, 0, &intervals.key(lane));
+        intervals.set_numbers(lane, 4, &log);
+        intervals.set_energy(lane, [log, [0.0; 3], [0.0; 3]]);
+    }
+}

@@ -16,6 +16,7 @@ pub const SQUAD: Method = Method {
     keeps_constant_velocity: Keys::Even,
     interpolates: true,
     symmetric: true,
+    uses_neighbours: true,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

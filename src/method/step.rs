@@ -14,6 +14,7 @@ pub const STEP: Method = Method {
     keeps_constant_velocity: Keys::Never,
     interpolates: true,
     symmetric: false,
+    uses_neighbours: false,
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,

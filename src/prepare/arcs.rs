@@ -221,6 +221,7 @@ impl Prepare for ArcPreparation {
             } else {
                 NONE
             },
+            at_end: NONE,
         });
         for key in intervals {
             if self.block.count == LANES {

@@ -1,8 +1,11 @@
 //! A curve in f64, and the part of it that is fitted.
 
+use super::motion;
 use super::shape::Shape;
 use crate::branchless::{Quaternion, dot};
 use crate::formula::Numbers;
+use crate::method::Quantity;
+use crate::scalar::Jet;
 
 /// What lies between two keys, or a part of it.
 #[derive(Clone, Copy)]
@@ -10,6 +13,9 @@ pub(crate) struct Curve {
     pub(super) shape: &'static Shape,
     pub(super) numbers: Numbers,
     pub(super) piece: Piece,
+    pub(super) quantity: Quantity,
+    /// Of the parameter, per second.
+    pub(super) rate: f64,
 }
 
 /// The part of an interval that is fitted: where it starts, and its length, in
@@ -45,10 +51,18 @@ impl Piece {
 }
 
 impl Curve {
-    /// The rotation at `t`, 0 to 1 over its piece, in f64.
-    pub(crate) fn rotation(&self, t: f64) -> Quaternion {
+    /// What is asked for at `t`, 0 to 1 over its piece, in f64.
+    pub(crate) fn value(&self, t: f64) -> Quaternion {
         let (start, width) = self.piece.extent();
-        let t = start + width * t;
+        self.value_at(start + width * t)
+    }
+
+    /// What is asked for at `t`, 0 to 1 over its interval.
+    pub(super) fn value_at(&self, t: f64) -> Quaternion {
+        if self.quantity != Quantity::Rotation {
+            let rotation = (self.shape.moving)(&self.numbers, Jet::parameter(t));
+            return motion::value(self.quantity, rotation, self.rate);
+        }
         let rotation = (self.shape.rotation)(&self.numbers, t);
         if dot(rotation, rotation) > 0.5 {
             return rotation;

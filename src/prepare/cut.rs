@@ -6,11 +6,13 @@ use super::curve::Curve;
 use super::fit::{FitBlock, Tier};
 use super::intervals::LANES;
 use super::shape::Shape;
+use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
 /// Cuts curves; what it needs for that is kept.
 pub(super) struct Cutter {
     shape: &'static Shape,
+    quantity: Quantity,
     /// Made when there is something to cut.
     block: Option<Box<FitBlock>>,
     waiting: Vec<Part>,
@@ -29,9 +31,10 @@ pub(super) struct Part {
 }
 
 impl Cutter {
-    pub(super) fn new(shape: &'static Shape) -> Self {
+    pub(super) fn new(shape: &'static Shape, quantity: Quantity) -> Self {
         Self {
             shape,
+            quantity,
             block: None,
             waiting: Vec::new(),
             parts: Vec::new(),
@@ -57,11 +60,11 @@ impl Cutter {
             let now = self.waiting.split_off(first);
             let mut block = match self.block.take() {
                 Some(block) => block,
-                None => Box::new(FitBlock::new(self.shape, Tier::Full)),
+                None => Box::new(FitBlock::new(self.shape, self.quantity, Tier::Full)),
             };
             block.clear();
             now.iter().for_each(|part| block.push(&part.curve));
-            (self.shape.fit)(&mut block);
+            block.run();
             for (lane, part) in now.into_iter().enumerate() {
                 if block.fits(lane) {
                     let mut segment = PolynomialSegment::zeroed();

@@ -8,9 +8,11 @@
 
 use super::curve::{Curve, Piece};
 use super::intervals::{Intervals, LANES};
+use super::motion;
 use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
 use super::shape::Shape;
 use crate::formula::{NUMBERS, Numbers};
+use crate::method::Quantity;
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 
@@ -64,6 +66,9 @@ pub(super) struct FitBlock {
     /// The middle of the piece to fit, and its width.
     pub(super) middles: Lane64,
     pub(super) widths: Lane64,
+    /// Of the parameter, per second.
+    rates: Lane64,
+    pub(super) quantity: Quantity,
     count: usize,
     /// The coefficients of each power, for every lane.
     coefficients: [[[f32; 4]; LANES]; COEFFICIENTS],
@@ -94,7 +99,7 @@ impl<const PAIRS: usize> Samples<PAIRS> {
 }
 
 impl FitBlock {
-    pub(super) fn new(shape: &'static Shape, tier: Tier) -> Self {
+    pub(super) fn new(shape: &'static Shape, quantity: Quantity, tier: Tier) -> Self {
         let lane = [0.0; LANES];
         Self {
             shape,
@@ -102,6 +107,8 @@ impl FitBlock {
             numbers: shape.shared.map(|number| [number; LANES]),
             middles: lane,
             widths: lane,
+            rates: lane,
+            quantity,
             count: 0,
             coefficients: [[[0.0; 4]; LANES]; COEFFICIENTS],
             tails: [0.0; LANES],
@@ -134,6 +141,7 @@ impl FitBlock {
         for (lanes, &number) in self.numbers[..own].iter_mut().zip(&curve.numbers) {
             lanes[lane] = number;
         }
+        self.rates[lane] = curve.rate;
         self.push_piece(curve.piece);
     }
 
@@ -144,6 +152,7 @@ impl FitBlock {
         for (lanes, curves) in self.numbers[..own].iter_mut().zip(&intervals.numbers) {
             lanes[lane] = curves[from];
         }
+        self.rates[lane] = intervals.rate(from);
         self.push_piece(Piece::WHOLE);
     }
 
@@ -166,6 +175,36 @@ impl FitBlock {
             shape: self.shape,
             numbers: self.numbers_of(lane),
             piece: Piece::WHOLE,
+            quantity: self.quantity,
+            rate: self.rates[lane],
+        }
+    }
+
+    /// Fits the curves that wait.
+    pub(super) fn run(&mut self) {
+        match self.quantity {
+            _ if self.count == 0 => {}
+            Quantity::Rotation => (self.shape.fit)(self),
+            _ => motion::fit(self),
+        }
+    }
+
+    /// Whether all that a gentle tier holds is fitted, unchecked.
+    pub(super) fn is_trusted(&self) -> bool {
+        self.tier == Tier::Gentle && self.is_entire()
+    }
+
+    fn is_entire(&self) -> bool {
+        self.shape.entire && self.quantity == Quantity::Rotation
+    }
+
+    /// Multiplies every lane's polynomial.
+    #[inline(always)]
+    pub(super) fn scale(&mut self, scales: &Lane32) {
+        for power in &mut self.coefficients {
+            for (coefficients, &scale) in power.iter_mut().zip(scales) {
+                *coefficients = coefficients.map(|c| canonical(c * scale));
+            }
         }
     }
 
@@ -191,7 +230,7 @@ impl FitBlock {
         nodes: &Nodes<PAIRS>,
         Samples { middle, even, odd }: &Samples<PAIRS>,
     ) {
-        let entire = self.shape.entire;
+        let entire = self.is_entire();
         let mut tails = [0.0; LANES];
         let mut found_even = [[[0.0f32; LANES]; 4]; PAIRS];
         let mut found_odd = [[[0.0f32; LANES]; 4]; PAIRS];

@@ -8,11 +8,13 @@ use super::fit::{FitBlock, Tier, tier};
 use super::intervals::Intervals;
 use super::shape::Shape;
 use super::{NONE, Prepared, Source};
+use crate::method::Quantity;
 use crate::segment::{PolynomialSegment, Segments};
 
 /// Fits curves; what it needs for that is kept.
 pub(super) struct Fitting {
     shape: &'static Shape,
+    quantity: Quantity,
     gentle: Queue,
     full: Queue,
     cutter: Cutter,
@@ -52,12 +54,13 @@ struct Queue {
 }
 
 impl Fitting {
-    pub(super) fn new(shape: &'static Shape) -> Self {
+    pub(super) fn new(shape: &'static Shape, quantity: Quantity) -> Self {
         Self {
             shape,
+            quantity,
             gentle: Queue::default(),
             full: Queue::default(),
-            cutter: Cutter::new(shape),
+            cutter: Cutter::new(shape, quantity),
             intervals: Vec::new(),
         }
     }
@@ -78,7 +81,8 @@ impl Fitting {
     ) {
         let interval = self.intervals.len();
         let Some(tier) = tier(curves.energies[lane]) else {
-            self.cutter.push(interval, curves.curve(lane, self.shape));
+            self.cutter
+                .push(interval, curves.curve(lane, self.shape, self.quantity));
             let source = CurveSource::Parts(None);
             self.intervals.push(Fitted { place, source });
             return;
@@ -92,7 +96,7 @@ impl Fitting {
             Tier::Full => &mut self.full,
         };
         queue.intervals.push(interval);
-        let new = || Box::new(FitBlock::new(self.shape, tier));
+        let new = || Box::new(FitBlock::new(self.shape, self.quantity, tier));
         let block = queue.block.get_or_insert_with(new);
         block.push_from(curves, lane);
         if block.is_full() {
@@ -109,8 +113,8 @@ impl Fitting {
         let Some(block) = &mut queue.block else {
             return;
         };
-        (self.shape.fit)(block);
-        let trusted = tier == Tier::Gentle && self.shape.entire;
+        block.run();
+        let trusted = block.is_trusted();
         let segments = polynomials(prepared);
         for (lane, interval) in queue.intervals.drain(..).enumerate() {
             let source = &mut self.intervals[interval].source;

@@ -12,6 +12,7 @@ use super::curve::{Curve, Piece};
 use super::shape::Shape;
 use crate::branchless::{self, Quaternion, Vector};
 use crate::formula::NUMBERS;
+use crate::method::Quantity;
 use crate::tracks::Track;
 
 /// Lanes worked out together.
@@ -145,6 +146,11 @@ impl Intervals {
         self.durations[lane]
     }
 
+    /// How fast the parameter runs, per second.
+    pub(super) fn rate(&self, lane: usize) -> f64 {
+        branchless::ratio(1.0, self.durations[lane])
+    }
+
     pub(crate) fn log(&self, lane: usize) -> Vector {
         at(&self.logs, lane)
     }
@@ -209,7 +215,7 @@ impl Intervals {
     }
 
     /// The curve of an interval.
-    pub(super) fn curve(&self, lane: usize, shape: &'static Shape) -> Curve {
+    pub(super) fn curve(&self, lane: usize, shape: &'static Shape, quantity: Quantity) -> Curve {
         let mut numbers = shape.shared;
         for (number, lanes) in numbers[..shape.own].iter_mut().zip(&self.numbers) {
             *number = lanes[lane];
@@ -218,6 +224,8 @@ impl Intervals {
             shape,
             numbers,
             piece: Piece::WHOLE,
+            quantity,
+            rate: self.rate(lane),
         }
     }
 

@@ -9,6 +9,7 @@ mod cut;
 mod fit;
 mod fitting;
 mod intervals;
+mod motion;
 mod nodes;
 mod passes;
 mod sample;
@@ -82,6 +83,8 @@ pub(crate) struct Part {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
+    /// The constant at exactly the last key; [`NONE`] where it is `after`.
+    pub(crate) at_end: u32,
 }
 
 impl Spans {
@@ -100,7 +103,7 @@ impl Spans {
 impl Prepared {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
-            segments: Segments::new(interpolation.method.form),
+            segments: Segments::new(interpolation.form()),
             constants: Vec::new(),
             exact: Vec::new(),
             spans: Spans::default(),
@@ -144,6 +147,7 @@ impl Prepared {
             spans: part.spans.start + spans..part.spans.end + spans,
             before: shift(part.before),
             after: shift(part.after),
+            at_end: shift(part.at_end),
             ..part
         }));
         self.segments.append(other.segments);

@@ -2,6 +2,8 @@
 //!
 //! Outputs are arrays of a pass's own: the compiler must see that they do not overlap
 //! what is read.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
 
 use std::marker::PhantomData;
 

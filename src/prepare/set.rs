@@ -10,7 +10,7 @@ use super::steps::StepPreparation;
 use super::{NONE, Prepared};
 use crate::clock::{Ticks, Timeline};
 use crate::frame_rate::FrameRate;
-use crate::method::{Curves, Ends, Interpolation, InterpolationError};
+use crate::method::{Curves, Ends, Interpolation, InterpolationError, Quantity};
 use crate::numeric::canonical;
 use crate::tracks::{Track, TrackSet};
 
@@ -85,6 +85,9 @@ fn prepare_long(
 
 /// The same rotations with the other sign, but for those that are the keys' own.
 fn negate(prepared: &mut Prepared, interpolation: &Interpolation) {
+    if interpolation.quantity != Quantity::Rotation {
+        return; // both signs move alike
+    }
     prepared.segments.negate();
     for curve in &mut prepared.exact {
         curve.negate();
@@ -124,7 +127,10 @@ pub(crate) struct Preparation(Box<dyn Prepare>);
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self(match interpolation.method.curves {
-            Curves::Arcs => Box::new(ArcPreparation::new(interpolation)),
+            Curves::Arcs(moving) if interpolation.quantity != Quantity::Rotation => {
+                Box::new(SmoothPreparation::new(interpolation, moving))
+            }
+            Curves::Arcs(_) => Box::new(ArcPreparation::new(interpolation)),
             Curves::Steps => Box::new(StepPreparation::new(interpolation)),
             Curves::Smooth(smooth) => Box::new(SmoothPreparation::new(interpolation, smooth)),
         })

@@ -11,6 +11,7 @@ use crate::cpu::{InLanes, in_lanes};
 use crate::formula::{
     DeCasteljau, Formula, Hermite, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
+use crate::scalar::Jet;
 
 /// A formula, and how its curves are sampled.
 pub(crate) struct Shape {
@@ -24,6 +25,7 @@ pub(crate) struct Shape {
     /// faster: a gentle curve's fit then needs no check.
     pub(super) entire: bool,
     pub(super) rotation: fn(&Numbers, f64) -> Quaternion,
+    pub(super) moving: fn(&Numbers, Jet) -> [Jet; 4],
     pub(super) fit: fn(&mut FitBlock),
 }
 
@@ -35,6 +37,7 @@ impl Shape {
             signed,
             entire: false,
             rotation: F::rotation::<f64>,
+            moving: F::rotation::<Jet>,
             fit: fit::<Directly<F>>,
         }
     }
@@ -97,7 +100,6 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
     fn run(&mut self) {
         match self.0.tier() {
-            _ if self.0.whole() == 0 => {}
             Tier::Gentle => self.fit(&GENTLE_NODES),
             Tier::Full => self.fit(&FULL_NODES),
         }

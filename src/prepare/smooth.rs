@@ -13,10 +13,13 @@ use super::{NONE, Part, Prepared};
 use crate::branchless::Vector;
 use crate::cpu::in_lanes;
 use crate::frame_rate::FrameRate;
-use crate::method::{Ends, Given, Interpolation, InterpolationError, Smooth};
+use crate::method::{Ends, Given, Interpolation, InterpolationError, Quantity, Smooth};
 use crate::numeric::round_quat;
 use crate::schedule::FrameClock;
 use crate::tracks::Track;
+
+/// What moves neither nor turns faster.
+const STILL: [f32; 4] = [0.0; 4];
 
 /// Lanes that a stretch needs beside those of its intervals.
 const CONTEXT: usize = 2;
@@ -49,7 +52,7 @@ impl SmoothPreparation {
             smooth,
             intervals: Intervals::new(path.flips_below()),
             stretches: Vec::new(),
-            fitting: Fitting::new(smooth.shape),
+            fitting: Fitting::new(smooth.shape, interpolation.quantity),
             sign: 1.0,
             frames: None,
         }
@@ -71,13 +74,16 @@ impl Prepare for SmoothPreparation {
         self.interpolation.ends.check(track, index)?;
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
+        let of_rotations = self.interpolation.quantity == Quantity::Rotation;
         // A curve that does not pass through its keys has end values of its own.
-        let meets_keys = self.interpolation.method.interpolates || all == 0;
-        if meets_keys {
+        let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
+        let last_key = first_key + intervals.len() as u32;
+        if of_rotations && meets_keys {
             let keys = track.keys[intervals.start..=intervals.end].iter();
             prepared.constants.extend(keys.map(Quat::to_array));
+        } else if meets_keys {
+            prepared.constant(STILL);
         }
-        let last_key = first_key + intervals.len() as u32;
         let held = |at_end: bool, key: u32| {
             if meets_keys && at_end { key } else { NONE }
         };
@@ -88,6 +94,7 @@ impl Prepare for SmoothPreparation {
             end: track.times[intervals.end],
             before: held(intervals.start == 0, first_key),
             after: held(intervals.end == all, last_key),
+            at_end: NONE,
         });
         let looped = matches!(self.interpolation.ends, Ends::Loop);
         // Two keys are joined by constant velocity, whatever lies beside them.
@@ -218,7 +225,10 @@ impl SmoothPreparation {
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);
                 } else if key == NONE {
-                    let [stored, _] = self.intervals.keys(lane);
+                    let stored = match self.interpolation.quantity {
+                        Quantity::Rotation => self.intervals.keys(lane)[0],
+                        _ => STILL,
+                    };
                     let constant = prepared.constant(stored);
                     self.fitting.push_constant(place, constant);
                 } else {
@@ -237,27 +247,39 @@ impl SmoothPreparation {
     }
 
     fn is_frozen(&self) -> bool {
-        matches!(self.interpolation.ends, Ends::Frozen)
+        let uses_ends = self.interpolation.method.uses_neighbours;
+        uses_ends && matches!(self.interpolation.ends, Ends::Frozen)
     }
 
-    /// A curve that does not pass through its keys is held at its own ends.
+    /// A curve that does not pass through its keys is held at its own ends; what is held
+    /// does not move.
     fn end_values(&self, prepared: &mut Prepared, stretch: &Stretch) {
         if stretch.key != NONE {
             return;
         }
-        let mut value = |lane: usize, end: usize| {
-            let value = if self.is_frozen() {
-                self.intervals.keys(lane)[end]
-            } else {
-                let curve = self.intervals.curve(lane, self.smooth.shape);
-                round_quat(curve.rotation(end as f64))
-            };
-            prepared.constant(value)
+        let quantity = self.interpolation.quantity;
+        let value = |lane: usize, end: usize| match (self.is_frozen(), quantity) {
+            (true, Quantity::Rotation) => self.intervals.keys(lane)[end],
+            (true, _) => STILL,
+            _ => {
+                let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
+                round_quat(curve.value(end as f64))
+            }
         };
-        let before = stretch.first().map(|lane| value(lane, 0));
-        let after = stretch.last().map(|lane| value(lane, 1));
-        let part = &mut prepared.parts[stretch.part];
-        part.before = before.unwrap_or(part.before);
-        part.after = after.unwrap_or(part.after);
+        let held = |value| match quantity {
+            Quantity::Rotation => value,
+            _ => STILL,
+        };
+        if let Some(lane) = stretch.first() {
+            prepared.parts[stretch.part].before = prepared.constant(held(value(lane, 0)));
+        }
+        if let Some(lane) = stretch.last() {
+            let at_end = value(lane, 1);
+            let after = prepared.constant(held(at_end));
+            prepared.parts[stretch.part].after = after;
+            if quantity != Quantity::Rotation {
+                prepared.parts[stretch.part].at_end = prepared.constant(at_end);
+            }
+        }
     }
 }

@@ -6,7 +6,7 @@ use glam::Quat;
 
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
-use crate::method::{Interpolation, InterpolationError};
+use crate::method::{Interpolation, InterpolationError, Quantity};
 use crate::tracks::Track;
 
 /// Prepares tracks whose keys are held.
@@ -33,8 +33,16 @@ impl Prepare for StepPreparation {
         self.interpolation.ends.check(track, index)?;
         let first = prepared.constants.len() as u32;
         let last = first + intervals.len() as u32;
+        let stands_still = self.interpolation.quantity != Quantity::Rotation;
+        let value = |key: &Quat| {
+            if stands_still {
+                [0.0; 4]
+            } else {
+                key.to_array()
+            }
+        };
         let keys = track.keys[intervals.start..=intervals.end].iter();
-        prepared.constants.extend(keys.map(Quat::to_array));
+        prepared.constants.extend(keys.map(value));
         let first_span = prepared.spans.len();
         let all = track.keys.len() - 1;
         prepared.parts.push(Part {
@@ -43,6 +51,7 @@ impl Prepare for StepPreparation {
             end: track.times[intervals.end],
             before: if intervals.start == 0 { first } else { NONE },
             after: if intervals.end == all { last } else { NONE },
+            at_end: NONE,
         });
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], 0.0, Source::Constant(constant), NONE);

@@ -151,7 +151,6 @@ fn segment(track: &Track, kind: Kind, ends: Ends, i: usize, velocities: &[DVec3]
     match kind {
         Kind::Step => Segment::Hold(from),
         Kind::Slerp => Segment::Arc(from, to),
-        _ if ends == Ends::Frozen && at_end && last > 0 => Segment::Hold(from),
         Kind::Nlerp => Segment::Line(from, to),
         Kind::GltfCubic => {
             let tangent = |key: usize, side: usize| match track.tangents.get(key) {
@@ -167,6 +166,7 @@ fn segment(track: &Track, kind: Kind, ends: Ends, i: usize, velocities: &[DVec3]
             };
             cumulative(track, i, handle(i), handle(i + 1))
         }
+        _ if ends == Ends::Frozen && at_end && last > 0 => Segment::Hold(from),
         _ if last == 0 && kind != Kind::BSpline => Segment::Arc(from, to),
         Kind::BSpline => b_spline(track, ends, i),
         Kind::C2 => c2::segment(track, velocities, i),

@@ -162,7 +162,7 @@ fn differences(of: impl Fn(f64) -> DQuat, t: f64, weights: [f64; 4]) -> DQuat {
     let h = 0.01;
     let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     for (k, weight) in (1..).map(f64::from).zip(weights) {
-        sum = sum + (of(t + k * h) - of(t - k * h)) * (weight / h);
+        sum += (of(t + k * h) - of(t - k * h)) * (weight / h);
     }
     sum
 }

@@ -1,0 +1,108 @@
+//! Angular velocities and accelerations of curves: by their formulas, evaluated in
+//! numbers that carry their derivatives, and fitted like the rotations themselves.
+
+use super::fit::{FitBlock, Samples, Tier};
+use super::intervals::LANES;
+use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
+use crate::branchless::{Quaternion, Vector, product, step};
+use crate::cpu::{InLanes, in_lanes};
+use crate::method::{Axes, Quantity};
+use crate::scalar::Jet;
+
+/// What is asked for of a curve, from its rotation and derivatives by the parameter;
+/// `rate` is how fast the parameter runs, per second. A rotation, or a vector and 0.
+pub(super) fn value(quantity: Quantity, rotation: [Jet; 4], rate: f64) -> Quaternion {
+    let at = rotation.map(|jet| jet.value);
+    let (derivative, scale, axes) = match quantity {
+        Quantity::Rotation => return at,
+        Quantity::Velocity(axes) => (rotation.map(|jet| jet.first), rate, axes),
+        Quantity::Acceleration(axes) => (rotation.map(|jet| jet.second), rate * rate, axes),
+    };
+    // ω = 2 q⁻¹ q', and what of 2 q⁻¹ q'' is a vector is its derivative.
+    let [x, y, z, _] = step(at, derivative);
+    let body = [x, y, z].map(|c| finite(2.0 * scale * c));
+    let [x, y, z] = match axes {
+        Axes::Body => body,
+        // The frame's own turning adds nothing to the derivative.
+        Axes::World => rotated(at, body),
+    };
+    [x, y, z, 0.0]
+}
+
+/// Between keys that are next to nothing apart velocities pass what f32 holds.
+fn finite(value: f64) -> f64 {
+    let largest = 0.25 * f64::from(f32::MAX);
+    value.clamp(-largest, largest)
+}
+
+/// `q v q⁻¹`.
+fn rotated(q: Quaternion, [x, y, z]: Vector) -> Vector {
+    let [a, b, c, _] = product(product(q, [x, y, z, 0.0]), [-q[0], -q[1], -q[2], q[3]]);
+    [a, b, c]
+}
+
+/// Fits a block's velocities or accelerations.
+pub(super) fn fit(block: &mut FitBlock) {
+    in_lanes(&mut Fit(block));
+}
+
+struct Fit<'a>(&'a mut FitBlock);
+
+impl InLanes for Fit<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        match self.0.tier() {
+            Tier::Gentle => self.fit(&GENTLE_NODES),
+            Tier::Full => self.fit(&FULL_NODES),
+        }
+    }
+}
+
+impl Fit<'_> {
+    #[inline(always)]
+    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+        let count = self.0.whole();
+        let mut samples = Samples::new();
+        let mut scales = [1.0; LANES];
+        for (lane, scale) in scales[..count].iter_mut().enumerate() {
+            *scale = sample(self.0, lane, nodes, &mut samples);
+        }
+        self.0.interpolate(count, nodes, &samples);
+        self.0.scale(&scales);
+    }
+}
+
+/// Samples the curve of a lane, in a unit that is about its largest value, and gives
+/// that unit: a power of two, which rounds nothing.
+fn sample<const PAIRS: usize>(
+    block: &FitBlock,
+    lane: usize,
+    nodes: &Nodes<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<PAIRS>,
+) -> f32 {
+    let curve = block.curve(lane);
+    let (at, width) = (block.middles[lane], block.widths[lane]);
+    let between = curve.value_at(at);
+    let pairs = nodes.at.map(|node| {
+        let reach = f64::from(node) * width;
+        [curve.value_at(at - reach), curve.value_at(at + reach)]
+    });
+    let largest = (pairs.as_flattened().as_flattened().iter())
+        .chain(&between)
+        .fold(0.0f64, |largest, component| largest.max(component.abs()));
+    let unit = if largest > 1e-30 {
+        f64::from_bits(largest.to_bits() & (0x7ff << 52))
+    } else {
+        1.0
+    };
+    for c in 0..4 {
+        middle[c][lane] = (between[c] / unit) as f32;
+        for (k, [before, after]) in pairs.iter().enumerate() {
+            let rise = (after[c] - between[c]) / unit;
+            let fall = (before[c] - between[c]) / unit;
+            even[k][c][lane] = ((rise + fall) * 0.5) as f32;
+            odd[k][c][lane] = ((rise - fall) * 0.5) as f32;
+        }
+    }
+    unit as f32
+}

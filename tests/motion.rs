@@ -1,0 +1,179 @@
+//! Angular velocities and accelerations: the derivatives of the formulas, near the
+//! reference's and with the same bits on every device.
+
+mod support;
+
+use glam::{DQuat, DVec3, Quat};
+use support::{Random, first_difference, give_key_data, hostile_set, vulkan_devices};
+use tumble::reference::Curve;
+use tumble::{
+    Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Quantity, Track, TrackSet, method,
+};
+
+const QUANTITIES: [Quantity; 4] = [
+    Quantity::Velocity(Axes::Body),
+    Quantity::Velocity(Axes::World),
+    Quantity::Acceleration(Axes::Body),
+    Quantity::Acceleration(Axes::World),
+];
+
+fn set(seed: u64, step: f64) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    for _ in 0..12 {
+        let (mut times, mut keys) = (Vec::new(), Vec::new());
+        let (mut time, mut rotation) = (random.between(0.0, 1.0), random.rotation());
+        for _ in 0..12 {
+            times.push(time);
+            keys.push(rotation.as_quat());
+            time += random.between(0.3, 1.3);
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+            rotation = (rotation * turn).normalize();
+        }
+        set.push("", &times, &keys).unwrap();
+    }
+    give_key_data(&mut set, seed);
+    set
+}
+
+fn expected(curve: &Curve, quantity: Quantity, time: f64) -> DVec3 {
+    let (body, axes) = match quantity {
+        Quantity::Velocity(axes) => (curve.velocity(time), axes),
+        Quantity::Acceleration(axes) => (curve.acceleration(time), axes),
+        Quantity::Rotation => unreachable!(),
+    };
+    match axes {
+        Axes::Body => body,
+        Axes::World => curve.rotation(time) * body,
+    }
+}
+
+/// The largest error, in parts of the largest value within the same key interval.
+fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> f64 {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let clip = engine.upload(set, interpolation).unwrap();
+    let timeline = clip.timeline(frames).unwrap();
+    let found = clip.evaluate(frames).unwrap();
+    let mut largest = 0.0f64;
+    for (t, track) in set.tracks().enumerate() {
+        let curve = Curve::of(&interpolation, track);
+        for s in 0..found.samples() {
+            let time = timeline.time(t, s);
+            let [x, y, z, w] = found.get(t, s).unwrap().to_array();
+            let found = DVec3::new(x.into(), y.into(), z.into());
+            assert!(w == 0.0 && found.is_finite());
+            let error = (found - expected(&curve, interpolation.quantity, time)).length();
+            largest = largest.max(error / scale(&curve, track, interpolation.quantity, time));
+        }
+    }
+    largest
+}
+
+/// The largest value in the interval of a time.
+fn scale(curve: &Curve, track: Track, quantity: Quantity, time: f64) -> f64 {
+    let i = track.times.partition_point(|&key| key <= time);
+    if i == 0 || i == track.times.len() {
+        return expected(curve, quantity, time).length().max(1e-3);
+    }
+    let (from, to) = (track.times[i - 1], track.times[i]);
+    let value = |k| {
+        let at = from + (to - from) * (0.02 + 0.96 * f64::from(k) / 8.0);
+        expected(curve, quantity, at).length()
+    };
+    (0..=8).map(value).fold(1e-3, f64::max)
+}
+
+#[test]
+fn velocities_and_accelerations_are_those_of_the_reference() {
+    let set = set(1, 2.0);
+    let mut random = Random(4);
+    let times = (0..400).map(|_| random.between(-1.0, 16.0)).collect();
+    for frames in [Frames::fps(30), Frames::at(times)] {
+        for method in METHODS {
+            for quantity in QUANTITIES {
+                let interpolation = Interpolation {
+                    quantity,
+                    ..method.into()
+                };
+                let error = largest_error(&set, interpolation, &frames);
+                println!("{method}, {quantity:?}: {error:e}");
+                assert!(error < 2e-6, "{method}, {quantity:?}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn ends_move_as_they_are_told() {
+    let set = set(2, 1.5);
+    let spin = DVec3::new(1.0, -2.0, 0.5);
+    let clamped = Ends::Clamped {
+        start: spin,
+        end: -spin,
+    };
+    for method in METHODS {
+        for ends in [Ends::Natural, Ends::Secant, Ends::Frozen, clamped] {
+            let interpolation = Interpolation {
+                quantity: Quantity::Velocity(Axes::Body),
+                ends,
+                ..method.into()
+            };
+            let error = largest_error(&set, interpolation, &Frames::fps(24));
+            assert!(error < 2e-6, "{method}, {ends:?}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn the_same_bits_on_every_device() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    for device in vulkan_devices() {
+        let vulkan = Engine::new(device).unwrap();
+        for seed in 0..3 {
+            let set = hostile_set(seed, 128);
+            let frames = Frames::fps(30).between(-1.0, 20.0);
+            for method in METHODS {
+                for quantity in QUANTITIES {
+                    let interpolation = Interpolation {
+                        quantity,
+                        ..method.into()
+                    };
+                    let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
+                    let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
+                    let difference = first_difference(expected.as_quats(), found.as_quats());
+                    assert_eq!(difference, None, "{method}, {quantity:?}, seed {seed}");
+                    assert!(expected.as_quats().iter().all(|q| q.is_finite()));
+                }
+            }
+        }
+    }
+}
+
+/// The last key's velocity is that with which it is reached; behind it nothing moves.
+#[test]
+fn a_door_turns_until_its_last_key() {
+    let mut set = TrackSet::new();
+    let keys = [0.0, 1.0, 3.0].map(Quat::from_rotation_y);
+    set.push("door", &[0.0, 1.0, 2.0], &keys).unwrap();
+    set.push("wall", &[0.5], &keys[..1]).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::World),
+        ..method::SLERP.into()
+    };
+    let frames = Frames::fps(2).between(-1.0, 3.0);
+    let times = Frames::at((-2..=6).map(|i| f64::from(i) * 0.5).collect());
+    for frames in [frames, times] {
+        let found = engine.evaluate(&set, velocity, &frames).unwrap();
+        let speeds: Vec<f32> = found.as_quats()[..9].iter().map(|v| v.y).collect();
+        let expected = [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0];
+        for (found, expected) in speeds.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-6, "{speeds:?}");
+        }
+        assert!(
+            found.as_quats()[9..]
+                .iter()
+                .all(|v| v.to_array() == [0.0; 4])
+        );
+    }
+}
