@@ -21,7 +21,17 @@ const CLOCKS: [(&str, &str); 2] = [
     ("frames", "distance_in_frames"),
     ("times", "distance_in_seconds"),
 ];
-const ENCODINGS: [&str; 3] = ["f32", "f16", "snorm16"];
+/// Each with the files that it needs beside its own.
+const ENCODINGS: [(&str, &[&str]); 8] = [
+    ("f32", &[]),
+    ("f16", &[]),
+    ("snorm16", &[]),
+    ("axis_angle", &["arc_tangent"]),
+    ("matrix3x3", &["matrix"]),
+    ("matrix3x4", &["matrix"]),
+    ("euler", &["arc_tangent"]),
+    ("vector", &[]),
+];
 
 /// Every pipeline: its name, and the files that are joined into it.
 fn pipelines() -> Vec<(String, Vec<String>)> {
@@ -31,18 +41,16 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
     )];
     for form in FORMS {
         for (clock, distance) in CLOCKS {
-            for encoding in ENCODINGS {
-                let files = [
+            for (encoding, needed) in ENCODINGS {
+                let own = [
                     "kernel",
                     distance,
                     "sine_cosine",
                     &format!("evaluate_{form}"),
                     &format!("store_{encoding}"),
                 ];
-                pipelines.push((
-                    format!("{form}_{clock}_{encoding}"),
-                    files.map(str::to_owned).to_vec(),
-                ));
+                let files = own.iter().chain(needed).map(|&file| file.to_owned());
+                pipelines.push((format!("{form}_{clock}_{encoding}"), files.collect()));
             }
         }
     }
@@ -55,6 +63,7 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let mut constants = BTreeMap::new();
     let mut layouts = BTreeMap::new();
+    let mut list = String::new();
     for (name, files) in pipelines() {
         let name = name.as_str();
         let source: String = files.iter().map(|file| read_shader(file)).collect();
@@ -63,6 +72,8 @@ fn main() {
         let words = compile(name, &source, &module);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR is writable");
+        let file = format!("concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")");
+        writeln!(list, "({name:?}, include_bytes!({file}) as &[u8]),").unwrap();
         collect_constants(&module, &mut constants);
         collect_layouts(name, &module, &mut layouts);
     }
@@ -74,6 +85,7 @@ fn main() {
         writeln!(rust, "pub(crate) const {name}: usize = {value};").unwrap();
     }
     fs::write(out.join("shader_constants.rs"), rust).expect("OUT_DIR is writable");
+    fs::write(out.join("shaders.rs"), format!("&[{list}]")).expect("OUT_DIR is writable");
 }
 
 fn read_shader(file: &str) -> String {

@@ -23,6 +23,8 @@ struct Launch {
     item_count: u32,
     // Distance in the result between neighbouring samples of a track.
     stride: u32,
+    // What the store has to know: the order of a matrix, the axes of angles.
+    detail: u32,
 }
 
 const WORKGROUP: u32 = 64;

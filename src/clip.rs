@@ -6,6 +6,7 @@ use crate::clock::{Frames, FramesError, Timeline};
 use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
 use crate::gpu::{ClipBuffers, Job};
+use crate::method::Quantity;
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Rotations, Storage};
 use crate::window::Window;
@@ -120,6 +121,7 @@ impl Clip {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), Error> {
+        self.check_encoding(encoding)?;
         match (&*self.engine.backend, &self.buffers) {
             (Backend::Cpu(engine), _) => {
                 Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
@@ -137,12 +139,20 @@ impl Clip {
         }
     }
 
-    /// The rotation of every track at every sample in an encoding of half the size:
-    /// what [`Encoding::encode`] makes of [`Clip::evaluate_as`]'s, bit by bit, but
-    /// made where they are evaluated.
+    pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {
+        let of_rotations = self.data.interpolation.quantity == Quantity::Rotation;
+        if encoding.needs_rotations() && !of_rotations {
+            return Err(Error::NotRotations { encoding });
+        }
+        Ok(())
+    }
+
+    /// Every track at every sample in another form: what [`Encoding::encode`] makes of
+    /// [`Clip::evaluate_as`]'s, bit by bit, but made where they are evaluated.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// When the frames do not fit the clip, the encoding is for rotations and the clip
+    /// has none, or the device fails.
     pub fn evaluate_encoded(
         &self,
         frames: &Frames,

@@ -1,33 +1,129 @@
-//! How a result is stored: f32, or half of the bytes.
+//! What a rotation is stored as.
 
-use crate::cpu::{InLanes, in_lanes, to_half, to_snorm};
+use glam::{Mat3, Quat, Vec3};
 
-/// What a component of a rotation becomes. The shorter ones are converted where the
-/// rotations are evaluated, so that only half of the bytes are moved; with the same
-/// bits on every device.
+use crate::cpu::{InLanes, axis_angle, euler, in_lanes, rows, to_half, to_snorm};
+use crate::euler::EulerSequence;
+use crate::numeric::canonical;
+
+/// What a rotation is stored as. It is converted where it is evaluated, so that only
+/// what is asked for is moved; with the same bits on every device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Encoding {
-    /// f32: 16 bytes a rotation.
+    /// `x y z w`, f32: 16 bytes a rotation.
     #[default]
     F32,
-    /// IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes a rotation,
-    /// within 2^-12 of each component.
+    /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes a
+    /// rotation, within 2^-12 of each component.
     F16,
-    /// Whole numbers of 1/32767 in 16 bits, rounded to nearest, ties to even
+    /// `x y z w` as whole numbers of 1/32767 in 16 bits, rounded to nearest, ties to even
     /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each
     /// component.
     Snorm16,
+    /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360;
+    /// without a turn the axis is x. Four f32.
+    AxisAngle,
+    /// The 3 × 3 matrix that turns column vectors: nine f32.
+    Matrix3x3(MatrixOrder),
+    /// The same with a translation of 0: twelve f32.
+    Matrix3x4(MatrixOrder),
+    /// Three angles in degrees, in the order of the sequence; the first and the third
+    /// within ±180, the second within ±90, or 0 to 180 where the first axis comes twice.
+    /// Where the first and the third turn about one axis, the third is 0. Three f32.
+    Euler(EulerSequence),
+    /// `x y z` alone, for velocities and accelerations: three f32.
+    Vector,
+}
+
+/// How a matrix lies in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MatrixOrder {
+    /// Row by row.
+    RowMajor,
+    /// Column by column.
+    ColumnMajor,
 }
 
 impl Encoding {
-    /// Every encoding.
-    pub const ALL: [Self; 3] = [Self::F32, Self::F16, Self::Snorm16];
+    /// One of every kind.
+    pub const KINDS: [Self; 10] = [
+        Self::F32,
+        Self::F16,
+        Self::Snorm16,
+        Self::AxisAngle,
+        Self::Matrix3x3(MatrixOrder::RowMajor),
+        Self::Matrix3x3(MatrixOrder::ColumnMajor),
+        Self::Matrix3x4(MatrixOrder::RowMajor),
+        Self::Matrix3x4(MatrixOrder::ColumnMajor),
+        Self::Euler(EulerSequence::XYZ),
+        Self::Vector,
+    ];
+
+    pub(crate) const MOST_BYTES: usize = 48;
 
     /// Bytes of one rotation.
     pub fn bytes(self) -> usize {
         match self {
-            Self::F32 => 16,
             Self::F16 | Self::Snorm16 => 8,
+            Self::Euler(_) | Self::Vector => 12,
+            Self::F32 | Self::AxisAngle => 16,
+            Self::Matrix3x3(_) => 36,
+            Self::Matrix3x4(_) => Self::MOST_BYTES,
+        }
+    }
+
+    /// The shape of one rotation in an array: `[4]`, `[3]`, `[3, 3]`, ….
+    pub fn shape(self) -> &'static [usize] {
+        match self {
+            Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle => &[4],
+            Self::Euler(_) | Self::Vector => &[3],
+            Self::Matrix3x3(_) => &[3, 3],
+            Self::Matrix3x4(MatrixOrder::RowMajor) => &[3, 4],
+            Self::Matrix3x4(MatrixOrder::ColumnMajor) => &[4, 3],
+        }
+    }
+
+    /// What its numbers are called, in their order.
+    pub fn components(self) -> Vec<String> {
+        let names: &[&str] = match self {
+            Self::F32 | Self::F16 | Self::Snorm16 => &["x", "y", "z", "w"],
+            Self::AxisAngle => &["x", "y", "z", "degrees"],
+            Self::Vector => &["x", "y", "z"],
+            Self::Matrix3x3(order) | Self::Matrix3x4(order) => {
+                let columns = self.bytes() / 12;
+                let name = |i: usize| match order {
+                    MatrixOrder::RowMajor => (i / columns, i % columns),
+                    MatrixOrder::ColumnMajor => (i % 3, i / 3),
+                };
+                let names = (0..3 * columns).map(name);
+                return names
+                    .map(|(row, column)| format!("m{row}{column}"))
+                    .collect();
+            }
+            Self::Euler(sequence) => {
+                let axes = (1..).zip(sequence.axes());
+                return axes
+                    .map(|(i, axis)| format!("{}{i}", ["x", "y", "z"][axis]))
+                    .collect();
+            }
+        };
+        names.iter().map(|&name| name.to_owned()).collect()
+    }
+
+    /// Whether it stores only rotations.
+    pub(crate) fn needs_rotations(self) -> bool {
+        !matches!(self, Self::F32 | Self::Vector)
+    }
+
+    /// What the kernels are told.
+    pub(crate) fn detail(self) -> u32 {
+        match self {
+            Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle | Self::Vector => 0,
+            Self::Matrix3x3(order) | Self::Matrix3x4(order) => {
+                u32::from(order == MatrixOrder::ColumnMajor)
+            }
+            Self::Euler(sequence) => sequence.detail(),
         }
     }
 
@@ -41,24 +137,107 @@ impl Encoding {
             Self::F32 => output.copy_from_slice(bytemuck::cast_slice(rotations)),
             Self::F16 => in_lanes(&mut Halves(components(rotations), output)),
             Self::Snorm16 => in_lanes(&mut WholeNumbers(components(rotations), output)),
+            _ => in_lanes(&mut Converted(self, rotations, output)),
         }
     }
 
-    /// What a stored rotation means.
+    /// What is stored: the rotation, up to rounding and sign, or the vector.
     ///
     /// # Panics
     /// When `bytes` are not those of one rotation.
     pub fn decode(self, bytes: &[u8]) -> [f32; 4] {
         assert_eq!(bytes.len(), self.bytes());
-        if self == Self::F32 {
-            return bytemuck::pod_read_unaligned(bytes);
-        }
-        let components: [u16; 4] = bytemuck::pod_read_unaligned(bytes);
-        components.map(|component| match self {
+        let number = |i: usize| f32::from_ne_bytes(std::array::from_fn(|b| bytes[4 * i + b]));
+        let half = |i: usize| u16::from_ne_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+        match self {
+            Self::F32 => [0, 1, 2, 3].map(number),
+            Self::F16 => [0, 1, 2, 3].map(|i| from_half(half(i))),
             // -32768 means -1 too.
-            Self::Snorm16 => (f32::from(component as i16) / 32767.0).max(-1.0),
-            _ => from_half(component),
-        })
+            Self::Snorm16 => [0, 1, 2, 3].map(|i| (f32::from(half(i) as i16) / 32767.0).max(-1.0)),
+            Self::AxisAngle => {
+                let axis = Vec3::new(number(0), number(1), number(2));
+                Quat::from_axis_angle(axis, number(3).to_radians()).to_array()
+            }
+            Self::Matrix3x3(order) => {
+                let columns = Mat3::from_cols_array(&std::array::from_fn(number));
+                from_columns(columns, order)
+            }
+            Self::Matrix3x4(MatrixOrder::ColumnMajor) => {
+                let columns = Mat3::from_cols_array(&std::array::from_fn(number));
+                from_columns(columns, MatrixOrder::ColumnMajor)
+            }
+            Self::Matrix3x4(MatrixOrder::RowMajor) => {
+                let columns = Mat3::from_cols_array(&std::array::from_fn(|i| number(i + i / 3)));
+                from_columns(columns, MatrixOrder::RowMajor)
+            }
+            Self::Euler(sequence) => {
+                let turns = [0, 1, 2].map(|i| {
+                    let axis = Vec3::AXES[sequence.axes()[i]];
+                    Quat::from_axis_angle(axis, number(i).to_radians())
+                });
+                let [first, second, third] = turns;
+                let together = if sequence.is_intrinsic() {
+                    first * second * third
+                } else {
+                    third * second * first
+                };
+                together.to_array()
+            }
+            Self::Vector => [number(0), number(1), number(2), 0.0],
+        }
+    }
+}
+
+fn from_columns(columns: Mat3, order: MatrixOrder) -> [f32; 4] {
+    let matrix = match order {
+        MatrixOrder::ColumnMajor => columns,
+        MatrixOrder::RowMajor => columns.transpose(),
+    };
+    Quat::from_mat3(&matrix).to_array()
+}
+
+/// Rotations to something else, in f32.
+struct Converted<'a>(Encoding, &'a [[f32; 4]], &'a mut [u8]);
+
+impl InLanes for Converted<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let Self(encoding, rotations, output) = self;
+        let detail = encoding.detail();
+        match encoding {
+            Encoding::Matrix3x3(_) => each(rotations, output, |rotation| {
+                let [a, b, c] = rows(rotation, detail);
+                [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
+            }),
+            Encoding::Matrix3x4(MatrixOrder::RowMajor) => each(rotations, output, |rotation| {
+                let [a, b, c] = rows(rotation, detail);
+                let [first, second] = [[a[0], a[1], a[2], 0.0], [b[0], b[1], b[2], 0.0]];
+                let third = [c[0], c[1], c[2], 0.0];
+                std::array::from_fn::<_, 12, _>(|i| [first, second, third][i / 4][i % 4])
+            }),
+            Encoding::Matrix3x4(MatrixOrder::ColumnMajor) => each(rotations, output, |rotation| {
+                let rows = rows(rotation, detail);
+                std::array::from_fn::<_, 12, _>(|i| if i < 9 { rows[i / 3][i % 3] } else { 0.0 })
+            }),
+            Encoding::Euler(_) => each(rotations, output, |rotation| {
+                euler(rotation, detail).map(canonical)
+            }),
+            Encoding::Vector => each(rotations, output, |[x, y, z, _]| [x, y, z]),
+            _ => each(rotations, output, |rotation| {
+                axis_angle(rotation).map(canonical)
+            }),
+        }
+    }
+}
+
+#[inline(always)]
+fn each<const N: usize>(
+    rotations: &[[f32; 4]],
+    output: &mut [u8],
+    convert: impl Fn([f32; 4]) -> [f32; N],
+) {
+    for (&rotation, bytes) in rotations.iter().zip(output.chunks_exact_mut(4 * N)) {
+        bytes.copy_from_slice(bytemuck::cast_slice(&convert(rotation)));
     }
 }
 

@@ -9,6 +9,7 @@ use crate::clip::Clip;
 use crate::clock::{Frames, FramesError, Timeline};
 use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
+use crate::encoding::Encoding;
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
 use crate::prepare::ClipData;
@@ -44,6 +45,12 @@ pub enum Error {
         given: usize,
         /// Bytes of the result.
         needed: usize,
+    },
+    /// Velocities and accelerations are no rotations, and cannot be stored as such.
+    #[error("{encoding:?} stores rotations, not velocities or accelerations; use F32 or Vector")]
+    NotRotations {
+        /// What was asked for.
+        encoding: Encoding,
     },
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]

@@ -52,6 +52,7 @@ mod cpu;
 mod device;
 mod encoding;
 mod engine;
+mod euler;
 pub mod formats;
 mod formula;
 mod frame_rate;
@@ -75,8 +76,9 @@ pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
 pub use cpu::{UnknownWidth, VectorWidth};
 pub use device::{Device, EngineOptions, Timings, Transfer, VulkanDevice};
-pub use encoding::Encoding;
+pub use encoding::{Encoding, MatrixOrder};
 pub use engine::{Engine, Error};
+pub use euler::{EulerSequence, UnknownSequence};
 pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
 pub use method::{

@@ -8,7 +8,8 @@ use crate::method::Form;
 use crate::numeric::canonical;
 
 /// Constants and layouts read from the shaders at build time.
-#[allow(dead_code)]
+// The parts of pi are written out where shaders need them.
+#[allow(dead_code, clippy::approx_constant)]
 pub(crate) mod shader {
     include!(concat!(env!("OUT_DIR"), "/shader_constants.rs"));
 }
@@ -47,6 +48,7 @@ pub(crate) struct Launch {
     pub(crate) first_item: u32,
     pub(crate) item_count: u32,
     pub(crate) stride: u32,
+    pub(crate) detail: u32,
 }
 
 /// `Probe` of `canary.wgsl`.
@@ -108,7 +110,8 @@ assert_layout!(
     LAUNCH_SIZE,
     first_item = LAUNCH_FIRST_ITEM,
     item_count = LAUNCH_ITEM_COUNT,
-    stride = LAUNCH_STRIDE
+    stride = LAUNCH_STRIDE,
+    detail = LAUNCH_DETAIL
 );
 assert_layout!(
     Probe,

@@ -1,10 +1,13 @@
-//! Results of half the size: the same bits from every device, namely those that the
-//! f32 result gives.
+//! Results in other forms: the same bits from every device, namely those that the f32
+//! result gives.
 
 mod support;
 
 use support::{hostile_set, vulkan_devices};
-use tumble::{Device, Encoding, Engine, EngineOptions, Error, Frames, Layout, METHODS, method};
+use tumble::{
+    Axes, Device, Encoding, Engine, EngineOptions, Error, Frames, Interpolation, Layout, Quantity,
+    method,
+};
 
 #[test]
 fn every_device_encodes_like_the_host() {
@@ -19,13 +22,14 @@ fn every_device_encodes_like_the_host() {
             let mut options = EngineOptions::default();
             options.memory = memory;
             let engine = Engine::with_options(device.clone(), &options).unwrap();
-            for method in METHODS {
+            // Both forms, and nothing but constants.
+            for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
                 let clip = engine.upload(&set, method).unwrap();
                 let of_cpu = cpu.upload(&set, method).unwrap();
                 for frames in &requests {
                     for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                         let rotations = of_cpu.evaluate_as(frames, layout).unwrap();
-                        for encoding in Encoding::ALL {
+                        for encoding in Encoding::KINDS {
                             let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
                             let mut expected = vec![0; quats.len() * encoding.bytes()];
                             encoding.encode(quats, &mut expected);
@@ -54,4 +58,30 @@ fn memory_of_another_size_is_refused() {
     let expected = "the output has 33 bytes; the result has 32";
     assert!(matches!(&result, Err(Error::OutputBytes { .. })));
     assert_eq!(result.unwrap_err().to_string(), expected);
+}
+
+/// A velocity has no axis and no angle; as it is, or as three numbers, it can be stored.
+#[test]
+fn velocities_are_not_stored_as_rotations() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::Body),
+        ..method::SLERP.into()
+    };
+    let set = hostile_set(1, 8);
+    let clip = engine.upload(&set, velocity).unwrap();
+    let frames = Frames::at(vec![0.0, 0.5, 1.0]);
+    let whole = clip.evaluate(&frames).unwrap();
+    for encoding in Encoding::KINDS {
+        let found = clip.evaluate_encoded(&frames, Layout::TrackMajor, encoding);
+        match (encoding, found) {
+            (Encoding::F32 | Encoding::Vector, Ok(found)) => {
+                let first = &found[..encoding.bytes()];
+                let expected = whole.as_quats()[0].to_array();
+                assert_eq!(encoding.decode(first), expected);
+            }
+            (_, Err(Error::NotRotations { encoding: refused })) => assert_eq!(refused, encoding),
+            (_, other) => panic!("{encoding:?}: {other:?}"),
+        }
+    }
 }

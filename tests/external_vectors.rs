@@ -3,8 +3,8 @@
 #![allow(clippy::approx_constant)] // theirs have fewer digits
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::{Curve, Kind, angle_between, nlerp, slerp};
-use tumble::{Device, Ends, Engine, Frames, Interpolation, Path, TrackSet, method};
+use tumble::reference::{Curve, Kind, angle_between, nlerp, slerp, squad};
+use tumble::{Device, Ends, Engine, Frames, Interpolation, Method, Path, TrackSet, method};
 
 fn q(wxyz: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(wxyz[1], wxyz[2], wxyz[3], wxyz[0])
@@ -252,4 +252,127 @@ fn drake_angular_velocity_across_a_sign_flip() {
     for (time, rate) in [(0.8, 0.875), (2.0, 4.027777777777778)] {
         assert!((curve.velocity(time) - axis * rate).length() < 1e-6);
     }
+}
+
+/// One track's rotations at any times.
+fn evaluate(set: &TrackSet, interpolation: impl Into<Interpolation>, at: &[f64]) -> Vec<DQuat> {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let rotations = engine.evaluate(set, interpolation, &Frames::at(at.to_vec()));
+    let rotations = rotations.unwrap();
+    rotations.as_quats().iter().map(|q| q.as_dquat()).collect()
+}
+
+fn set_of(times: &[f64], keys: &[DQuat]) -> TrackSet {
+    let mut set = TrackSet::new();
+    let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
+    set.push("", times, &keys).unwrap();
+    set
+}
+
+/// mosra/magnum, src/Magnum/Math/Test/CubicHermiteTest.cpp (MIT): glTF's CUBICSPLINE.
+#[test]
+fn magnum_gltf_cubic_spline() {
+    let keys = [
+        q([0.182018, 0.780076, 0.0260025, 0.598059]),
+        q([0.462519, -0.711568, 0.391362, 0.355784]),
+    ];
+    let (leaving, arriving) = (q([0.4, -1.0, 0.0, 0.3]), q([0.5, 5.0, 0.3, 1.1]));
+    let mut set = set_of(&[0.0, 1.0], &keys);
+    let none = q([0.0; 4]).as_quat();
+    set.set_tangents(0, &[[none, leaving.as_quat()], [arriving.as_quat(), none]])
+        .unwrap();
+    let found = evaluate(&set, method::GLTF_CUBIC, &[0.35, 0.8]);
+    let expected = [
+        [0.466615, -0.309862, 0.174831, 0.809747],
+        [0.283524, -0.911408, 0.23368, 0.185318],
+    ];
+    let line = [
+        [0.426207, 0.392449, 0.234067, 0.780733],
+        [0.524396, -0.533196, 0.410685, 0.521583],
+    ];
+    for (i, t) in [0.35, 0.8].into_iter().enumerate() {
+        assert_near(found[i], expected[i], 1e-5);
+        assert_near(nlerp(keys[0], keys[1], t), line[i], 1e-5);
+    }
+    // As authored: their dot product is negative.
+    let raw = Interpolation {
+        path: Path::AsAuthored,
+        ..method::NLERP.into()
+    };
+    let found = evaluate(&set, raw, &[0.35, 0.8]);
+    assert_near(found[0], line[0], 1e-5);
+    assert_near(found[1], line[1], 1e-5);
+}
+
+/// KhronosGroup/glTF-Asset-Generator, Animation_SamplerType: CUBICSPLINE with tangents of
+/// zero is `normalise((1-s) q0 + s q1)`, `s = 3t² - 2t³`.
+#[test]
+fn gltf_cubic_spline_without_tangents_eases() {
+    let keys = [90.0, 0.0, -90.0, 0.0, 90.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
+    let times: Vec<f64> = (0..5).map(f64::from).collect();
+    let set = set_of(&times, &keys);
+    for at in [0.25, 1.5, 2.75, 3.9f64] {
+        let (i, t) = (at.floor() as usize, at.fract());
+        let expected = nlerp(keys[i], keys[i + 1], t * t * (3.0 - 2.0 * t));
+        let found = evaluate(&set, method::GLTF_CUBIC, &[at])[0];
+        assert!(angle_between(found, expected) < 4e-7, "{at}");
+    }
+}
+
+/// Roll, pitch and yaw about fixed axes.
+fn rpy(angle: f64) -> DQuat {
+    DQuat::from_rotation_z(angle) * DQuat::from_rotation_y(angle) * DQuat::from_rotation_x(angle)
+}
+
+/// gazebosim/gz-math, src/RotationSpline_TEST.cc (Apache-2.0). Where a neighbour is
+/// missing it takes log(1) = 0 for it; a last key equal to the first closes the curve.
+#[test]
+fn gz_math_squad() {
+    // log(q_0⁻¹ q_1) of helpers that all turn about one axis is half of the step.
+    let helper = |key: DQuat, neighbours: &[DQuat]| {
+        let log = |to: &DQuat| (key.inverse() * *to).to_scaled_axis();
+        let sum: DVec3 = neighbours.iter().map(log).sum();
+        key * DQuat::from_scaled_axis(-sum / 4.0)
+    };
+    let (a, b, c) = (rpy(-0.1), rpy(0.2), rpy(0.4));
+    // The helpers belong to earlier keys: recalculation was off.
+    let (old, new) = (rpy(0.0), rpy(0.2));
+    let found = squad([a, helper(old, &[new]), helper(new, &[old]), b], 0.5);
+    assert_near(found, [0.998089, 0.0315333, 0.0427683, 0.0315333], 1e-5);
+    let found = squad([b, helper(b, &[a, c]), helper(c, &[b]), c], 0.2);
+    assert_near(found, [0.978787, 0.107618, 0.137159, 0.107618], 1e-5);
+    // The inner helper is the engine's too: its curve has the same first half, nearly.
+    let closed = set_of(&[0.0, 1.0, 2.0], &[rpy(0.0), rpy(0.4), rpy(0.0)]);
+    let looped = Interpolation {
+        ends: Ends::Loop,
+        ..method::SQUAD.into()
+    };
+    for found in evaluate(&closed, looped, &[0.5, 1.5]) {
+        assert_near(found, [0.987225, 0.077057, 0.11624, 0.077057], 1e-5);
+    }
+}
+
+/// scipy/scipy, scipy/spatial/transform/tests/test_rotation_spline.py (BSD-3-Clause): with
+/// two keys it is slerp.
+#[test]
+fn scipy_rotation_spline_of_two_keys_is_slerp() {
+    let [x, y, z] = [10.0, -20.0, 30.0].map(f64::to_radians);
+    let end = DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
+    let keys = [DQuat::IDENTITY, end];
+    let set = set_of(&[0.0, 10.0], &keys);
+    let found = evaluate(&set, method::C2, &[0.0, 2.5, 5.0, 9.0]);
+    for (found, t) in found.into_iter().zip([0.0, 0.25, 0.5, 0.9]) {
+        assert!(angle_between(found, slerp(keys[0], keys[1], t)) < 3e-7);
+    }
+    let curve = curve(method::C2, &[0.0, 10.0], &keys);
+    let rate = end.to_scaled_axis() / 10.0;
+    for time in [0.0, 5.0, 10.0] {
+        assert!((curve.velocity(time) - rate).length() < 1e-7);
+        assert!(curve.acceleration(time).length() < 1e-9);
+    }
+}
+
+fn curve(method: Method, times: &[f64], keys: &[DQuat]) -> Curve {
+    let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
+    Curve::new(method.reference, Path::Shortest, method.ends, times, &keys)
 }

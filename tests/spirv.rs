@@ -11,30 +11,7 @@ use tumble::spirv::{
     FloatControls, SpirvError, float_controls, no_contraction, without_decorations,
 };
 
-macro_rules! shader {
-    ($name:literal) => {
-        (
-            $name,
-            include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) as &[u8],
-        )
-    };
-}
-
-const SHADERS: [(&str, &[u8]); 13] = [
-    shader!("arc_frames_f32"),
-    shader!("arc_frames_f16"),
-    shader!("arc_frames_snorm16"),
-    shader!("arc_times_f32"),
-    shader!("arc_times_f16"),
-    shader!("arc_times_snorm16"),
-    shader!("polynomial_frames_f32"),
-    shader!("polynomial_frames_f16"),
-    shader!("polynomial_frames_snorm16"),
-    shader!("polynomial_times_f32"),
-    shader!("polynomial_times_f16"),
-    shader!("polynomial_times_snorm16"),
-    shader!("canary"),
-];
+const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 const ALL_CONTROLS: FloatControls = FloatControls {
     preserve_signed_zero_inf_nan: true,
@@ -85,7 +62,7 @@ fn kernel_of(expression: &str) -> Vec<u32> {
 #[test]
 fn every_float_operation_of_every_shader_is_decorated_once() {
     const FLOAT_ARITHMETIC: [u16; 5] = [127, 129, 131, 133, 142];
-    for (name, code) in SHADERS {
+    for &(name, code) in SHADERS {
         let mut decorations = BTreeMap::<u32, u32>::new();
         let mut results = 0;
         let code = instructions(&words(code));
@@ -116,7 +93,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
 
 #[test]
 fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
-    for (name, code) in SHADERS {
+    for &(name, code) in SHADERS {
         let passed = words(code);
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
@@ -153,7 +130,7 @@ fn inexact_operations_are_refused() {
 #[test]
 fn the_validator_accepts_every_shader() {
     let environments = ["vulkan1.1", "vulkan1.2"];
-    for (name, code) in SHADERS {
+    for &(name, code) in SHADERS {
         for controls in 0..4 {
             let offered = FloatControls {
                 preserve_signed_zero_inf_nan: controls & 1 != 0,
@@ -196,7 +173,7 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
 
 #[test]
 fn controls_reach_every_entry_point() {
-    for (name, code) in SHADERS {
+    for &(name, code) in SHADERS {
         let module = float_controls(&words(code), ALL_CONTROLS).unwrap();
         let modes: Vec<_> = instructions(&module)
             .into_iter()

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::formats::npy::ComponentOrder;
-use tumble::{Encoding, Layout, Method};
+use tumble::{Encoding, Interpolation, Layout, Method};
 
 use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
@@ -13,18 +13,20 @@ use super::input::Inputs;
 use super::interpolation::{Manner, method};
 use super::output::{Format, ResultShape, Target};
 use super::time::{Samples, Sampling};
+use super::what::What;
 use super::{input, output, signals, words};
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is float32 of shape (tracks, frames, 4) in NPY, or CSV with a row for
-each frame. CPU and Vulkan give the same bits.
+The result is float32 of shape (tracks, frames, 4) in NPY (or as --output says), or CSV
+with a row for each frame. CPU and Vulkan give the same bits.
 
 Examples:
   tumble eval data/pendulum.dat -o out.npy
   tumble eval data/pendulum.dat -m slerp --fps 30000/1001 -o out.csv
   tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
+  tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
@@ -32,8 +34,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
     /// Where to write: OUT.npy, OUT.csv, `-` (standard output), or a directory for several inputs
-    #[arg(short, long, value_name = "OUT")]
-    output: Option<PathBuf>,
+    #[arg(short, long = "out", value_name = "OUT")]
+    out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
@@ -61,6 +63,8 @@ pub(crate) struct Arguments {
     /// What a component of NPY results is stored as
     #[arg(long, value_enum, default_value = "f32")]
     encoding: EncodingArgument,
+    #[command(flatten)]
+    what: What,
     /// npy or csv [default: by the name of the output, else npy]
     #[arg(long, value_enum)]
     format: Option<Format>,
@@ -117,15 +121,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = arguments.sampling.samples()?;
     let targets = output::plan(
         &inputs,
-        arguments.output.as_deref(),
+        arguments.out.as_deref(),
         arguments.format,
         arguments.overwrite,
     )?;
     let is_text = |target: &Target| target.format() == Format::Csv;
-    if arguments.encoding != EncodingArgument::F32 && targets.iter().any(is_text) {
+    let short = arguments.encoding != EncodingArgument::F32;
+    if short && targets.iter().any(is_text) {
         return Err(Failure::usage(
             "--encoding is for NPY results; CSV holds every digit",
         ));
+    }
+    let encoding = arguments.what.encoding(arguments.encoding.into());
+    if short && encoding != arguments.encoding.into() {
+        return Err(Failure::usage("--encoding is for quaternions"));
     }
     let mut device = arguments.device.open()?;
     let jobs: Vec<(PathBuf, Target)> = inputs.into_iter().zip(targets).collect();
@@ -156,7 +165,7 @@ impl Arguments {
             &name,
             set.track_count(),
             timeline.len(),
-            self.encoding.into(),
+            self.what.encoding(self.encoding.into()),
         )?;
         let layout = match (self.layout, target.format()) {
             (LayoutArgument::Track, Format::Npy) => Layout::TrackMajor,
@@ -169,10 +178,13 @@ impl Arguments {
             timeline: &timeline,
             layout,
             order: self.order.into(),
-            encoding: self.encoding.into(),
+            encoding: self.what.encoding(self.encoding.into()),
         };
         let started = Instant::now();
-        let interpolation = self.manner.with(self.method);
+        let interpolation = Interpolation {
+            quantity: self.what.quantity(),
+            ..self.manner.with(self.method)
+        };
         target.write_rotations(&result, |sink| {
             device.stream(&set, interpolation, &frames, layout, sink)
         })?;

@@ -22,6 +22,7 @@ mod signals;
 mod stream;
 mod time;
 mod verify;
+mod what;
 mod words;
 
 pub(crate) use signals::stop_on_signals;

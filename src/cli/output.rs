@@ -348,7 +348,13 @@ impl<'a> ResultWriter<'a, '_> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
         *self = match std::mem::replace(self, Self::Failed) {
             Self::Waiting(out) if format == Format::Csv => {
-                Self::Csv(Box::new(CsvWriter::new(out, result.set, result.timeline)?))
+                let (set, timeline) = (result.set, result.timeline);
+                Self::Csv(Box::new(CsvWriter::new(
+                    out,
+                    set,
+                    timeline,
+                    result.encoding,
+                )?))
             }
             Self::Waiting(out) => {
                 let (rows, columns) = match result.layout {

@@ -1,16 +1,20 @@
 //! The CPU: the f32 twins of the shaders, and the walk over tracks and samples
 //! that feeds them.
 
+mod arc_tangent;
 pub(crate) mod canary;
 mod dispatch;
 mod engine;
 mod evaluate;
 mod evaluate_arc;
 mod evaluate_polynomial;
+mod matrix;
 mod row;
 mod sample_lanes;
 mod sampled;
 mod sine_cosine;
+mod store_axis_angle;
+mod store_euler;
 mod store_f16;
 mod store_snorm16;
 
@@ -19,6 +23,9 @@ pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::{CpuEngine, is_sampled};
+pub(crate) use matrix::rows;
 pub(crate) use sine_cosine::sine_and_fall;
+pub(crate) use store_axis_angle::axis_angle;
+pub(crate) use store_euler::euler;
 pub(crate) use store_f16::to_half;
 pub(crate) use store_snorm16::to_snorm;

@@ -1,4 +1,5 @@
-//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame.
+//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame; or the
+//! numbers of another encoding in the place of those of quaternions.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -6,6 +7,7 @@ use std::io::{self, Write};
 use glam::Quat;
 
 use crate::clock::Timeline;
+use crate::encoding::Encoding;
 use crate::tracks::TrackSet;
 
 /// Writes frames as they come, with as many digits as it takes to read the same bits
@@ -13,6 +15,7 @@ use crate::tracks::TrackSet;
 pub struct CsvWriter<'a, W: Write> {
     csv: ::csv::Writer<W>,
     timeline: &'a Timeline,
+    encoding: Encoding,
     tracks: usize,
     /// The next frame to be written.
     frame: usize,
@@ -21,14 +24,21 @@ pub struct CsvWriter<'a, W: Write> {
 }
 
 impl<'a, W: Write> CsvWriter<'a, W> {
-    /// Writes the header for a set's rotations at the samples of a timeline.
+    /// Writes the header for a set's rotations at the samples of a timeline. F16 and
+    /// Snorm16 are written as F32: digits cost nothing here.
     ///
     /// # Errors
     /// When writing fails.
-    pub fn new(writer: W, set: &TrackSet, timeline: &'a Timeline) -> io::Result<Self> {
+    pub fn new(
+        writer: W,
+        set: &TrackSet,
+        timeline: &'a Timeline,
+        encoding: Encoding,
+    ) -> io::Result<Self> {
         let mut writer = Self {
             csv: ::csv::Writer::from_writer(writer),
             timeline,
+            encoding,
             tracks: set.track_count(),
             frame: 0,
             text: String::new(),
@@ -67,19 +77,40 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         self.csv.write_field("time")?;
         for track in 0..set.track_count() {
             let name = set.track_name(track);
-            for component in ["w", "x", "y", "z"] {
+            let mut components = self.encoding.components();
+            if self.is_quaternion() {
+                components.rotate_right(1);
+            }
+            for component in components {
                 self.csv.write_field(format!("{name}.{component}"))?;
             }
         }
         self.csv.write_record(None::<&[u8]>)
     }
 
+    /// Those are written `w` first, as in `.dat` files, and never rounded.
+    fn is_quaternion(&self) -> bool {
+        matches!(
+            self.encoding,
+            Encoding::F32 | Encoding::F16 | Encoding::Snorm16
+        )
+    }
+
     fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
         self.csv.write_field(self.frame.to_string())?;
         let time = self.timeline.time(0, self.frame);
         self.csv.write_field(time.to_string())?;
+        let mut bytes = vec![0; self.encoding.bytes()];
+        let is_quaternion = self.is_quaternion();
         for q in frame {
-            for component in [q.w, q.x, q.y, q.z] {
+            let mut numbers = q.to_array().to_vec();
+            if is_quaternion {
+                numbers.rotate_right(1);
+            } else {
+                self.encoding.encode(&[q.to_array()], &mut bytes);
+                numbers = bytemuck::pod_collect_to_vec(&bytes);
+            }
+            for component in numbers {
                 self.text.clear();
                 let _ = write!(self.text, "{component}"); // a String takes everything
                 self.csv.write_field(&self.text)?;

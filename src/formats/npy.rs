@@ -1,5 +1,5 @@
-//! NPY: float32 (or float16, or int16), C order, shape `(tracks, frames, 4)` or
-//! `(frames, tracks, 4)`.
+//! NPY: float32 (or float16, or int16), C order, shape `(tracks, frames, …)` or
+//! `(frames, tracks, …)`, four numbers a rotation or as its encoding has it.
 
 use std::io::{self, Write};
 
@@ -28,7 +28,8 @@ pub struct NpyWriter<W> {
 
 impl<W: Write> NpyWriter<W> {
     /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is
-    /// int16, to be divided by 32767.
+    /// int16, to be divided by 32767. The order is that of quaternions; nothing else has
+    /// one.
     ///
     /// # Errors
     /// When writing fails.
@@ -39,13 +40,18 @@ impl<W: Write> NpyWriter<W> {
         order: ComponentOrder,
         encoding: Encoding,
     ) -> io::Result<Self> {
-        let shape = [rows as u64, columns as u64, 4];
+        let own = encoding.shape().iter().map(|&length| length as u64);
+        let shape: Vec<u64> = [rows as u64, columns as u64]
+            .into_iter()
+            .chain(own)
+            .collect();
         let mut header = Vec::new();
         // The values are written below, whole slices at a time.
         match encoding {
             Encoding::F32 => write_header::<f32>(&mut header, "<f4", &shape)?,
             Encoding::F16 => write_header::<half::f16>(&mut header, "<f2", &shape)?,
             Encoding::Snorm16 => write_header::<i16>(&mut header, "<i2", &shape)?,
+            _ => write_header::<f32>(&mut header, "<f4", &shape)?,
         }
         writer.write_all(&header)?;
         Ok(Self {
@@ -77,14 +83,17 @@ impl<W: Write> NpyWriter<W> {
         let mut bytes = Vec::new();
         for block in rotations.chunks(BLOCK) {
             ordered.clear();
-            ordered.extend(block.iter().map(|q| match self.order {
-                ComponentOrder::Xyzw => [q.x, q.y, q.z, q.w],
-                ComponentOrder::Wxyz => [q.w, q.x, q.y, q.z],
+            ordered.extend(block.iter().map(|q| match (self.order, self.encoding) {
+                (ComponentOrder::Wxyz, Encoding::F32 | Encoding::F16 | Encoding::Snorm16) => {
+                    [q.w, q.x, q.y, q.z]
+                }
+                _ => [q.x, q.y, q.z, q.w],
             }));
             bytes.resize(block.len() * self.encoding.bytes(), 0);
             self.encoding.encode(&ordered, &mut bytes);
             if !little {
-                let component = self.encoding.bytes() / 4;
+                let numbers: usize = self.encoding.shape().iter().product();
+                let component = self.encoding.bytes() / numbers;
                 bytes.chunks_exact_mut(component).for_each(<[u8]>::reverse);
             }
             self.writer.write_all(&bytes)?;

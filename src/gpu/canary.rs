@@ -10,7 +10,7 @@ use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::engine::{Job, VulkanEngine};
 use super::error::VulkanError;
-use super::pipeline::{CANARY, CANARY_BINDINGS, Exactness, Pipeline};
+use super::pipeline::{CANARY_BINDINGS, Exactness, Pipeline, canary};
 use super::submission::{Access, Binding, Submission};
 use crate::branchless::exp;
 use crate::clock::Frames;
@@ -119,7 +119,7 @@ fn expressions(
     let probes = probes();
     let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
     let reply_bytes = probes.len() * size_of::<Reply>();
-    let pipeline = Pipeline::new(device, &CANARY, CANARY_BINDINGS, exactness)?;
+    let pipeline = Pipeline::new(device, canary(), CANARY_BINDINGS, exactness)?;
     let mut input = Buffer::new(
         device,
         "tumble probes",
@@ -141,6 +141,7 @@ fn expressions(
         first_item: 0,
         item_count: probes.len() as u32,
         stride: 1,
+        detail: 0,
     };
     submission.dispatch(
         &pipeline,

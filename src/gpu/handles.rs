@@ -88,6 +88,7 @@ impl Clip {
         encoding: Encoding,
         buffer: VulkanBuffer,
     ) -> Result<(), Error> {
+        self.check_encoding(encoding)?;
         let timeline = self.timeline(frames)?;
         let rotation = encoding.bytes() as u64;
         let needed = (self.track_count() * timeline.len()) as u64 * rotation;

@@ -11,22 +11,15 @@ use crate::method::Form;
 use crate::segment::Launch;
 use crate::spirv;
 
-/// A shader that the build compiled.
-pub(super) struct Shader {
-    name: &'static str,
-    code: &'static [u8],
-}
+/// A shader that the build compiled: its name and its words.
+pub(super) type Shader = (&'static str, &'static [u8]);
 
-macro_rules! shader {
-    ($name:literal) => {
-        Shader {
-            name: $name,
-            code: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")),
-        }
-    };
-}
+/// All of them: the canary, then the kernels, by form, clock and encoding.
+static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
-pub(super) static CANARY: Shader = shader!("canary");
+pub(super) fn canary() -> Shader {
+    SHADERS[0]
+}
 
 /// What a sample's distance is counted in: frames, or explicit times in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,36 +28,12 @@ pub(super) enum Clock {
     Times,
 }
 
-/// The kernel of a form, a clock and an encoding.
-pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> &'static Shader {
-    macro_rules! kernels {
-        ($($name:literal),+) => {{
-            static SHADERS: [Shader; 12] = [$(shader!($name)),+];
-            &SHADERS
-        }};
-    }
-    let shaders = kernels!(
-        "arc_frames_f32",
-        "arc_frames_f16",
-        "arc_frames_snorm16",
-        "arc_times_f32",
-        "arc_times_f16",
-        "arc_times_snorm16",
-        "polynomial_frames_f32",
-        "polynomial_frames_f16",
-        "polynomial_frames_snorm16",
-        "polynomial_times_f32",
-        "polynomial_times_f16",
-        "polynomial_times_snorm16"
-    );
-    &shaders[kernel_index(form, clock, encoding)]
-}
-
 /// Kernels that there are.
-pub(super) const KERNELS: usize = 12;
+pub(super) const KERNELS: usize = 32;
+const _: () = assert!(SHADERS.len() == 1 + KERNELS);
 
-/// The place of a kernel among all.
-pub(super) fn kernel_index(form: Form, clock: Clock, encoding: Encoding) -> usize {
+/// A kernel, and its place among all.
+pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, usize) {
     let form = match form {
         Form::Arc => 0,
         Form::Polynomial => 1,
@@ -77,8 +46,14 @@ pub(super) fn kernel_index(form: Form, clock: Clock, encoding: Encoding) -> usiz
         Encoding::F32 => 0,
         Encoding::F16 => 1,
         Encoding::Snorm16 => 2,
+        Encoding::AxisAngle => 3,
+        Encoding::Matrix3x3(_) => 4,
+        Encoding::Matrix3x4(_) => 5,
+        Encoding::Euler(_) => 6,
+        Encoding::Vector => 7,
     };
-    (form * 2 + clock) * 3 + encoding
+    let place = (form * 2 + clock) * 8 + encoding;
+    (SHADERS[1 + place], place)
 }
 
 /// Number of storage buffers that `kernel.wgsl` binds.
@@ -99,7 +74,7 @@ impl Pipeline {
     /// A pipeline whose set 0 binds `bindings` storage buffers.
     pub(super) fn new(
         device: &Arc<LogicalDevice>,
-        shader: &Shader,
+        shader: Shader,
         bindings: u32,
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
@@ -155,7 +130,7 @@ impl Pipeline {
         pipeline.raw = created
             .map_err(|(_, result)| result)
             .named("vkCreateComputePipelines")?[0];
-        device.name(pipeline.raw, shader.name);
+        device.name(pipeline.raw, shader.0);
         Ok(pipeline)
     }
 }
@@ -170,8 +145,8 @@ pub(super) enum Exactness {
     LeftToTheDriver,
 }
 
-fn words(shader: &Shader, device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(shader.code);
+fn words(shader: Shader, device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(shader.1);
     let passed = match exactness {
         Exactness::Demanded => spirv::float_controls(&words, device.physical.float_controls),
         Exactness::LeftToTheDriver => spirv::without_decorations(&words),

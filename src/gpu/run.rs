@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::buffer::Residence;
 use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
 use super::error::VulkanError;
-use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel, kernel_index};
+use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding};
 use super::work_list::work;
@@ -27,7 +27,9 @@ impl VulkanEngine {
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let windows = window.cut(self.window);
+        // Windows are as large as they may be with 16 bytes a rotation.
+        let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
+        let windows = window.cut((self.window / each).max(1));
         while slots.len() < SLOTS.min(windows.len()) {
             slots.push(Slot::new(&self.device)?);
         }
@@ -87,7 +89,11 @@ impl VulkanEngine {
             Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
             Target::Slice(_) => 0,
         };
-        let aligned = start / alignment * alignment;
+        // Where a binding may begin, whole rotations before it.
+        let mut aligned = start / alignment * alignment;
+        while !(start - aligned).is_multiple_of(rotation) {
+            aligned -= alignment;
+        }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
         let mut lists = work(clip, timeline, &window, shift as u32)?;
@@ -167,6 +173,7 @@ impl VulkanEngine {
                 first_item,
                 item_count,
                 stride: window.stride() as u32,
+                detail: encoding.detail(),
             };
             let groups = self.workgroups(item_count);
             slot.submission
@@ -185,7 +192,7 @@ impl VulkanEngine {
             }
             (Target::External(buffer), ..) => {
                 slot.submission.barrier(Access::Kernel, Access::Copy);
-                let mut bytes = [0; size_of::<[f32; 4]>()];
+                let mut bytes = [0; Encoding::MOST_BYTES];
                 let bytes = &mut bytes[..encoding.bytes()];
                 for (place, value) in patches.drain(..) {
                     encoding.encode(&[value], bytes);
@@ -217,11 +224,11 @@ impl VulkanEngine {
             .pipelines
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let place = &mut all[kernel_index(form, clock, encoding)];
+        let (shader, place) = kernel(form, clock, encoding);
+        let place = &mut all[place];
         if let Some(pipeline) = place {
             return Ok(Arc::clone(pipeline));
         }
-        let shader = kernel(form, clock, encoding);
         let exactness = Exactness::Demanded;
         let pipeline = Pipeline::new(&self.device, shader, KERNEL_BINDINGS, exactness)?;
         Ok(Arc::clone(place.insert(Arc::new(pipeline))))

@@ -14,5 +14,5 @@ mod tangents;
 pub use curve::{Curve, Kind};
 pub use quaternion::{
     angle_between, nlerp, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
-    slerp_from_start_left,
+    slerp_from_start_left, squad,
 };

@@ -95,6 +95,12 @@ pub fn slerp_from_end_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(power(multiply(a, invert(b)), 1.0 - t), b)
 }
 
+/// Spherical quadrangle: `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))` (Shoemake
+/// 1987); no shortest-path flip.
+pub fn squad([q0, s0, s1, q1]: [DQuat; 4], t: f64) -> DQuat {
+    slerp(slerp(q0, q1, t), slerp(s0, s1, t), 2.0 * t * (1.0 - t))
+}
+
 /// Normalised linear interpolation; no shortest-path flip.
 pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     normalise(a * (1.0 - t) + b * t)

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::quaternion::{
-    exponential, invert, logarithm, multiply, nlerp, normalise, slerp, vector,
+    exponential, invert, logarithm, multiply, nlerp, normalise, slerp, squad, vector,
 };
 
 /// A curve over `t` from 0 to 1.
@@ -106,9 +106,7 @@ impl Segment {
                 let (first, second, third) = (slerp(q0, a, t), slerp(a, b, t), slerp(b, q1, t));
                 slerp(slerp(first, second, t), slerp(second, third, t), t)
             }
-            Self::Squad([q0, s0, s1, q1]) => {
-                slerp(slerp(q0, q1, t), slerp(s0, s1, t), 2.0 * t * (1.0 - t))
-            }
+            Self::Squad(controls) => squad(controls, t),
             Self::Cubic([p0, m0, m1, p1]) => {
                 let (t2, t3) = (t * t, t * t * t);
                 normalise(

@@ -1,0 +1,79 @@
+// Reciprocal, root and arc tangent, from operations that every driver rounds alike:
+// integer seeds and Newton's steps. Arguments are 0 or at least 2^-60 in magnitude, so
+// that no square is subnormal.
+// Twin: src/cpu/arc_tangent.rs.
+
+const RECIPROCAL_SEED: u32 = 0x7ef311c7;
+const ROOT_SEED: u32 = 0x5f3759df;
+// 2^-60.
+const CLEAN_BITS: u32 = 0x21800000;
+
+// (atan(t)/t - 1)/t² in powers of t², for 0 <= t <= 1; within 6e-8.
+const ARC_0: f32 = -0.3333333134651184;
+const ARC_1: f32 = 0.19999739527702332;
+const ARC_2: f32 = -0.1427856832742691;
+const ARC_3: f32 = 0.11033764481544495;
+const ARC_4: f32 = -0.08656880259513855;
+const ARC_5: f32 = 0.0625016912817955;
+const ARC_6: f32 = -0.035871539264917374;
+const ARC_7: f32 = 0.01350777130573988;
+const ARC_8: f32 = -0.0023869972210377455;
+
+// pi/2 and pi in two parts.
+const QUARTER: f32 = 1.5707963705062866;
+const QUARTER_LOW: f32 = -4.371138828673793e-8;
+const HALF: f32 = 3.1415927410125732;
+const HALF_LOW: f32 = -8.742277657347586e-8;
+const DEGREES: f32 = 57.295780181884766;
+
+fn clean(x: f32) -> f32 {
+    return select(x, 0.0, (bitcast<u32>(x) & 0x7fffffffu) < CLEAN_BITS);
+}
+
+fn magnitude(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) & 0x7fffffffu);
+}
+
+// For x > 0.
+fn reciprocal(x: f32) -> f32 {
+    let seed = bitcast<f32>(RECIPROCAL_SEED - bitcast<u32>(x));
+    let first = seed * (2.0 - x * seed);
+    let second = first * (2.0 - x * first);
+    let third = second * (2.0 - x * second);
+    return third * (2.0 - x * third);
+}
+
+// For x > 0; at 0 it is large.
+fn reciprocal_root(x: f32) -> f32 {
+    let seed = bitcast<f32>(ROOT_SEED - (bitcast<u32>(x) >> 1u));
+    let half = 0.5 * x;
+    let first = seed * (1.5 - half * seed * seed);
+    let second = first * (1.5 - half * first * first);
+    return second * (1.5 - half * second * second);
+}
+
+fn root(x: f32) -> f32 {
+    let near = x * reciprocal_root(x);
+    // One more step, on the root itself.
+    return near + (x - near * near) * (0.5 * reciprocal_root(x));
+}
+
+// The angle of (x, y), -pi to pi; 0 for (0, 0).
+fn arc_tangent(y: f32, x: f32) -> f32 {
+    let up = magnitude(y);
+    let along = magnitude(x);
+    let steep = up > along;
+    let large = select(along, up, steep);
+    let small = select(up, along, steep);
+    let divisor = select(large, 1.0, large == 0.0);
+    let inverse = reciprocal(divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
+    let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
+    let flat = tail * (z * t) + t;
+    let acute = select(flat, (QUARTER - flat) + QUARTER_LOW, steep);
+    let turned = select(acute, (HALF - acute) + HALF_LOW, x < 0.0);
+    return select(turned, -turned, y < 0.0);
+}

@@ -1,0 +1,32 @@
+// A rotation as the rows of its matrix; as its columns when `detail` is 1: those of the
+// inverse.
+// Twin: src/cpu/matrix.rs.
+
+struct Rows {
+    first: vec3f,
+    second: vec3f,
+    third: vec3f,
+}
+
+fn rows(rotation: vec4f, detail: u32) -> Rows {
+    let along = select(rotation.xyz, -rotation.xyz, detail == 1u);
+    let double = along + along;
+    let xx = along.x * double.x;
+    let yy = along.y * double.y;
+    let zz = along.z * double.z;
+    let xy = along.x * double.y;
+    let yz = along.y * double.z;
+    let zx = along.z * double.x;
+    let wx = rotation.w * double.x;
+    let wy = rotation.w * double.y;
+    let wz = rotation.w * double.z;
+    var rows: Rows;
+    rows.first = vec3f(1.0 - (yy + zz), xy - wz, zx + wy);
+    rows.second = vec3f(xy + wz, 1.0 - (xx + zz), yz - wx);
+    rows.third = vec3f(zx - wy, yz + wx, 1.0 - (xx + yy));
+    return rows;
+}
+
+fn settled(row: vec3f) -> vec3f {
+    return canonical(vec4f(row, 0.0)).xyz;
+}

@@ -1,0 +1,97 @@
+//! Arguments that say what of each rotation is written.
+
+use clap::{Args, ValueEnum};
+use tumble::{Axes, Encoding, EulerSequence, MatrixOrder, Quantity};
+
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct What {
+    /// What to write of each rotation
+    #[arg(
+        long = "output",
+        value_enum,
+        value_name = "WHAT",
+        default_value = "quaternion"
+    )]
+    output: Output,
+    /// euler: the axes, about turned ones (XYZ, ZXZ …) or about fixed ones (xyz, zxz …)
+    #[arg(long, value_name = "AXES", default_value = "XYZ", value_parser = sequence)]
+    sequence: EulerSequence,
+    /// matrix: how it lies in memory
+    #[arg(long, value_enum, default_value = "row")]
+    major: Major,
+    /// velocity, acceleration: whose axes
+    #[arg(long, value_enum, default_value = "body")]
+    axes: AxesArgument,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Output {
+    /// x y z w
+    Quaternion,
+    /// x y z of the axis, and degrees, 0 to 360
+    AxisAngle,
+    /// 3 × 3, for column vectors
+    Matrix,
+    /// 3 × 4, its translation 0
+    #[value(name = "matrix-3x4")]
+    Matrix3x4,
+    /// three angles, degrees
+    Euler,
+    /// angular velocity, rad/s
+    Velocity,
+    /// angular acceleration, rad/s²
+    Acceleration,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Major {
+    /// row by row
+    Row,
+    /// column by column
+    Column,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AxesArgument {
+    /// of what turns
+    Body,
+    /// of what it turns in (the parent)
+    World,
+}
+
+fn sequence(name: &str) -> Result<EulerSequence, String> {
+    name.parse().map_err(|_| {
+        "give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
+            .to_owned()
+    })
+}
+
+impl What {
+    /// How it is stored; quaternions as `components` says.
+    pub(crate) fn encoding(self, components: Encoding) -> Encoding {
+        let order = match self.major {
+            Major::Row => MatrixOrder::RowMajor,
+            Major::Column => MatrixOrder::ColumnMajor,
+        };
+        match self.output {
+            Output::Quaternion => components,
+            Output::AxisAngle => Encoding::AxisAngle,
+            Output::Matrix => Encoding::Matrix3x3(order),
+            Output::Matrix3x4 => Encoding::Matrix3x4(order),
+            Output::Euler => Encoding::Euler(self.sequence),
+            Output::Velocity | Output::Acceleration => Encoding::Vector,
+        }
+    }
+
+    pub(crate) fn quantity(self) -> Quantity {
+        let axes = match self.axes {
+            AxesArgument::Body => Axes::Body,
+            AxesArgument::World => Axes::World,
+        };
+        match self.output {
+            Output::Velocity => Quantity::Velocity(axes),
+            Output::Acceleration => Quantity::Acceleration(axes),
+            _ => Quantity::Rotation,
+        }
+    }
+}
