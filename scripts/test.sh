@@ -34,6 +34,26 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
+# Peers to compare with, in an environment of their own (tests/peers).
+peers=target/peers
+if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
+    if ! python3 -c 'import venv, ensurepip' 2>/dev/null && command -v apt-get >/dev/null; then
+        sudo=""
+        [ "$(id -u)" -eq 0 ] || sudo="sudo"
+        $sudo apt-get update -qq
+        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
+            python3-venv >/dev/null
+    fi
+    echo "installing SciPy and splines into $peers" >&2
+    rm -rf "$peers"
+    if ! { python3 -m venv "$peers" &&
+        "$peers/bin/pip" install --quiet --requirement tests/peers/requirements.txt; }; then
+        rm -rf "$peers"
+        echo "the peers' test wants python3 with venv, and SciPy and splines from PyPI; without" >&2
+        echo "them it says so and compares nothing (where CI is set it fails)" >&2
+    fi
+fi
+
 if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
 if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --all-targets --quiet -- -D warnings

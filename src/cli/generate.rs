@@ -17,8 +17,8 @@ Examples:
   tumble generate --boxes 4096 --keys 260 --seconds 200 --random -o - | tumble info -")]
 pub(crate) struct Arguments {
     /// Where to write (`-`: standard output)
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(short, long = "out", value_name = "FILE")]
+    out: PathBuf,
     /// Replace an existing file
     #[arg(long)]
     overwrite: bool,
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     generate
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;
-    let target = Target::new(&arguments.output, Format::Dat, arguments.overwrite, &[])?;
+    let target = Target::new(&arguments.out, Format::Dat, arguments.overwrite, &[])?;
     target.write(None, |out| generate.write(out))?;
     words::note(&format!(
         "{} × {}, {} s, seed {} → {target}",
