@@ -4,7 +4,10 @@
 //! The last word on every result: nothing here trusts what the engine says about
 //! itself. The reference shares no code with the kernels.
 
+mod outputs;
+
 use glam::{DQuat, Quat};
+pub use outputs::OutputVerification;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -54,6 +57,8 @@ pub struct Verification {
     pub error_bound: f64,
     /// What `max_norm_error` may be.
     pub norm_bound: f64,
+    /// What follows from the rotations.
+    pub outputs: Vec<OutputVerification>,
 }
 
 /// One rotation of a result.
@@ -68,16 +73,17 @@ pub struct Place {
 }
 
 impl Verification {
-    /// Whether all bits agree and both errors are within their bounds.
+    /// Whether all bits agree and all errors are within their bounds.
     pub fn passes(&self) -> bool {
         self.differing == 0
             && self.max_error <= self.error_bound
             && self.max_norm_error <= self.norm_bound
+            && self.outputs.iter().all(OutputVerification::passes)
     }
 }
 
 /// Evaluates on the engine, on the CPU and with the reference, and compares every
-/// rotation.
+/// rotation and all that follows from it: velocities, accelerations, encodings.
 ///
 /// ```
 /// use tumble::{Engine, Frames, TrackSet, method, verify::verify};
@@ -141,6 +147,7 @@ pub fn verify(
         max_norm_error: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
         error_bound: error_bound(interpolation.form()),
         norm_bound: NORM_BOUND,
+        outputs: outputs::verify(engine, set, interpolation, frames, &timeline)?,
     })
 }
 

@@ -20,7 +20,8 @@ use super::{input, room, words};
 #[command(after_help = "\
 Every rotation of every frame is computed three times: on the device, by its f32
 twin on the CPU, and by a textbook implementation in f64. The bits of the first two
-must agree; the error against the third has a bound. Exit code 8 when not.
+must agree; the error against the third has a bound. So is what follows from the
+rotations: velocities, accelerations, every encoding. Exit code 8 when not.
 
 Examples:
   tumble verify data/pendulum.dat
@@ -124,18 +125,22 @@ fn report(lines: &[Line], device: &Opened) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{:width$}  {:17} {:>12} {:>9}  {:>9} {:>9} {:>9}  {:>9}  verdict",
+        "{:width$}  {:22} {:>12} {:>9}  {:>9} {:>9} {:>9}  {:>9}  verdict",
         "input", "method", "rotations", "differing", "max rad", "bound", "rms rad", "| |q|-1 |"
     );
     for line in lines {
         line.tell(&mut text, width);
     }
     let rotations: u64 = lines.iter().map(|line| line.found.rotations).sum();
-    let differing: u64 = lines.iter().map(|line| line.found.differing).sum();
+    let outputs = || lines.iter().flat_map(|line| &line.found.outputs);
+    let values: u64 = outputs().map(|output| output.values).sum();
+    let differing: u64 = lines.iter().map(|line| line.found.differing).sum::<u64>()
+        + outputs().map(|output| output.differing).sum::<u64>();
     let _ = if device.is_vulkan() {
         writeln!(
             text,
-            "total: {rotations} rotations compared between {} and the CPU, {differing} differ",
+            "total: {rotations} rotations, and {values} values that follow from them, compared \
+             between {} and the CPU, {differing} differ",
             device.label
         )
     } else {
@@ -154,7 +159,7 @@ impl Line {
         let found = &self.found;
         let _ = writeln!(
             text,
-            "{:width$}  {:17} {:>12} {:>9}  {:>9.2e} {:>9.0e} {:>9.2e}  {:>9.2e}  {}",
+            "{:width$}  {:22} {:>12} {:>9}  {:>9.2e} {:>9.0e} {:>9.2e}  {:>9.2e}  {}",
             self.input,
             found.method,
             found.rotations,
@@ -169,6 +174,18 @@ impl Line {
             found.max_norm_error,
             if self.pass { "pass" } else { "FAIL" },
         );
+        for output in found.outputs.iter().filter(|output| !output.passes()) {
+            let _ = writeln!(
+                text,
+                "{:width$}  FAIL: {}, {} of {} differ, error {:.2e} of {:.0e}",
+                "",
+                output.output,
+                output.differing,
+                output.values,
+                output.max_error,
+                output.error_bound
+            );
+        }
         for (what, place) in [
             ("worst", found.worst),
             ("first difference", found.first_difference),

@@ -157,7 +157,7 @@ impl Segment {
 const FIRST: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
 
 fn differences(of: impl Fn(f64) -> DQuat, t: f64, weights: [f64; 4]) -> DQuat {
-    let h = 0.01;
+    let h = 0.0025;
     let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     for (k, weight) in (1..).map(f64::from).zip(weights) {
         sum += (of(t + k * h) - of(t - k * h)) * (weight / h);

@@ -1,0 +1,152 @@
+//! What follows from a rotation, verified: velocities, accelerations, and every encoding.
+
+use glam::{DQuat, DVec3, Quat};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::clock::{Frames, Timeline};
+use crate::device::Device;
+use crate::encoding::Encoding;
+use crate::engine::{Engine, Error};
+use crate::method::{Axes, Interpolation, Quantity};
+use crate::reference::{Curve, angle_between};
+use crate::rotations::{Layout, Rotations};
+use crate::tracks::TrackSet;
+
+/// What was found of one output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct OutputVerification {
+    /// Its name.
+    pub output: String,
+    /// Values compared between the device and the CPU: one for each track and sample.
+    pub values: u64,
+    /// Values whose bits differ.
+    pub differing: u64,
+    /// Largest error against the reference: radians for rotations, parts of the track's
+    /// largest value for velocities and accelerations.
+    pub max_error: f64,
+    /// What that may be.
+    pub error_bound: f64,
+}
+
+impl OutputVerification {
+    /// Whether all bits agree and the error is within its bound.
+    pub fn passes(&self) -> bool {
+        self.differing == 0 && self.max_error <= self.error_bound
+    }
+}
+
+const QUANTITIES: [(&str, Quantity); 4] = [
+    ("velocity", Quantity::Velocity(Axes::Body)),
+    ("velocity, world", Quantity::Velocity(Axes::World)),
+    ("acceleration", Quantity::Acceleration(Axes::Body)),
+    ("acceleration, world", Quantity::Acceleration(Axes::World)),
+];
+
+/// Samples of a method's derivatives that are compared with the reference, which is slow.
+const RATES_CHECKED: usize = 4096;
+
+/// Every output of one method.
+pub(super) fn verify(
+    engine: &Engine,
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+    timeline: &Timeline,
+) -> Result<Vec<OutputVerification>, Error> {
+    let cpu = Engine::new(Device::Cpu)?;
+    let mut outputs = Vec::new();
+    for (name, quantity) in QUANTITIES {
+        let interpolation = Interpolation {
+            quantity,
+            ..interpolation
+        };
+        let found = engine.evaluate(set, interpolation, frames)?;
+        let expected = cpu.evaluate(set, interpolation, frames)?;
+        let (differing, _) = super::differences(&found, &expected);
+        outputs.push(OutputVerification {
+            output: name.to_owned(),
+            values: found.as_quats().len() as u64,
+            differing,
+            max_error: rate_error(set, interpolation, timeline, &found),
+            error_bound: 1e-6,
+        });
+    }
+    let (clip, layout) = (engine.upload(set, interpolation)?, Layout::TrackMajor);
+    let rotations = cpu.evaluate(set, interpolation, frames)?;
+    let rotations: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
+    let mut expected = Vec::new();
+    for encoding in Encoding::KINDS {
+        if encoding == Encoding::Vector {
+            continue; // not for rotations
+        }
+        let found = clip.evaluate_encoded(frames, layout, encoding)?;
+        let bytes = encoding.bytes();
+        expected.resize(rotations.len() * bytes, 0);
+        encoding.encode(rotations, &mut expected);
+        let pairs = found.chunks(bytes).zip(expected.chunks(bytes));
+        let error = |(stored, &rotation): (&[u8], &[f32; 4])| {
+            let [decoded, rotation] = [encoding.decode(stored), rotation].map(exact);
+            worse(angle_between(decoded, rotation))
+        };
+        outputs.push(OutputVerification {
+            output: format!("{encoding:?}"),
+            values: rotations.len() as u64,
+            differing: pairs.filter(|(found, expected)| found != expected).count() as u64,
+            max_error: (found.chunks(bytes).zip(rotations))
+                .map(error)
+                .fold(0.0, f64::max),
+            error_bound: match encoding {
+                Encoding::F32 => 0.0,
+                Encoding::F16 => 2e-3,
+                Encoding::Snorm16 => 1.5e-4,
+                // Of which the larger part is the way back.
+                _ => 4e-6,
+            },
+        });
+    }
+    Ok(outputs)
+}
+
+fn exact(rotation: [f32; 4]) -> DQuat {
+    Quat::from_array(rotation).as_dquat()
+}
+
+/// NaN is as wrong as can be.
+fn worse(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
+}
+
+fn rate_error(
+    set: &TrackSet,
+    interpolation: Interpolation,
+    timeline: &Timeline,
+    found: &Rotations,
+) -> f64 {
+    let samples = timeline.len();
+    let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
+    let track = |index: usize| {
+        let curve = Curve::of(&interpolation, set.track(index));
+        let (mut error, mut largest) = (0.0f64, 1e-3f64);
+        for sample in (0..samples).step_by(each) {
+            let time = timeline.time(index, sample);
+            let (body, axes) = match interpolation.quantity {
+                Quantity::Velocity(axes) => (curve.velocity(time), axes),
+                Quantity::Acceleration(axes) => (curve.acceleration(time), axes),
+                Quantity::Rotation => unreachable!("a rate"),
+            };
+            let expected = match axes {
+                Axes::Body => body,
+                Axes::World => curve.rotation(time) * body,
+            };
+            let [x, y, z, _] = found.get(index, sample).unwrap_or(Quat::NAN).to_array();
+            let found = DVec3::new(x.into(), y.into(), z.into());
+            error = error.max(worse((found - expected).length()));
+            largest = largest.max(expected.length());
+        }
+        error / largest
+    };
+    let errors = (0..set.track_count()).into_par_iter().map(track);
+    errors.reduce(|| 0.0, f64::max)
+}
