@@ -33,6 +33,9 @@ const ENCODINGS: [(&str, &[&str]); 8] = [
     ("vector", &[]),
 ];
 
+/// Kernels over poses that are already there.
+const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
+
 /// Every pipeline: its name, and the files that are joined into it.
 fn pipelines() -> Vec<(String, Vec<String>)> {
     let mut pipelines = vec![(
@@ -43,6 +46,7 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
         for (clock, distance) in CLOCKS {
             for (encoding, needed) in ENCODINGS {
                 let own = [
+                    "canonical",
                     "kernel",
                     distance,
                     "sine_cosine",
@@ -53,6 +57,17 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
                 pipelines.push((format!("{form}_{clock}_{encoding}"), files.collect()));
             }
         }
+    }
+    for pose in POSES {
+        let shared = [
+            "canonical",
+            "sine_cosine",
+            "arc_tangent",
+            "quaternion",
+            "pass",
+        ];
+        let files = shared.into_iter().chain([pose]).map(str::to_owned);
+        pipelines.push((pose.to_owned(), files.collect()));
     }
     pipelines
 }

@@ -31,20 +31,12 @@ const WORKGROUP: u32 = 64;
 const ITEM_SAMPLES: u32 = 16;
 const HOLD: u32 = 0x80000000;
 
-// Magnitudes below 2^-64 become +0: drivers may or may not flush subnormals.
-const TINY_BITS: u32 = 0x1f800000;
-
 @group(0) @binding(0) var<storage, read> segments: array<Segment>;
 @group(0) @binding(1) var<storage, read> constants: array<vec4f>;
 @group(0) @binding(2) var<storage, read> items: array<Item>;
 @group(0) @binding(3) var<storage, read> distances: array<f32>;
 
 var<immediate> launch: Launch;
-
-fn canonical(q: vec4f) -> vec4f {
-    let magnitude = bitcast<vec4u>(q) & vec4u(0x7fffffffu);
-    return select(q, vec4f(0.0), magnitude < vec4u(TINY_BITS));
-}
 
 @compute @workgroup_size(WORKGROUP)
 fn main(

@@ -46,6 +46,9 @@ pub enum Error {
         /// Bytes of the result.
         needed: usize,
     },
+    /// Poses cannot be put together as asked.
+    #[error("{0}")]
+    Poses(&'static str),
     /// Velocities and accelerations are no rotations, and cannot be stored as such.
     #[error("{encoding:?} stores rotations, not velocities or accelerations; use F32 or Vector")]
     NotRotations {

@@ -60,12 +60,14 @@ pub mod generate;
 mod gpu;
 pub mod method;
 mod numeric;
+mod poses;
 mod prepare;
 pub mod reference;
 mod rotations;
 mod scalar;
 mod schedule;
 mod segment;
+mod skeleton;
 pub mod spirv;
 mod stream;
 mod tracks;
@@ -85,7 +87,9 @@ pub use method::{
     Axes, Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
     Quantity,
 };
+pub use poses::WorldPoses;
 pub use rotations::{Layout, Rotations};
+pub use skeleton::{Skeleton, SkeletonError};
 pub use stream::Chunk;
 pub use tracks::{NORM_TOLERANCE, Tcb, Track, TrackError, TrackSet};
 

@@ -51,6 +51,24 @@ pub(crate) struct Launch {
     pub(crate) detail: u32,
 }
 
+/// `Pass` of `pass.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Pass {
+    pub(crate) count: u32,
+    pub(crate) detail: u32,
+}
+
+/// `Link` of `pose_world.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Link {
+    pub(crate) offset: [f32; 3],
+    pub(crate) track: u32,
+    pub(crate) parent: u32,
+    pub(crate) padding: [u32; 3],
+}
+
 /// `Probe` of `canary.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -112,6 +130,14 @@ assert_layout!(
     item_count = LAUNCH_ITEM_COUNT,
     stride = LAUNCH_STRIDE,
     detail = LAUNCH_DETAIL
+);
+assert_layout!(Pass, PASS_SIZE, count = PASS_COUNT, detail = PASS_DETAIL);
+assert_layout!(
+    Link,
+    LINK_SIZE,
+    offset = LINK_OFFSET,
+    track = LINK_TRACK,
+    parent = LINK_PARENT
 );
 assert_layout!(
     Probe,

@@ -59,6 +59,7 @@ fn every_shader_function_has_its_twin() {
                 "distance_in_frames",
                 "distance_in_seconds",
                 "store_f32",
+                "pass",
                 "store_matrix3x3",
                 "store_matrix3x4",
                 "store_vector",

@@ -127,7 +127,7 @@ fn run<S: Evaluate>(
     }
 }
 
-/// Magnitudes below 2^-64 become +0.
+/// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.
 #[inline(always)]
 pub(super) fn canonical(q: f32) -> f32 {
     let magnitude = q.to_bits() & 0x7fff_ffff;

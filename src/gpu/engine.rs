@@ -9,7 +9,7 @@ use super::device::LogicalDevice;
 use super::error::VulkanError;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
-use super::pipeline::{KERNELS, Pipeline};
+use super::pipeline::{KERNELS, POSES, Pipeline};
 use super::slot::{External, Slot, Target};
 use super::submission::{Access, Submission};
 use crate::clock::{FramesError, Timeline};
@@ -32,6 +32,7 @@ pub(crate) struct VulkanEngine {
     pub(super) device: Arc<LogicalDevice>,
     /// Made when they are first needed.
     pub(super) pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS]>,
+    pub(super) pose_pipelines: Mutex<[Option<Arc<Pipeline>>; POSES]>,
     pub(super) slots: Mutex<Vec<Slot>>,
     /// Results are written in place, or copied out of the device's own memory.
     pub(super) in_place: bool,
@@ -117,6 +118,7 @@ impl VulkanEngine {
         let window = (window / 64 * 64).max(64) as usize;
         Ok(Self {
             pipelines: Mutex::default(),
+            pose_pipelines: Mutex::default(),
             slots: Mutex::default(),
             in_place,
             window,

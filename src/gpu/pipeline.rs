@@ -14,7 +14,8 @@ use crate::spirv;
 /// A shader that the build compiled: its name and its words.
 pub(super) type Shader = (&'static str, &'static [u8]);
 
-/// All of them: the canary, then the kernels, by form, clock and encoding.
+/// All of them: the canary, then the kernels, by form, clock and encoding, then those of
+/// poses.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 pub(super) fn canary() -> Shader {
@@ -30,7 +31,23 @@ pub(super) enum Clock {
 
 /// Kernels that there are.
 pub(super) const KERNELS: usize = 32;
-const _: () = assert!(SHADERS.len() == 1 + KERNELS);
+const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES);
+
+/// Kernels over poses that are already there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PoseKernel {
+    Blend,
+    Mix,
+    Add,
+    World,
+}
+
+/// How many of them there are.
+pub(super) const POSES: usize = 4;
+
+pub(super) fn pose_shader(kernel: PoseKernel) -> Shader {
+    SHADERS[1 + KERNELS + kernel as usize]
+}
 
 /// A kernel, and its place among all.
 pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, usize) {
@@ -58,6 +75,8 @@ pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, u
 
 /// Number of storage buffers that `kernel.wgsl` binds.
 pub(super) const KERNEL_BINDINGS: u32 = 5;
+/// Number of storage buffers that a `pose_*.wgsl` binds: three inputs and the output.
+pub(super) const POSE_BINDINGS: u32 = 4;
 /// Number of storage buffers that `canary.wgsl` binds.
 pub(super) const CANARY_BINDINGS: u32 = 2;
 

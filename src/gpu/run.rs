@@ -235,7 +235,7 @@ impl VulkanEngine {
     }
 
     /// Enough workgroups for `items`, within the limit along x.
-    fn workgroups(&self, items: u32) -> [u32; 2] {
+    pub(super) fn workgroups(&self, items: u32) -> [u32; 2] {
         let groups = items.div_ceil(WORKGROUP);
         let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
         [x, groups.div_ceil(x)]

@@ -1,0 +1,18 @@
+// A layer of rotations added to another: what it turns from its reference, or a part of
+// that, behind the base.
+// Twin: src/cpu/pose_add.rs.
+
+@group(0) @binding(0) var<storage, read> base: array<vec4f>;
+@group(0) @binding(1) var<storage, read> layer: array<vec4f>;
+// One for each value of the layer, then one number: the weight.
+@group(0) @binding(2) var<storage, read> reference: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> added: array<vec4f>;
+
+const IDENTITY: vec4f = vec4f(0.0, 0.0, 0.0, 1.0);
+
+fn pose(place: u32) {
+    let own = reference[place];
+    let inverse = vec4f(-own.x, -own.y, -own.z, own.w);
+    let turn = slerp(IDENTITY, product(inverse, layer[place]), reference[launch.count].x);
+    added[place] = canonical(normalised(product(base[place], turn)));
+}

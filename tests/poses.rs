@@ -1,0 +1,219 @@
+//! Poses from poses: layers blended, mixed and added, and chains walked down to the
+//! world. The same bits on every device, near the textbook.
+
+mod support;
+
+use glam::{DQuat, DVec3, Quat, Vec3};
+use support::{Random, hostile_set, vulkan_devices};
+use tumble::reference::{angle_between, slerp};
+use tumble::{
+    Device, Engine, EngineOptions, Error, Frames, Layout, Rotations, Skeleton, TrackSet,
+    WorldPoses, method,
+};
+
+fn engines() -> Vec<Engine> {
+    let mut engines = vec![Engine::new(Device::Cpu).unwrap()];
+    for device in vulkan_devices() {
+        for memory in [None, Some(100_000)] {
+            let mut options = EngineOptions::default();
+            options.memory = memory;
+            engines.push(Engine::with_options(device.clone(), &options).unwrap());
+        }
+    }
+    engines
+}
+
+fn layers(layout: Layout) -> Vec<Rotations> {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let frames = Frames::fps(30).between(0.0, 5.0);
+    (0..3)
+        .map(|seed| {
+            let set = hostile_set(seed, 64);
+            let method = [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP][seed as usize];
+            engine.evaluate_as(&set, method, &frames, layout).unwrap()
+        })
+        .collect()
+}
+
+fn bits(values: &[Quat]) -> Vec<[u32; 4]> {
+    values
+        .iter()
+        .map(|q| q.to_array().map(f32::to_bits))
+        .collect()
+}
+
+fn exact(layer: &Rotations, place: usize) -> DQuat {
+    layer.as_quats()[place].as_dquat().normalize()
+}
+
+/// The same bits from all, and what the first gives.
+fn agreed(what: &str, of: impl Fn(&Engine) -> Rotations) -> Rotations {
+    let engines = engines();
+    let first = of(&engines[0]);
+    for engine in &engines[1..] {
+        let found = of(engine);
+        assert!(
+            bits(first.as_quats()) == bits(found.as_quats()),
+            "{what} on {}",
+            engine.device_name()
+        );
+    }
+    first
+}
+
+#[test]
+fn a_blend_is_the_normalised_sum() {
+    let layers = layers(Layout::TrackMajor);
+    let weights = [0.5, 0.3, 0.4];
+    let pairs: Vec<_> = layers.iter().zip(weights).collect();
+    let found = agreed("blend", |engine| engine.blend(&pairs).unwrap());
+    for place in 0..found.as_quats().len() {
+        let first = exact(&layers[0], place);
+        let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+        for (layer, weight) in &pairs {
+            let own = exact(layer, place);
+            let sign = if own.dot(first) < 0.0 { -1.0 } else { 1.0 };
+            sum = sum + own * (sign * f64::from(*weight));
+        }
+        let off = angle_between(found.as_quats()[place].as_dquat(), sum.normalize());
+        // A sign at a right angle is rounding's to choose.
+        let doubtful = pairs
+            .iter()
+            .any(|(layer, _)| exact(layer, place).dot(first).abs() < 1e-6);
+        assert!(off < 2e-6 || doubtful, "{place}: {off:e}");
+    }
+}
+
+#[test]
+fn a_mix_is_slerp() {
+    let layers = layers(Layout::FrameMajor);
+    for weight in [0.0, 0.25, 0.7, 1.0] {
+        let mix = |engine: &Engine| engine.mix(&layers[0], &layers[1], weight).unwrap();
+        let found = agreed("mix", mix);
+        for place in 0..found.as_quats().len() {
+            let (a, b) = (exact(&layers[0], place), exact(&layers[1], place));
+            if a.dot(b).abs() < 1e-6 {
+                continue; // either way
+            }
+            let near = if a.dot(b) < 0.0 { -b } else { b };
+            let expected = slerp(a, near, f64::from(weight));
+            let off = angle_between(found.as_quats()[place].as_dquat(), expected);
+            assert!(off < 2e-6, "{place}, {weight}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn an_added_layer_turns_the_base_on() {
+    for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+        let layers = layers(layout);
+        let mut random = Random(8);
+        let reference: Vec<Quat> = (0..64).map(|_| random.rotation().as_quat()).collect();
+        for weight in [0.0, 0.4, 1.0] {
+            let add = |engine: &Engine| {
+                engine
+                    .add(&layers[0], &layers[1], &reference, weight)
+                    .unwrap()
+            };
+            let found = agreed("add", add);
+            for track in 0..64 {
+                for sample in 0..found.samples() {
+                    let get = |layer: &Rotations| layer.get(track, sample).unwrap().as_dquat();
+                    let turn = reference[track].as_dquat().normalize().inverse() * get(&layers[1]);
+                    if turn.w.abs() < 1e-6 {
+                        continue; // half a turn, either way
+                    }
+                    let turn = if turn.w < 0.0 { -turn } else { turn };
+                    let part = slerp(DQuat::IDENTITY, turn, f64::from(weight));
+                    let off = angle_between(get(&found), get(&layers[0]) * part);
+                    assert!(off < 3e-6, "{track}, {sample}: {off:e}");
+                }
+            }
+        }
+    }
+}
+
+fn world_bits(poses: &WorldPoses) -> Vec<u32> {
+    let values = poses.as_slice().as_flattened();
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// A tree whose tracks are in no order.
+#[test]
+fn worlds_follow_their_parents() {
+    let mut random = Random(5);
+    let tracks = 64;
+    // Track 7 is a root; each other hangs from one that hangs already.
+    let mut order: Vec<usize> = (0..tracks).collect();
+    order.swap(0, 7);
+    for i in (2..tracks).rev() {
+        order.swap(i, 1 + (random.next() as usize) % i);
+    }
+    let mut parents = vec![None; tracks];
+    for i in 1..tracks {
+        let far = (random.next() as usize) % i;
+        parents[order[i]] = (i % 20 != 0).then_some(order[far]);
+    }
+    let offsets: Vec<Vec3> = (0..tracks)
+        .map(|_| (random.direction() * random.between(0.0, 3.0)).as_vec3())
+        .collect();
+    let skeleton = Skeleton::new(parents.clone(), offsets.clone()).unwrap();
+    for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+        let local = &layers(layout)[1];
+        let engines = engines();
+        let found = engines[0].world(local, &skeleton).unwrap();
+        for engine in &engines[1..] {
+            let other = engine.world(local, &skeleton).unwrap();
+            assert!(
+                world_bits(&found) == world_bits(&other),
+                "{}",
+                engine.device_name()
+            );
+        }
+        for sample in 0..local.samples() {
+            let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
+            for &track in &order {
+                let own = local.get(track, sample).unwrap().as_dquat();
+                let hung = offsets[track].as_dvec3();
+                world[track] = match parents[track] {
+                    None => (own, hung),
+                    Some(parent) => {
+                        let (above, at): (DQuat, DVec3) = world[parent];
+                        ((above * own).normalize(), at + above * hung)
+                    }
+                };
+                let rotation = found.rotation(track, sample).unwrap().as_dquat();
+                assert!(angle_between(rotation, world[track].0) < 6e-6);
+                let position = found.position(track, sample).unwrap().as_dvec3();
+                assert!((position - world[track].1).length() < 1e-4);
+            }
+        }
+        assert_eq!(found.position(tracks, 0), None);
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let all = layers(Layout::TrackMajor);
+    let set = hostile_set(1, 3);
+    let few = engine
+        .evaluate(&set, method::SLERP, &Frames::fps(2))
+        .unwrap();
+    let refused = |result: Result<Rotations, Error>| match result {
+        Err(Error::Poses(message)) => message,
+        other => panic!("{other:?}"),
+    };
+    assert!(refused(engine.blend(&[])).contains("no layer"));
+    assert!(refused(engine.blend(&[(&few, f32::NAN)])).contains("not finite"));
+    assert!(refused(engine.mix(&few, &all[0], 0.5)).contains("differ"));
+    assert!(refused(engine.mix(&few, &few, 1.5)).contains("between 0 and 1"));
+    assert!(refused(engine.add(&few, &few, &[], 0.5)).contains("one reference"));
+    let world = engine.world(&few, &Skeleton::chain(2, 1.0));
+    assert!(matches!(world, Err(Error::Poses(_))));
+    let nothing = engine
+        .evaluate(&TrackSet::new(), method::SLERP, &Frames::fps(2))
+        .unwrap();
+    let world = engine.world(&nothing, &Skeleton::chain(0, 1.0)).unwrap();
+    assert_eq!((world.tracks(), world.as_slice().len()), (0, 0));
+}
