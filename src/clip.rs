@@ -55,9 +55,12 @@ impl Clip {
         let timeline = self.timeline(frames)?;
         let (tracks, samples) = (self.data.track_count(), timeline.len());
         let storage: Box<dyn Storage> = match (&*self.engine.backend, &self.buffers) {
-            (Backend::Vulkan(opened), Some(buffers)) => opened
-                .engine
-                .evaluate(&self.data, buffers, &timeline, layout)?,
+            (Backend::Vulkan(opened), Some(buffers)) => {
+                let timeline = self.data.folded(&timeline);
+                opened
+                    .engine
+                    .evaluate(&self.data, buffers, &timeline, layout)?
+            }
             _ => {
                 let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
                 self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
@@ -106,7 +109,10 @@ impl Clip {
         output: &mut [Quat],
     ) -> Result<(), Error> {
         match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
+            (Backend::Cpu(engine), _) => {
+                let timeline = self.data.folded(timeline);
+                Ok(engine.evaluate(&self.data, &timeline, window, output)?)
+            }
             (Backend::Vulkan(_), _) => {
                 let bytes = bytemuck::cast_slice_mut(output);
                 self.evaluate_bytes_into(timeline, window, Encoding::F32, bytes)
@@ -122,6 +128,7 @@ impl Clip {
         output: &mut [u8],
     ) -> Result<(), Error> {
         self.check_encoding(encoding)?;
+        let timeline = &*self.data.folded(timeline);
         match (&*self.engine.backend, &self.buffers) {
             (Backend::Cpu(engine), _) => {
                 Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)

@@ -259,6 +259,20 @@ impl Timeline {
         own
     }
 
+    /// Explicit times, each made another, for every track its own.
+    pub(crate) fn map_times(&self, tracks: usize, map: impl Fn(usize, f64) -> f64) -> Self {
+        let times =
+            (0..tracks).flat_map(|track| (0..self.count).map(move |sample| (track, sample)));
+        let mapped = times.map(|(track, sample)| map(track, self.time(track, sample)));
+        Self {
+            ticks: Ticks::Times {
+                times: mapped.collect(),
+                stride: self.count,
+            },
+            count: self.count,
+        }
+    }
+
     /// The time of a sample in seconds.
     ///
     /// # Panics

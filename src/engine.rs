@@ -8,6 +8,7 @@ use glam::Quat;
 use crate::clip::Clip;
 use crate::clock::{Frames, FramesError, Timeline};
 use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
+use crate::cycle::Sides;
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::encoding::Encoding;
 use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
@@ -284,8 +285,8 @@ impl Engine {
         let timeline = frames.resolve(tracks, set.time_span())?;
         let samples = timeline.len();
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
-        let by_segments =
-            !(self.is_fused(set, layout) || on_cpu && is_sampled(set, &interpolation, &timeline));
+        let by_segments = !(self.is_fused(set, &interpolation, layout)
+            || on_cpu && is_sampled(set, &interpolation, &timeline));
         if by_segments && self.pieces(set, &interpolation).len() == 1 {
             return self.upload(set, interpolation)?.evaluate_as(frames, layout);
         }
@@ -326,7 +327,9 @@ impl Engine {
         output: &mut [Quat],
     ) -> Result<(), Error> {
         let (tracks, samples) = (set.track_count(), timeline.len());
-        if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
+        if let (Backend::Cpu(engine), true) =
+            (&*self.backend, self.is_fused(set, &interpolation, layout))
+        {
             return engine.evaluate_set(set, 0..tracks, &interpolation, timeline, output);
         }
         if let (Backend::Cpu(engine), Layout::TrackMajor) = (&*self.backend, layout)
@@ -366,9 +369,16 @@ impl Engine {
 
     /// Whether preparing and evaluating go hand in hand, track by track: on the CPU,
     /// unless a few long tracks must be shared among the threads.
-    pub(crate) fn is_fused(&self, set: &TrackSet, layout: Layout) -> bool {
+    pub(crate) fn is_fused(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+        layout: Layout,
+    ) -> bool {
         let short = set.key_count() <= LONG_TRACK * set.track_count();
-        matches!(*self.backend, Backend::Cpu(_)) && layout == Layout::TrackMajor && short
+        let held = interpolation.sides() == Sides::default();
+        let on_cpu = matches!(*self.backend, Backend::Cpu(_));
+        on_cpu && layout == Layout::TrackMajor && short && held
     }
 
     /// Ranges of tracks whose segments fit the device's budget.

@@ -45,16 +45,19 @@
 //!   methods that pass through their keys).
 
 mod auto;
+mod backward;
 mod branchless;
 mod clip;
 mod clock;
 mod cpu;
+mod cycle;
 mod device;
 mod encoding;
 mod engine;
 mod euler;
 pub mod formats;
 mod formula;
+mod frame_clock;
 mod frame_rate;
 pub mod generate;
 mod gpu;
@@ -77,6 +80,7 @@ mod window;
 pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
 pub use cpu::{UnknownWidth, VectorWidth};
+pub use cycle::Outside;
 pub use device::{Device, EngineOptions, Timings, Transfer, VulkanDevice};
 pub use encoding::{Encoding, MatrixOrder};
 pub use engine::{Engine, Error};

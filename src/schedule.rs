@@ -6,8 +6,9 @@
 use std::ops::Range;
 
 use crate::clock::{FramesError, Ticks, Timeline};
-use crate::frame_rate::FrameRate;
-use crate::numeric::{nearest_whole, round_f32, round_quat};
+use crate::cycle::Cycle;
+use crate::frame_clock::{FrameClock, finite_scale, in_frames};
+use crate::numeric::round_quat;
 use crate::prepare::{NONE, Part, Prepared, Source};
 
 /// Consecutive samples of one track with one source.
@@ -66,18 +67,22 @@ impl<F: FnMut(Run)> Emit for F {
 }
 
 impl Prepared {
-    /// The runs of one part within a range of samples, in order.
+    /// The runs of one part within the samples of a cycle, in order.
     #[inline(always)]
     pub(crate) fn runs(
         &self,
         part: &Part,
         timeline: &Timeline,
-        samples: Range<usize>,
+        cycle: &Cycle,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
+        let samples = cycle.samples.clone();
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let clock = FrameClock::new(*rate, *start, part.end);
+                let clock = FrameClock::new(*rate, *start, part.end).of_copy(cycle);
+                if cycle.sign < 0.0 {
+                    return self.backward_runs(part, clock, samples, emit);
+                }
                 self.frame_runs(part, clock, samples, emit)
             }
             Ticks::Times { times, stride } => {
@@ -123,10 +128,15 @@ impl Prepared {
             let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
             clip(0, begin.first as usize, &samples, part.before, emit);
         }
+        if part.from_before != NONE {
+            let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
+            let before = 0..begin.first as usize;
+            extrapolate(before, &samples, part.from_before, clock, begin.frame, emit);
+        }
         // The span that holds the first sample; a time's own rounding may put it one
         // further.
         let mut skipped = 0;
-        if samples.start > 0 {
+        if samples.start > 0 && clock.is_own() {
             let first_time = clock.time(samples.start);
             let found = starts.partition_point(|&start| start <= first_time);
             skipped = found.saturating_sub(2);
@@ -203,6 +213,16 @@ impl Prepared {
             }
             clip(first, usize::MAX, &samples, part.after, emit);
         }
+        if part.from_after != NONE {
+            let end = clock.boundary(part.end);
+            let mut first = end.first as usize;
+            if part.at_end != NONE && first as f64 == end.frame {
+                clip(first, first + 1, &samples, part.at_end, emit);
+                first += 1;
+            }
+            let after = first..usize::MAX;
+            extrapolate(after, &samples, part.from_after, clock, end.frame, emit);
+        }
         Ok(())
     }
 
@@ -239,10 +259,12 @@ impl Prepared {
             } else if time == part.end && part.at_end != NONE {
                 (time..time.next_up(), constant_source(part.at_end))
             } else if time >= part.end {
-                (part.end..f64::INFINITY, constant_source(part.after))
+                let source = beyond(part.after, part.from_after, part.end);
+                (part.end..f64::INFINITY, source)
             } else {
                 let begin = starts.first().copied().unwrap_or(part.end);
-                (f64::NEG_INFINITY..begin, constant_source(part.before))
+                let source = beyond(part.before, part.from_before, begin);
+                (f64::NEG_INFINITY..begin, source)
             };
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
@@ -279,9 +301,60 @@ impl Prepared {
     }
 }
 
+/// What gives the samples outside the keys: a constant, or a curve from the end on, or
+/// another part.
+fn beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
+    match (constant_source(constant), curve) {
+        (None, NONE) => None,
+        (None, index) => Some(RunSource::Exact {
+            index,
+            parameter: Parameter::Seconds {
+                start: end,
+                seconds: 1.0,
+            },
+        }),
+        (held, _) => held,
+    }
+}
+
+/// Emits those of the samples `outside` the keys that are asked for, on a curve whose
+/// parameter is seconds from the frame coordinate `end`.
+fn extrapolate(
+    outside: Range<usize>,
+    samples: &Range<usize>,
+    index: u32,
+    clock: FrameClock,
+    end: f64,
+    emit: &mut impl Emit,
+) {
+    let (first, last) = (
+        outside.start.max(samples.start),
+        outside.end.min(samples.end),
+    );
+    if first < last {
+        emit.run(Run {
+            sample: first,
+            count: last - first,
+            source: RunSource::Exact {
+                index,
+                parameter: Parameter::Frames {
+                    start: end,
+                    frames: clock.frames_a_second(),
+                },
+            },
+        });
+    }
+}
+
 /// Emits the part of a constant's samples that lies within `samples`.
 #[inline(always)]
-fn clip(from: usize, to: usize, samples: &Range<usize>, constant: u32, emit: &mut impl Emit) {
+pub(crate) fn clip(
+    from: usize,
+    to: usize,
+    samples: &Range<usize>,
+    constant: u32,
+    emit: &mut impl Emit,
+) {
     let (sample, to) = (from.max(samples.start), to.min(samples.end));
     if sample < to {
         emit.run(Run {
@@ -347,91 +420,6 @@ impl SpanBlock {
             scales[j] = span.scale;
             offsets[j] = span.offset;
         }
-    }
-}
-
-/// How the parameter of a span's frames follows from their numbers.
-pub(crate) struct InFrames {
-    /// The whole frame nearest to the span's middle.
-    pub(crate) whole: f64,
-    /// parameter = (frame - whole) × scale + offset
-    pub(crate) scale: f32,
-    pub(crate) offset: f32,
-}
-
-/// A span between two frame coordinates over which the parameter runs through
-/// `extent`.
-#[inline(always)]
-pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
-    let middle = (from + to) * 0.5;
-    let scale = extent / (to - from);
-    let whole = nearest_whole(middle);
-    InFrames {
-        whole,
-        scale: finite_scale(scale),
-        offset: round_f32((whole - middle) * scale),
-    }
-}
-
-/// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
-#[inline(always)]
-pub(crate) fn finite_scale(scale: f64) -> f32 {
-    let largest = f64::from(f32::MAX);
-    round_f32(if scale < largest { scale } else { largest })
-}
-
-/// Key times as frames: exact ratios in f64.
-#[derive(Clone, Copy)]
-pub(crate) struct FrameClock {
-    rate: FrameRate,
-    start: f64,
-    /// Frames by which the rounding of a key's time may move it.
-    rounding: f64,
-}
-
-/// Where one span ends and the next starts.
-#[derive(Clone, Copy)]
-pub(crate) struct Boundary {
-    /// Its frame coordinate.
-    pub(crate) frame: f64,
-    /// The first whole frame not before it.
-    pub(crate) first: f64,
-}
-
-impl FrameClock {
-    /// `latest`: the largest time that will be asked for.
-    pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
-        let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
-        Self {
-            rate,
-            start,
-            rounding,
-        }
-    }
-
-    /// A time within its own rounding of a whole frame is that frame, so a sample on
-    /// a key returns the key at hour 24 too.
-    #[inline(always)]
-    pub(crate) fn boundary(self, time: f64) -> Boundary {
-        let exact = self.rate.frames_in(time - self.start);
-        let whole = nearest_whole(exact);
-        let frame = if (exact - whole).abs() <= self.rounding {
-            whole
-        } else {
-            exact
-        };
-        let first = if whole < frame { whole + 1.0 } else { whole };
-        Boundary { frame, first }
-    }
-
-    /// The first frame not before a time.
-    #[inline(always)]
-    pub(crate) fn first_frame(self, time: f64) -> usize {
-        self.boundary(time).first as usize
-    }
-
-    fn time(self, frame: usize) -> f64 {
-        self.start + self.rate.time_of(frame as u64)
     }
 }
 

@@ -116,7 +116,9 @@ impl Engine {
         output: &mut [Quat],
     ) -> Result<(), Error> {
         let layout = Layout::TrackMajor;
-        if let (Backend::Cpu(engine), true) = (&*self.backend, self.is_fused(set, layout)) {
+        if let (Backend::Cpu(engine), true) =
+            (&*self.backend, self.is_fused(set, &interpolation, layout))
+        {
             return engine.evaluate_set(set, tracks, &interpolation, timeline, output);
         }
         let own = set.select(tracks.clone());

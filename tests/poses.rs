@@ -73,7 +73,7 @@ fn a_blend_is_the_normalised_sum() {
         for (layer, weight) in &pairs {
             let own = exact(layer, place);
             let sign = if own.dot(first) < 0.0 { -1.0 } else { 1.0 };
-            sum = sum + own * (sign * f64::from(*weight));
+            sum += own * (sign * f64::from(*weight));
         }
         let off = angle_between(found.as_quats()[place].as_dquat(), sum.normalize());
         // A sign at a right angle is rounding's to choose.
@@ -116,10 +116,10 @@ fn an_added_layer_turns_the_base_on() {
                     .unwrap()
             };
             let found = agreed("add", add);
-            for track in 0..64 {
+            for (track, reference) in reference.iter().enumerate() {
                 for sample in 0..found.samples() {
                     let get = |layer: &Rotations| layer.get(track, sample).unwrap().as_dquat();
-                    let turn = reference[track].as_dquat().normalize().inverse() * get(&layers[1]);
+                    let turn = reference.as_dquat().normalize().inverse() * get(&layers[1]);
                     if turn.w.abs() < 1e-6 {
                         continue; // half a turn, either way
                     }

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use tumble::{Ends, METHODS, Method, Path};
+use tumble::{Ends, METHODS, Method, Outside, Path};
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -19,6 +19,12 @@ pub(crate) struct Manner {
         hide_default_value = true
     )]
     path: PathArgument,
+    /// What lies before the first key
+    #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
+    before: OutsideArgument,
+    /// What lies after the last key
+    #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
+    after: OutsideArgument,
     /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
     tension: f64,
@@ -60,6 +66,8 @@ impl Manner {
             path: method.path.unwrap_or(path),
             ends: ends.unwrap_or(method.ends),
             quantity: tumble::Quantity::Rotation,
+            before: self.before.into(),
+            after: self.after.into(),
             tcb: tumble::Tcb {
                 tension: self.tension,
                 continuity: self.continuity,
@@ -83,6 +91,29 @@ enum EndsArgument {
     Loop,
     /// the first and the last segment stand still
     Frozen,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum OutsideArgument {
+    /// the end value
+    Hold,
+    /// the track again
+    Loop,
+    /// the track backwards, and again
+    Mirror,
+    /// on, at the velocity of the end
+    Extrapolate,
+}
+
+impl From<OutsideArgument> for Outside {
+    fn from(outside: OutsideArgument) -> Self {
+        match outside {
+            OutsideArgument::Hold => Self::Hold,
+            OutsideArgument::Loop => Self::Loop,
+            OutsideArgument::Mirror => Self::Mirror,
+            OutsideArgument::Extrapolate => Self::Extrapolate,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

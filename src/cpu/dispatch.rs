@@ -3,13 +3,13 @@
 //! subtraction and multiplication are used, never a fused one.
 #![allow(unsafe_code)]
 
-use std::ops::Range;
 use std::str::FromStr;
 use std::sync::OnceLock;
 
 use super::evaluate::Evaluate;
 use super::row::row;
 use crate::clock::{FramesError, Timeline};
+use crate::cycle::Cycle;
 use crate::prepare::PartRef;
 use crate::segment::{ArcSegment, PolynomialSegment};
 
@@ -102,13 +102,8 @@ impl FromStr for VectorWidth {
     }
 }
 
-type RowFn<S> = unsafe fn(
-    PartRef<'_>,
-    &[S],
-    &Timeline,
-    Range<usize>,
-    &mut [[f32; 4]],
-) -> Result<(), FramesError>;
+type RowFn<S> =
+    unsafe fn(PartRef<'_>, &[S], &Timeline, &Cycle, &mut [[f32; 4]]) -> Result<(), FramesError>;
 
 /// The evaluation of one form, compiled for one width.
 #[derive(Clone, Copy)]
@@ -123,12 +118,12 @@ impl<S> Kernel<S> {
         part: PartRef<'_>,
         segments: &[S],
         timeline: &Timeline,
-        samples: Range<usize>,
+        cycle: &Cycle,
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         // SAFETY: a kernel exists only for a width that the processor has
         // (`Kernels::new`); otherwise this is a safe function.
-        unsafe { (self.row)(part, segments, timeline, samples, output) }
+        unsafe { (self.row)(part, segments, timeline, cycle, output) }
     }
 }
 
@@ -189,17 +184,17 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 macro_rules! compiled_for {
     ($width:ident, $features:literal) => {
         mod $width {
-            use super::{Evaluate, FramesError, InLanes, Kernel, PartRef, Range, Timeline};
+            use super::{Cycle, Evaluate, FramesError, InLanes, Kernel, PartRef, Timeline};
 
             #[target_feature(enable = $features)]
             fn row<S: Evaluate>(
                 part: PartRef<'_>,
                 segments: &[S],
                 timeline: &Timeline,
-                samples: Range<usize>,
+                cycle: &Cycle,
                 output: &mut [[f32; 4]],
             ) -> Result<(), FramesError> {
-                super::row(part, segments, timeline, samples, output)
+                super::row(part, segments, timeline, cycle, output)
             }
 
             #[target_feature(enable = $features)]

@@ -8,12 +8,13 @@ use rayon::prelude::*;
 use super::dispatch::{Kernels, VectorWidth};
 use super::sampled::{SampledArcs, Stretch};
 use crate::clock::{FramesError, Ticks, Timeline};
+use crate::cycle::{Cycle, Sides};
 use crate::encoding::Encoding;
 use crate::engine::Error;
+use crate::frame_clock::FrameClock;
 use crate::method::{Form, Interpolation};
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
 use crate::rotations::Layout;
-use crate::schedule::FrameClock;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
 use crate::window::Window;
@@ -149,9 +150,12 @@ impl CpuEngine {
         first: usize,
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
-        let samples = first..first + row.len();
-        clip.parts_of(track, timeline, samples.clone())
-            .try_for_each(|part| self.part(part, timeline, samples.clone(), row))
+        for cycle in clip.cycles(track, timeline, first..first + row.len()) {
+            let own = &mut row[cycle.samples.start - first..cycle.samples.end - first];
+            clip.parts_of(track, timeline, &cycle)
+                .try_for_each(|part| self.part(part, timeline, &cycle, own))?;
+        }
+        Ok(())
     }
 
     /// The samples of one part of a track.
@@ -159,17 +163,17 @@ impl CpuEngine {
         &self,
         part: PartRef<'_>,
         timeline: &Timeline,
-        samples: Range<usize>,
+        cycle: &Cycle,
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         match &part.prepared.segments {
             Segments::Arc(all) => {
                 let kernel = &self.kernels.arc;
-                kernel.row(part, all, timeline, samples, row)
+                kernel.row(part, all, timeline, cycle, row)
             }
             Segments::Polynomial(all) => {
                 let kernel = &self.kernels.polynomial;
-                kernel.row(part, all, timeline, samples, row)
+                kernel.row(part, all, timeline, cycle, row)
             }
         }
     }
@@ -211,7 +215,7 @@ impl CpuEngine {
                     preparation.push(prepared, set, tracks)?;
                     for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
                         let part = PartRef { prepared, part };
-                        self.part(part, timeline, 0..samples, row)?;
+                        self.part(part, timeline, &Cycle::own(0..samples), row)?;
                     }
                 }
                 Ok(())
@@ -316,7 +320,7 @@ pub(crate) fn is_sampled(
     interpolation: &Interpolation,
     timeline: &Timeline,
 ) -> bool {
-    let arcs = interpolation.form() == Form::Arc;
+    let arcs = interpolation.form() == Form::Arc && interpolation.sides() == Sides::default();
     arcs && timeline.len() * set.track_count() < set.key_count()
 }
 

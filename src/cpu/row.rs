@@ -1,26 +1,25 @@
 //! The samples of one track: its runs, evaluated one behind the other. Compiled as
 //! one function for each vector width, so that nothing is called for a run.
 
-use std::ops::Range;
-
 use super::evaluate::{Affine, CHUNK, Evaluate, FEW, Scratch, distances, frames, one};
 use crate::clock::{FramesError, Timeline};
+use crate::cycle::Cycle;
 use crate::numeric::round_f32;
 use crate::prepare::PartRef;
 use crate::schedule::{Distance, Emit, Run, RunSource};
 
-/// The samples of one part of a track that lie in `samples`, into `output`, which
+/// The samples of one part of a track in a cycle, into `output`, which
 /// starts with the first of them.
 #[inline(always)]
 pub(super) fn row<S: Evaluate>(
     PartRef { prepared, part }: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
-    samples: Range<usize>,
+    cycle: &Cycle,
     output: &mut [[f32; 4]],
 ) -> Result<(), FramesError> {
-    let first = samples.start;
-    if samples.len() <= FEW {
+    let first = cycle.samples.start;
+    if cycle.samples.len() <= FEW {
         let mut row = ShortRow {
             part: PartRef { prepared, part },
             segments,
@@ -28,7 +27,7 @@ pub(super) fn row<S: Evaluate>(
             first,
             output,
         };
-        return prepared.runs(part, timeline, samples, &mut row);
+        return prepared.runs(part, timeline, cycle, &mut row);
     }
     let mut row = Row {
         part: PartRef { prepared, part },
@@ -39,7 +38,7 @@ pub(super) fn row<S: Evaluate>(
         // Its own, and not borrowed: the compiler must see that it is not the output.
         scratch: Scratch::new(),
     };
-    prepared.runs(part, timeline, samples, &mut row)
+    prepared.runs(part, timeline, cycle, &mut row)
 }
 
 struct Row<'a, S> {

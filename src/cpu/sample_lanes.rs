@@ -5,9 +5,9 @@
 
 use super::dispatch::InLanes;
 use super::evaluate::{Affine, one};
+use crate::frame_clock::{FrameClock, InFrames, finite_scale, in_frames};
 use crate::numeric::{round_f32, whole_number};
 use crate::prepare::{arc, signed};
-use crate::schedule::{FrameClock, InFrames, finite_scale, in_frames};
 use crate::segment::ArcSegment;
 
 /// Samples, or intervals, worked out together.

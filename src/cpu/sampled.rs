@@ -8,9 +8,10 @@ use super::dispatch::in_lanes;
 use super::sample_lanes::{Boundaries, Dots, IN_DOUBT, LANES, SampleBlock};
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::engine::Error;
+use crate::frame_clock::{FrameClock, in_frames};
 use crate::method::{Interpolation, InterpolationError, Path};
 use crate::prepare::arc;
-use crate::schedule::{COUNTABLE, FrameClock, in_frames};
+use crate::schedule::COUNTABLE;
 use crate::tracks::{Track, TrackSet};
 
 /// Evaluates tracks; what it needs for that is kept.

@@ -90,6 +90,7 @@ impl Clip {
     ) -> Result<(), Error> {
         self.check_encoding(encoding)?;
         let timeline = self.timeline(frames)?;
+        let timeline = self.data.folded(&timeline);
         let rotation = encoding.bytes() as u64;
         let needed = (self.track_count() * timeline.len()) as u64 * rotation;
         let (Backend::Vulkan(opened), Some(buffers)) = (&*self.engine.backend, &self.buffers)

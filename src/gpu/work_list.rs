@@ -64,8 +64,9 @@ pub(super) fn work(
                     let mut push = |run| {
                         chunk.push(prepared, timeline, window, part.track, shift, &run);
                     };
-                    let samples = window.samples.clone();
-                    prepared.runs(part, timeline, samples, &mut push)?;
+                    for cycle in prepared.cycles(part, timeline, window.samples.clone()) {
+                        prepared.runs(part, timeline, &cycle, &mut push)?;
+                    }
                 }
                 Ok(chunk)
             })

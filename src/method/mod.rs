@@ -42,6 +42,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use crate::branchless::{self, Vector, length, log, unit};
+use crate::cycle::{Outside, Sides};
 use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
 use crate::tracks::{Tcb, Track};
@@ -271,14 +272,32 @@ pub struct Interpolation {
     pub tcb: Tcb,
     /// What of the rotation is asked for.
     pub quantity: Quantity,
+    /// What lies before a track's first key, and after its last.
+    pub before: Outside,
+    /// See `before`.
+    pub after: Outside,
 }
 
 impl Interpolation {
     /// What the kernels evaluate for it.
     pub fn form(&self) -> Form {
-        match self.quantity {
-            Quantity::Rotation => self.method.form,
-            _ => Form::Polynomial,
+        if self.is_by_formula() {
+            Form::Polynomial
+        } else {
+            self.method.form
+        }
+    }
+
+    /// Whether arcs too are curves with a formula: for what follows from derivatives.
+    pub(crate) fn is_by_formula(&self) -> bool {
+        let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
+        self.quantity != Quantity::Rotation || extrapolates
+    }
+
+    pub(crate) fn sides(&self) -> Sides {
+        Sides {
+            before: self.before,
+            after: self.after,
         }
     }
 }
@@ -315,6 +334,8 @@ impl From<Method> for Interpolation {
             ends: method.ends,
             tcb: Tcb::default(),
             quantity: Quantity::Rotation,
+            before: Outside::Hold,
+            after: Outside::Hold,
         }
     }
 }
@@ -425,6 +446,9 @@ pub enum InterpolationError {
         /// The first of the two keys.
         key: usize,
     },
+    /// Under [`Outside::Mirror`] velocities would change their signs from copy to copy.
+    #[error("velocities are not mirrored; hold, loop or extrapolate them")]
+    MirroredVelocity,
     /// Under [`Ends::Clamped`] a velocity is no number, or too large.
     #[error(
         "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",

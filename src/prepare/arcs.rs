@@ -222,6 +222,9 @@ impl Prepare for ArcPreparation {
                 NONE
             },
             at_end: NONE,
+            from_before: NONE,
+            from_after: NONE,
+            span: (track.times[0], track.times[track.times.len() - 1]),
         });
         for key in intervals {
             if self.block.count == LANES {

@@ -1,11 +1,15 @@
 //! A whole set, prepared: the groups of its tracks, and where each track is.
 
+use std::borrow::Cow;
 use std::ops::Range;
+
+use rayon::iter::Either;
 
 use super::set::prepare;
 use super::{Part, Prepared};
 use crate::clock::{Ticks, Timeline};
-use crate::method::{Interpolation, InterpolationError};
+use crate::cycle::{Cycle, Outside};
+use crate::method::{Interpolation, InterpolationError, Quantity};
 use crate::tracks::TrackSet;
 
 /// The prepared tracks, on the host: what every device's schedule is made from.
@@ -34,6 +38,11 @@ impl ClipData {
         interpolation: Interpolation,
         group_bytes: Option<usize>,
     ) -> Result<Self, InterpolationError> {
+        if matches!(interpolation.quantity, Quantity::Velocity(_))
+            && [interpolation.before, interpolation.after].contains(&Outside::Mirror)
+        {
+            return Err(InterpolationError::MirroredVelocity);
+        }
         let mut groups = prepare(set, &interpolation)?;
         if let Some(limit) = group_bytes {
             groups = merge(groups, limit);
@@ -71,11 +80,15 @@ impl ClipData {
         &self,
         track: usize,
         timeline: &Timeline,
-        samples: Range<usize>,
+        cycle: &Cycle,
     ) -> impl Iterator<Item = PartRef<'_>> {
+        let samples = &cycle.samples;
         let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
         let own = match timeline.ticks {
-            Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
+            _ if cycle.sign < 0.0 => {
+                return Either::Right(all.iter().rev().map(|&place| self.part(place)));
+            }
+            Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() && cycle.offset == 0.0 => {
                 let first = timeline.time(track, samples.start);
                 let last = timeline.time(track, samples.end - 1);
                 // One more on either side: a time within its rounding of a boundary
@@ -86,7 +99,34 @@ impl ClipData {
             }
             _ => all,
         };
-        own.iter().map(|&place| self.part(place))
+        Either::Left(own.iter().map(|&place| self.part(place)))
+    }
+
+    /// The copies of a track among some samples.
+    pub(crate) fn cycles(
+        &self,
+        track: usize,
+        timeline: &Timeline,
+        samples: Range<usize>,
+    ) -> Vec<Cycle> {
+        let sides = self.interpolation.sides();
+        match self.parts.get(self.tracks[track]) {
+            Some(&first) => sides.cycles(self.part(first).part.span, timeline, samples),
+            None => vec![Cycle::own(samples)],
+        }
+    }
+
+    /// The timeline, with explicit times folded into the keys of their tracks.
+    pub(crate) fn folded<'t>(&self, timeline: &'t Timeline) -> Cow<'t, Timeline> {
+        let sides = self.interpolation.sides();
+        if !sides.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
+            return Cow::Borrowed(timeline);
+        }
+        let folded = |track: usize, time: f64| match self.parts.get(self.tracks[track]) {
+            Some(&first) => sides.folded(self.part(first).part.span, time),
+            None => time,
+        };
+        Cow::Owned(timeline.map_times(self.track_count(), folded))
     }
 
     fn part(&self, (group, part): (u32, u32)) -> PartRef<'_> {

@@ -4,7 +4,7 @@ use super::motion;
 use super::shape::Shape;
 use crate::branchless::{Quaternion, dot};
 use crate::formula::Numbers;
-use crate::method::Quantity;
+use crate::method::{Axes, Quantity};
 use crate::scalar::Jet;
 
 /// What lies between two keys, or a part of it.
@@ -69,6 +69,24 @@ impl Curve {
         }
         // Straight through the middle, where there is no rotation: that just behind it.
         (self.shape.rotation)(&self.numbers, t + 1e-9)
+    }
+
+    /// What goes on from `t` at the velocity there; its parameter is seconds.
+    pub(super) fn beyond(&self, t: f64) -> Self {
+        let rotation = (self.shape.moving)(&self.numbers, Jet::parameter(t));
+        let [x, y, z, _] = motion::value(Quantity::Velocity(Axes::Body), rotation, self.rate);
+        let half = [0.5 * x, 0.5 * y, 0.5 * z];
+        let shape = Shape::ROTATION_VECTOR;
+        let mut numbers = shape.shared;
+        numbers[..4].copy_from_slice(&rotation.map(|jet| jet.value));
+        numbers[4..7].copy_from_slice(&half);
+        Self {
+            shape,
+            numbers,
+            piece: Piece::WHOLE,
+            quantity: self.quantity,
+            rate: 1.0,
+        }
     }
 
     /// The same rotations with the other sign.

@@ -31,6 +31,8 @@ pub(crate) use shape::Shape;
 
 use std::ops::Range;
 
+use crate::clock::Timeline;
+use crate::cycle::{Cycle, Sides};
 use crate::method::Interpolation;
 use crate::segment::Segments;
 
@@ -47,6 +49,8 @@ pub(crate) struct Prepared {
     pub(crate) exact: Vec<Curve>,
     pub(crate) spans: Spans,
     pub(crate) parts: Vec<Part>,
+    /// What lies outside the keys.
+    pub(crate) sides: Sides,
 }
 
 /// Stretches of tracks' time, each from its start to the start of the next one.
@@ -85,6 +89,12 @@ pub(crate) struct Part {
     pub(crate) after: u32,
     /// The constant at exactly the last key; [`NONE`] where it is `after`.
     pub(crate) at_end: u32,
+    /// The exact curves that go on before the first key and behind the last, their
+    /// parameter seconds from there; [`NONE`] where constants are held.
+    pub(crate) from_before: u32,
+    pub(crate) from_after: u32,
+    /// When the whole track starts and ends, seconds.
+    pub(crate) span: (f64, f64),
 }
 
 impl Spans {
@@ -108,6 +118,7 @@ impl Prepared {
             exact: Vec::new(),
             spans: Spans::default(),
             parts: Vec::new(),
+            sides: interpolation.sides(),
         }
     }
 
@@ -126,13 +137,11 @@ impl Prepared {
         let segments = self.segments.len() as u32;
         let exact = self.exact.len() as u32;
         let spans = self.spans.len();
-        let shift = |constant: u32| {
-            if constant == NONE {
-                NONE
-            } else {
-                constant + constants
-            }
+        let place = |own: u32, before: u32| match own {
+            NONE => NONE,
+            _ => own + before,
         };
+        let shift = |constant: u32| place(constant, constants);
         let own = &mut self.spans;
         own.starts.extend(other.spans.starts);
         own.extents.extend(other.spans.extents);
@@ -148,11 +157,23 @@ impl Prepared {
             before: shift(part.before),
             after: shift(part.after),
             at_end: shift(part.at_end),
+            from_before: place(part.from_before, exact),
+            from_after: place(part.from_after, exact),
             ..part
         }));
         self.segments.append(other.segments);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
+    }
+
+    /// The copies of a part's track among some samples.
+    pub(crate) fn cycles(
+        &self,
+        part: &Part,
+        timeline: &Timeline,
+        samples: Range<usize>,
+    ) -> Vec<Cycle> {
+        self.sides.cycles(part.span, timeline, samples)
     }
 
     fn constant(&mut self, value: [f32; 4]) -> u32 {

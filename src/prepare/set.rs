@@ -127,7 +127,7 @@ pub(crate) struct Preparation(Box<dyn Prepare>);
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self(match interpolation.method.curves {
-            Curves::Arcs(moving) if interpolation.quantity != Quantity::Rotation => {
+            Curves::Arcs(moving) if interpolation.is_by_formula() => {
                 Box::new(SmoothPreparation::new(interpolation, moving))
             }
             Curves::Arcs(_) => Box::new(ArcPreparation::new(interpolation)),

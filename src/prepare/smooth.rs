@@ -12,10 +12,11 @@ use super::set::Prepare;
 use super::{NONE, Part, Prepared};
 use crate::branchless::Vector;
 use crate::cpu::in_lanes;
+use crate::cycle::Outside;
+use crate::frame_clock::FrameClock;
 use crate::frame_rate::FrameRate;
 use crate::method::{Ends, Given, Interpolation, InterpolationError, Quantity, Smooth};
 use crate::numeric::round_quat;
-use crate::schedule::FrameClock;
 use crate::tracks::Track;
 
 /// What moves neither nor turns faster.
@@ -84,17 +85,25 @@ impl Prepare for SmoothPreparation {
         } else if meets_keys {
             prepared.constant(STILL);
         }
-        let held = |at_end: bool, key: u32| {
-            if meets_keys && at_end { key } else { NONE }
+        let held = |at_end: bool, key: u32, outside: Outside| {
+            let goes_on = self.goes_on(outside) && all > 0;
+            if meets_keys && at_end && !goes_on {
+                key
+            } else {
+                NONE
+            }
         };
         let part = prepared.parts.len();
         prepared.parts.push(Part {
             track: index,
             spans: 0..0,
             end: track.times[intervals.end],
-            before: held(intervals.start == 0, first_key),
-            after: held(intervals.end == all, last_key),
+            before: held(intervals.start == 0, first_key, self.interpolation.before),
+            after: held(intervals.end == all, last_key, self.interpolation.after),
             at_end: NONE,
+            from_before: NONE,
+            from_after: NONE,
+            span: (track.times[0], track.times[track.times.len() - 1]),
         });
         let looped = matches!(self.interpolation.ends, Ends::Loop);
         // Two keys are joined by constant velocity, whatever lies beside them.
@@ -201,6 +210,7 @@ impl SmoothPreparation {
         );
         for stretch in std::mem::take(&mut self.stretches) {
             self.end_values(prepared, &stretch);
+            self.beyond(prepared, &stretch);
             let latest = prepared.parts[stretch.part].end;
             let clock = self
                 .frames
@@ -246,9 +256,37 @@ impl SmoothPreparation {
         self.is_frozen() && at_end && stretch.all > 1
     }
 
+    /// What stands still at its ends does so outside them.
+    fn goes_on(&self, outside: Outside) -> bool {
+        outside == Outside::Extrapolate && !self.is_frozen()
+    }
+
     fn is_frozen(&self) -> bool {
         let uses_ends = self.interpolation.method.uses_neighbours;
         uses_ends && matches!(self.interpolation.ends, Ends::Frozen)
+    }
+
+    /// Where it goes on outside its keys, it does so at the velocity of its ends.
+    fn beyond(&self, prepared: &mut Prepared, stretch: &Stretch) {
+        let sides = [
+            (stretch.first(), self.interpolation.before, 0.0),
+            (stretch.last(), self.interpolation.after, 1.0),
+        ];
+        for (lane, outside, t) in sides {
+            let (Some(lane), true) = (lane, self.goes_on(outside)) else {
+                continue;
+            };
+            let quantity = self.interpolation.quantity;
+            let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
+            prepared.exact.push(curve.beyond(t));
+            let place = prepared.exact.len() as u32 - 1;
+            let part = &mut prepared.parts[stretch.part];
+            if t == 0.0 {
+                part.from_before = place;
+            } else {
+                part.from_after = place;
+            }
+        }
     }
 
     /// A curve that does not pass through its keys is held at its own ends; what is held
@@ -270,13 +308,15 @@ impl SmoothPreparation {
             Quantity::Rotation => value,
             _ => STILL,
         };
-        if let Some(lane) = stretch.first() {
+        if let (Some(lane), false) = (stretch.first(), self.goes_on(self.interpolation.before)) {
             prepared.parts[stretch.part].before = prepared.constant(held(value(lane, 0)));
         }
         if let Some(lane) = stretch.last() {
             let at_end = value(lane, 1);
-            let after = prepared.constant(held(at_end));
-            prepared.parts[stretch.part].after = after;
+            if !self.goes_on(self.interpolation.after) {
+                let after = prepared.constant(held(at_end));
+                prepared.parts[stretch.part].after = after;
+            }
             if quantity != Quantity::Rotation {
                 prepared.parts[stretch.part].at_end = prepared.constant(at_end);
             }

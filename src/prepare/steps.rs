@@ -52,6 +52,9 @@ impl Prepare for StepPreparation {
             before: if intervals.start == 0 { first } else { NONE },
             after: if intervals.end == all { last } else { NONE },
             at_end: NONE,
+            from_before: NONE,
+            from_after: NONE,
+            span: (track.times[0], track.times[track.times.len() - 1]),
         });
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], 0.0, Source::Constant(constant), NONE);

@@ -1,0 +1,81 @@
+//! A part of a track that runs backwards: its spans from the last to the first, the
+//! parameter falling.
+
+use std::ops::Range;
+
+use crate::clock::FramesError;
+use crate::frame_clock::{FrameClock, in_frames};
+use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::schedule::{COUNTABLE, Distance, Emit, Parameter, Run, RunSource, clip};
+
+impl Prepared {
+    /// The runs of one part in a copy that runs backwards, in order.
+    pub(crate) fn backward_runs(
+        &self,
+        part: &Part,
+        clock: FrameClock,
+        samples: Range<usize>,
+        emit: &mut impl Emit,
+    ) -> Result<(), FramesError> {
+        let starts = &self.spans.starts[part.spans.clone()];
+        let end = clock.boundary(part.end);
+        if part.after != NONE {
+            clip(0, end.first as usize, &samples, part.after, emit);
+        }
+        let mut from = end;
+        let mut key = if part.after == NONE { NONE } else { part.after };
+        for (j, &start) in starts.iter().enumerate().rev() {
+            let span = part.spans.start + j;
+            let to = clock.boundary(start);
+            let mut first = from.first as usize; // saturates at 0
+            if key != NONE && first as f64 == from.frame && first < to.first as usize {
+                clip(first, first + 1, &samples, key, emit);
+                first += 1;
+            }
+            let first = first.max(samples.start);
+            let last = (to.first as usize).min(samples.end);
+            if first < last {
+                let source = match self.spans.sources[span] {
+                    Source::Constant(constant) => RunSource::Constant(constant),
+                    Source::Exact(index) => RunSource::Exact {
+                        index,
+                        parameter: Parameter::Frames {
+                            start: to.frame,
+                            frames: from.frame - to.frame,
+                        },
+                    },
+                    Source::Segment(index) => {
+                        let extent = self.spans.extents[span];
+                        let run = in_frames(from.frame, to.frame, -extent);
+                        let distance = |sample: usize| sample as f64 - run.whole;
+                        if distance(first).abs() >= COUNTABLE || distance(last).abs() >= COUNTABLE {
+                            return Err(FramesError::GapTooLong {
+                                track: part.track,
+                                key: j,
+                                frames: to.frame - from.frame,
+                            });
+                        }
+                        RunSource::Segment {
+                            index,
+                            distance: Distance::Frames {
+                                first: distance(first) as i32,
+                            },
+                            scale: run.scale,
+                            offset: run.offset,
+                        }
+                    }
+                };
+                emit.run(Run {
+                    sample: first,
+                    count: last - first,
+                    source,
+                });
+            }
+            (from, key) = (to, self.spans.keys[span]);
+        }
+        if part.before != NONE {
+            clip(from.first as usize, usize::MAX, &samples, part.before, emit);
+        }
+        Ok(())
+    }
+}

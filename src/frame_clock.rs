@@ -1,0 +1,115 @@
+//! Seconds to frames, in f64: where spans start and end, and how the parameter of their
+//! samples follows.
+
+use crate::cycle::Cycle;
+use crate::frame_rate::FrameRate;
+use crate::numeric::{nearest_whole, round_f32};
+
+/// How the parameter of a span's frames follows from their numbers.
+pub(crate) struct InFrames {
+    /// The whole frame nearest to the span's middle.
+    pub(crate) whole: f64,
+    /// parameter = (frame - whole) × scale + offset
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+
+/// A span between two frame coordinates over which the parameter runs through
+/// `extent`.
+#[inline(always)]
+pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
+    let middle = (from + to) * 0.5;
+    let scale = extent / (to - from);
+    let whole = nearest_whole(middle);
+    InFrames {
+        whole,
+        scale: finite_scale(scale),
+        offset: round_f32((whole - middle) * scale),
+    }
+}
+
+/// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
+#[inline(always)]
+pub(crate) fn finite_scale(scale: f64) -> f32 {
+    let largest = f64::from(f32::MAX);
+    round_f32(if scale < largest { scale } else { largest })
+}
+
+/// Key times as frames: exact ratios in f64.
+#[derive(Clone, Copy)]
+pub(crate) struct FrameClock {
+    rate: FrameRate,
+    start: f64,
+    /// Of a copy's frame coordinates; 1 and 0 for the track itself.
+    sign: f64,
+    offset: f64,
+    /// Frames by which the rounding of a key's time may move it.
+    rounding: f64,
+}
+
+/// Where one span ends and the next starts.
+#[derive(Clone, Copy)]
+pub(crate) struct Boundary {
+    /// Its frame coordinate.
+    pub(crate) frame: f64,
+    /// The first whole frame not before it.
+    pub(crate) first: f64,
+}
+
+impl FrameClock {
+    /// `latest`: the largest time that will be asked for.
+    pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
+        let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
+        Self {
+            rate,
+            start,
+            sign: 1.0,
+            offset: 0.0,
+            rounding,
+        }
+    }
+
+    /// Whether it counts the frames of the track itself.
+    pub(crate) fn is_own(self) -> bool {
+        self.sign == 1.0 && self.offset == 0.0
+    }
+
+    pub(crate) fn frames_a_second(self) -> f64 {
+        self.rate.frames_in(1.0)
+    }
+
+    /// The frames of a copy of the track.
+    pub(crate) fn of_copy(self, cycle: &Cycle) -> Self {
+        Self {
+            sign: cycle.sign,
+            offset: cycle.offset,
+            rounding: self.rounding + 4.0 * f64::EPSILON * cycle.offset.abs(),
+            ..self
+        }
+    }
+
+    /// A time within its own rounding of a whole frame is that frame, so a sample on
+    /// a key returns the key at hour 24 too.
+    #[inline(always)]
+    pub(crate) fn boundary(self, time: f64) -> Boundary {
+        let exact = self.rate.frames_in(time - self.start) * self.sign + self.offset;
+        let whole = nearest_whole(exact);
+        let frame = if (exact - whole).abs() <= self.rounding {
+            whole
+        } else {
+            exact
+        };
+        let first = if whole < frame { whole + 1.0 } else { whole };
+        Boundary { frame, first }
+    }
+
+    /// The first frame not before a time.
+    #[inline(always)]
+    pub(crate) fn first_frame(self, time: f64) -> usize {
+        self.boundary(time).first as usize
+    }
+
+    pub(crate) fn time(self, frame: usize) -> f64 {
+        self.start + self.rate.time_of(frame as u64)
+    }
+}

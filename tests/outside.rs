@@ -1,0 +1,228 @@
+//! Before the first key and behind the last: held, again, back and forth, or on.
+
+mod support;
+
+use glam::{DQuat, DVec3, Quat};
+use support::{Random, first_difference, give_key_data, vulkan_devices};
+use tumble::reference::{Curve, angle_between};
+use tumble::{
+    Axes, Device, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside, Quantity,
+    Track, TrackSet, method,
+};
+
+const ALL: [Outside; 4] = [
+    Outside::Hold,
+    Outside::Loop,
+    Outside::Mirror,
+    Outside::Extrapolate,
+];
+
+fn set(seed: u64, keys: usize) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    for track in 0..9 {
+        let (mut times, mut quats) = (Vec::new(), Vec::new());
+        let (mut time, mut rotation) = (random.between(-1.0, 1.0), random.rotation());
+        // One, two and more keys; some at whole frames.
+        for _ in 0..[1, 2, 3, keys][track.min(3)] {
+            times.push(time);
+            quats.push(rotation.as_quat());
+            time += if track % 2 == 0 {
+                0.4
+            } else {
+                random.between(0.2, 0.9)
+            };
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 1.5));
+            rotation = (rotation * turn).normalize();
+        }
+        set.push("", &times, &quats).unwrap();
+    }
+    give_key_data(&mut set, seed);
+    set
+}
+
+/// What the words say, by the reference.
+fn expected(curve: &Curve, track: Track, sides: [Outside; 2], time: f64) -> DQuat {
+    let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
+    let length = last - first;
+    let side = if time < first { sides[0] } else { sides[1] };
+    if (first..=last).contains(&time) && !(time == last && side == Outside::Loop) || length == 0.0 {
+        return curve.rotation(time);
+    }
+    match side {
+        Outside::Hold => curve.rotation(time),
+        Outside::Loop => curve.rotation(first + (time - first).rem_euclid(length)),
+        Outside::Mirror => {
+            let place = (time - first).rem_euclid(2.0 * length);
+            curve.rotation(
+                first
+                    + if place > length {
+                        2.0 * length - place
+                    } else {
+                        place
+                    },
+            )
+        }
+        Outside::Extrapolate => {
+            let end = time.clamp(first, last);
+            let velocity: DVec3 = curve.velocity(end);
+            curve.rotation(end) * DQuat::from_scaled_axis(velocity * (time - end))
+        }
+    }
+}
+
+#[test]
+fn outside_is_what_the_words_say() {
+    let set = set(1, 11);
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut random = Random(3);
+    let times: Vec<f64> = (0..300).map(|_| random.between(-14.0, 16.0)).collect();
+    for method in METHODS {
+        for before in ALL {
+            for after in ALL {
+                let interpolation = Interpolation {
+                    before,
+                    after,
+                    ..method.into()
+                };
+                for frames in [
+                    Frames::fps(24).between(-12.0, 14.0),
+                    Frames::at(times.clone()),
+                ] {
+                    let clip = engine.upload(&set, interpolation).unwrap();
+                    let timeline = clip.timeline(&frames).unwrap();
+                    let found = clip.evaluate(&frames).unwrap();
+                    for (t, track) in set.tracks().enumerate() {
+                        let curve = Curve::of(&interpolation, track);
+                        let steps = method == method::STEP;
+                        for s in 0..found.samples() {
+                            let time = timeline.time(t, s);
+                            if (steps || before == Outside::Loop || after == Outside::Loop)
+                                && near_a_seam(track, time)
+                            {
+                                continue; // it jumps there
+                            }
+                            let expected = expected(&curve, track, [before, after], time);
+                            let off = angle_between(found.get(t, s).unwrap().as_dquat(), expected);
+                            assert!(
+                                off < 1.2e-6,
+                                "{method}, {before:?} {after:?}, track {t} at {time}: {off:e}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where rounding decides on which side of a jump a time lies.
+fn near_a_seam(track: Track, time: f64) -> bool {
+    let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
+    let length = (last - first).max(1e-300);
+    track.times.iter().any(|key| {
+        [time - key, time + key - 2.0 * first]
+            .iter()
+            .any(|distance| {
+                let place = distance.rem_euclid(length);
+                place < 1e-9 || length - place < 1e-9
+            })
+    })
+}
+
+#[test]
+fn the_same_bits_on_every_device_however_it_is_cut() {
+    // Also a track so long that it is prepared in pieces.
+    let mut long = set(5, 40);
+    let mut random = Random(9);
+    let times: Vec<f64> = (0..9000).map(|i| 0.01 * f64::from(i)).collect();
+    let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+    long.push("long", &times, &keys).unwrap();
+    let explicit = (0..400).map(|i| 0.7 * f64::from(i) - 120.0).collect();
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    for frames in [Frames::fps(12).between(-130.0, 200.0), Frames::at(explicit)] {
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::B_SPLINE] {
+            for [before, after] in [
+                [Outside::Loop, Outside::Mirror],
+                [Outside::Mirror, Outside::Loop],
+                [Outside::Extrapolate, Outside::Loop],
+                [Outside::Hold, Outside::Extrapolate],
+            ] {
+                let interpolation = Interpolation {
+                    before,
+                    after,
+                    ..method.into()
+                };
+                let expected = cpu.evaluate(&long, interpolation, &frames).unwrap();
+                let mut streamed = Vec::new();
+                let layout = Layout::TrackMajor;
+                cpu.stream(&long, interpolation, &frames, layout, 1000, |chunk| {
+                    streamed.extend_from_slice(chunk.rotations);
+                    Ok::<(), tumble::Error>(())
+                })
+                .unwrap();
+                let what = format!("{method}, {before:?} {after:?}");
+                assert_eq!(
+                    first_difference(expected.as_quats(), &streamed),
+                    None,
+                    "{what}"
+                );
+                for device in vulkan_devices() {
+                    for memory in [None, Some(50_000)] {
+                        let mut options = EngineOptions::default();
+                        options.memory = memory;
+                        let engine = Engine::with_options(device.clone(), &options).unwrap();
+                        let found = engine.evaluate(&long, interpolation, &frames).unwrap();
+                        let difference = first_difference(expected.as_quats(), found.as_quats());
+                        assert_eq!(difference, None, "{what}, {device:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// SciPy, scipy/spatial/transform/tests/test_rotation_spline.py (BSD-3-Clause): two keys
+/// are slerp, extended outside of them too, and turn at a constant rate.
+#[test]
+fn two_keys_go_on_turning() {
+    let [x, y, z] = [10.0, -20.0, 30.0].map(f64::to_radians);
+    let end = DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
+    let mut set = TrackSet::new();
+    let keys = [Quat::IDENTITY, end.as_quat()];
+    set.push("", &[0.0, 10.0], &keys).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let at = [-1.0, 5.0, 12.0];
+    for quantity in [Quantity::Rotation, Quantity::Velocity(Axes::Body)] {
+        let interpolation = Interpolation {
+            before: Outside::Extrapolate,
+            after: Outside::Extrapolate,
+            quantity,
+            ..method::C2.into()
+        };
+        let frames = Frames::at(at.to_vec());
+        let found = engine.evaluate(&set, interpolation, &frames).unwrap();
+        for (q, time) in found.as_quats().iter().zip(at) {
+            let turn = end.to_scaled_axis() / 10.0;
+            let off = match quantity {
+                Quantity::Rotation => {
+                    angle_between(q.as_dquat(), DQuat::from_scaled_axis(turn * time))
+                }
+                _ => (DVec3::new(q.x.into(), q.y.into(), q.z.into()) - turn).length(),
+            };
+            assert!(off < 3e-7, "{quantity:?} at {time}: {off:e}");
+        }
+    }
+    let mirrored = Interpolation {
+        after: Outside::Mirror,
+        quantity: Quantity::Velocity(Axes::Body),
+        ..method::C2.into()
+    };
+    let refused = engine
+        .evaluate(&set, mirrored, &Frames::fps(1))
+        .unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "velocities are not mirrored; hold, loop or extrapolate them"
+    );
+}
