@@ -74,6 +74,8 @@ mod skeleton;
 pub mod spirv;
 mod stream;
 mod tracks;
+mod transforms;
+mod vector_method;
 pub mod verify;
 mod window;
 
@@ -96,6 +98,8 @@ pub use rotations::{Layout, Rotations};
 pub use skeleton::{Skeleton, SkeletonError};
 pub use stream::Chunk;
 pub use tracks::{NORM_TOLERANCE, Tcb, Track, TrackError, TrackSet};
+pub use transforms::{Transforms, Vectors};
+pub use vector_method::{UnknownVectorMethod, VectorMethod};
 
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]

@@ -7,6 +7,7 @@
 
 mod error;
 mod key_data;
+mod vectors;
 
 use std::ops::Range;
 
@@ -14,6 +15,8 @@ pub use error::TrackError;
 use glam::{DQuat, DVec3, Quat};
 use key_data::KeyData;
 pub use key_data::Tcb;
+use vectors::VectorTracks;
+pub(crate) use vectors::{Channel, VectorTrack};
 
 use crate::numeric::{canonical, to_f64, unit_f32};
 
@@ -44,6 +47,8 @@ pub struct TrackSet {
     velocities: KeyData<DVec3>,
     tangents: KeyData<[Quat; 2]>,
     tcb: KeyData<Tcb>,
+    translations: VectorTracks,
+    scales: VectorTracks,
     /// First and last key time over all tracks.
     span: Option<(f64, f64)>,
 }
@@ -240,6 +245,9 @@ impl TrackSet {
             set.velocities.set(own, track.velocities);
             set.tangents.set(own, track.tangents);
             set.tcb.set(own, track.tcb);
+            set.translations
+                .push(self.translations.get(index).cloned().flatten());
+            set.scales.push(self.scales.get(index).cloned().flatten());
             if let Some(name) = track.name {
                 set.names.resize(set.tracks.len(), String::new());
                 set.names.push(name.to_owned());

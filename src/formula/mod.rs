@@ -6,12 +6,14 @@
 
 mod de_casteljau;
 mod hermite;
+mod line;
 mod product;
 mod rotation_vector;
 mod squad;
 
 pub(crate) use de_casteljau::DeCasteljau;
 pub(crate) use hermite::{Hermite, Linear};
+pub(crate) use line::Line;
 pub(crate) use product::Product;
 pub(crate) use rotation_vector::RotationVector;
 pub(crate) use squad::Squad;

@@ -3,14 +3,20 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use glam::Vec3;
 use rayon::iter::Either;
+use rayon::prelude::*;
 
 use super::set::prepare;
-use super::{Part, Prepared};
+use super::{Part, Prepared, vectors};
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::{Cycle, Outside};
-use crate::method::{Interpolation, InterpolationError, Quantity};
-use crate::tracks::TrackSet;
+use crate::method::{Axes, Interpolation, InterpolationError, Quantity};
+use crate::tracks::{Channel, TrackSet};
+use crate::vector_method::VectorMethod;
+
+/// Tracks whose vectors are prepared as one piece of work.
+const VECTOR_BATCH: usize = 256;
 
 /// The prepared tracks, on the host: what every device's schedule is made from.
 pub(crate) struct ClipData {
@@ -43,7 +49,46 @@ impl ClipData {
         {
             return Err(InterpolationError::MirroredVelocity);
         }
-        let mut groups = prepare(set, &interpolation)?;
+        let groups = prepare(set, &interpolation)?;
+        Ok(Self::of_groups(groups, set, interpolation, group_bytes))
+    }
+
+    /// Prepares a set's translations or scales.
+    pub(crate) fn of_vectors(
+        set: &TrackSet,
+        channel: Channel,
+        method: VectorMethod,
+        interpolation: &Interpolation,
+        group_bytes: Option<usize>,
+    ) -> Self {
+        let rest = match channel {
+            Channel::Translation => Vec3::ZERO,
+            Channel::Scale => Vec3::ONE,
+        };
+        // Vectors, as velocities are: what is for rotations is refused.
+        let interpolation = Interpolation {
+            quantity: Quantity::Velocity(Axes::World),
+            ..*interpolation
+        };
+        let batches: Vec<usize> = (0..set.track_count()).step_by(VECTOR_BATCH).collect();
+        let batch = |first: usize| {
+            let mut prepared = Prepared::new(&interpolation);
+            for index in first..set.track_count().min(first + VECTOR_BATCH) {
+                let track = set.vectors(channel, index);
+                vectors::add(&mut prepared, index, track, rest, method, &interpolation);
+            }
+            prepared
+        };
+        let groups = batches.into_par_iter().map(batch).collect();
+        Self::of_groups(groups, set, interpolation, group_bytes)
+    }
+
+    fn of_groups(
+        mut groups: Vec<Prepared>,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        group_bytes: Option<usize>,
+    ) -> Self {
         if let Some(limit) = group_bytes {
             groups = merge(groups, limit);
         }
@@ -58,13 +103,13 @@ impl ClipData {
             }
         }
         tracks.push(parts.len());
-        Ok(Self {
+        Self {
             interpolation,
             groups,
             parts,
             tracks,
             span: set.time_span(),
-        })
+        }
     }
 
     pub(crate) fn track_count(&self) -> usize {

@@ -64,7 +64,7 @@ impl Curve {
             return motion::value(self.quantity, rotation, self.rate);
         }
         let rotation = (self.shape.rotation)(&self.numbers, t);
-        if dot(rotation, rotation) > 0.5 {
+        if dot(rotation, rotation) > 0.5 || !self.shape.is_unit {
             return rotation;
         }
         // Straight through the middle, where there is no rotation: that just behind it.

@@ -182,7 +182,7 @@ impl Prepared {
     }
 }
 
-fn polynomials(prepared: &mut Prepared) -> &mut Vec<PolynomialSegment> {
+pub(super) fn polynomials(prepared: &mut Prepared) -> &mut Vec<PolynomialSegment> {
     match &mut prepared.segments {
         Segments::Polynomial(segments) => segments,
         Segments::Arc(_) => unreachable!("the method's form"),

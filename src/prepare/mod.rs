@@ -17,6 +17,7 @@ mod set;
 mod shape;
 mod smooth;
 mod steps;
+mod vectors;
 
 pub(crate) use arcs::{arc, signed};
 pub(crate) use clip_data::{ClipData, PartRef};

@@ -9,7 +9,7 @@ use super::sample::Expansion;
 use crate::branchless::Quaternion;
 use crate::cpu::{InLanes, in_lanes};
 use crate::formula::{
-    DeCasteljau, Formula, Hermite, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
+    DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
 use crate::scalar::Jet;
 
@@ -24,6 +24,8 @@ pub(crate) struct Shape {
     /// Whether it is made of exponentials alone, whose Chebyshev coefficients fall ever
     /// faster: a gentle curve's fit then needs no check.
     pub(super) entire: bool,
+    /// Whether it gives rotations.
+    pub(super) is_unit: bool,
     pub(super) rotation: fn(&Numbers, f64) -> Quaternion,
     pub(super) moving: fn(&Numbers, Jet) -> [Jet; 4],
     pub(super) fit: fn(&mut FitBlock),
@@ -36,6 +38,7 @@ impl Shape {
             shared: [0.0; NUMBERS],
             signed,
             entire: false,
+            is_unit: true,
             rotation: F::rotation::<f64>,
             moving: F::rotation::<Jet>,
             fit: fit::<Directly<F>>,
@@ -75,6 +78,11 @@ impl Shape {
     pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16, 4);
     /// [`Hermite`].
     pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16, 4);
+    /// [`Line`].
+    pub(crate) const LINE: &'static Self = &Self {
+        is_unit: false,
+        ..Self::of::<Line>(8, 2)
+    };
     /// [`RotationVector`].
     pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13, 1);
 }

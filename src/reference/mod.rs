@@ -10,9 +10,11 @@ mod curve;
 mod quaternion;
 mod segment;
 mod tangents;
+mod vector;
 
 pub use curve::{Curve, Kind};
 pub use quaternion::{
     angle_between, nlerp, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left, squad,
 };
+pub use vector::VectorCurve;

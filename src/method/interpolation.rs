@@ -1,0 +1,218 @@
+//! What can be asked of a method: the path, the ends, what lies outside, which quantity.
+
+use super::{Form, Method};
+use crate::branchless::{self, length, log, unit};
+use crate::cycle::{Outside, Sides};
+use crate::tracks::{Tcb, Track};
+
+/// A method with its options: what [`Engine::upload`](crate::Engine::upload)
+/// takes. A bare [`Method`] has the default options.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interpolation {
+    /// The method.
+    pub method: Method,
+    /// Which way round, of the two.
+    pub path: Path,
+    /// What happens at the first and the last key.
+    pub ends: Ends,
+    /// For [`KOCHANEK_BARTELS`](super::KOCHANEK_BARTELS), where a track has none of its own.
+    pub tcb: Tcb,
+    /// What of the rotation is asked for.
+    pub quantity: Quantity,
+    /// What lies before a track's first key, and after its last.
+    pub before: Outside,
+    /// See `before`.
+    pub after: Outside,
+}
+
+impl Interpolation {
+    /// What the kernels evaluate for it.
+    pub fn form(&self) -> Form {
+        if self.is_by_formula() {
+            Form::Polynomial
+        } else {
+            self.method.form
+        }
+    }
+
+    /// Whether arcs too are curves with a formula: for what follows from derivatives.
+    pub(crate) fn is_by_formula(&self) -> bool {
+        let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
+        self.quantity != Quantity::Rotation || extrapolates
+    }
+
+    pub(crate) fn sides(&self) -> Sides {
+        Sides {
+            before: self.before,
+            after: self.after,
+        }
+    }
+}
+
+/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations
+/// are vectors, `x y z` and 0 in the place of `w`; by the derivative of the formula. On
+/// a key they are those of the segment behind it, on the last key those of the last
+/// segment; before the first key and behind the last nothing moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Quantity {
+    /// The rotation, a unit quaternion.
+    #[default]
+    Rotation,
+    /// The angular velocity, radians per second.
+    Velocity(Axes),
+    /// The angular acceleration, radians per second squared.
+    Acceleration(Axes),
+}
+
+/// Whose axes a vector is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Axes {
+    /// Those of what turns.
+    Body,
+    /// Those of what it turns in: of the parent, in a chain.
+    World,
+}
+
+impl From<Method> for Interpolation {
+    fn from(method: Method) -> Self {
+        Self {
+            method,
+            path: method.path.unwrap_or_default(),
+            ends: method.ends,
+            tcb: Tcb::default(),
+            quantity: Quantity::Rotation,
+            before: Outside::Hold,
+            after: Outside::Hold,
+        }
+    }
+}
+
+/// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Path {
+    /// Each key is taken with the sign nearer to its predecessor, so no rotation
+    /// goes the long way round. Keys 180° apart keep the sign they were given.
+    #[default]
+    Shortest,
+    /// Signs as given: a dot product below zero turns the long way.
+    AsAuthored,
+}
+
+/// Dot products nearer to zero than this are rounding noise of f32 keys: the signs
+/// given decide, never the noise.
+const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
+
+impl Path {
+    /// A key counts with the other sign where its dot product with its predecessor
+    /// is below this.
+    pub(crate) fn flips_below(self) -> f64 {
+        match self {
+            Self::Shortest => -DOT_NOISE,
+            Self::AsAuthored => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Whether there is no path between keys with that dot product.
+    pub(crate) fn refuses(self, dot: f64) -> bool {
+        self == Self::AsAuthored && dot < -1.0 + f64::from(f32::EPSILON)
+    }
+}
+
+/// What happens in the first and in the last segment, where a neighbour is missing.
+/// Two keys are joined by slerp whatever the ends.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Ends {
+    /// The parabola through the last three keys: constant velocity stays constant
+    /// to the very ends.
+    #[default]
+    Parabolic,
+    /// No angular acceleration at the ends.
+    Natural,
+    /// Given angular velocities (radians per second, body frame) at the ends.
+    Clamped {
+        /// At the first key.
+        start: glam::DVec3,
+        /// At the last key.
+        end: glam::DVec3,
+    },
+    /// The angular velocity of slerp between the last two keys: constant velocity stays
+    /// constant too. [`C2`](super::C2)'s own ends.
+    Secant,
+    /// The last key repeats the first; neighbours are taken across the seam.
+    Loop,
+    /// The first and the last segment stand still, as in the original program.
+    Frozen,
+}
+
+/// How far the last key of a loop may be from the first (half-angle, radians).
+const LOOP_TOLERANCE: f64 = 1e-3;
+
+/// Radians per second at an end; more is refused.
+const FASTEST: f64 = 1e12;
+
+impl Ends {
+    /// Refuses a track, the `index`th of its set, that does not end as it must.
+    pub(crate) fn check(self, track: Track, index: usize) -> Result<(), InterpolationError> {
+        if let Self::Clamped { start, end } = self {
+            for velocity in [start, end] {
+                let speed = length(velocity.to_array());
+                if !speed.is_finite() || speed > FASTEST {
+                    return Err(InterpolationError::EndVelocity { velocity });
+                }
+            }
+        }
+        let (Self::Loop, [first, .., last]) = (self, track.keys) else {
+            return Ok(());
+        };
+        let seam = branchless::step(unit(first.to_array()), unit(last.to_array()));
+        let half_angle = length(log([seam[0], seam[1], seam[2], seam[3].abs()]));
+        if half_angle > LOOP_TOLERANCE {
+            let degrees = (2.0 * half_angle).to_degrees();
+            return Err(InterpolationError::OpenLoop {
+                track: index,
+                degrees,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Why a track cannot be interpolated as asked. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InterpolationError {
+    /// Under [`Path::AsAuthored`] neighbouring keys are each other's negative: no
+    /// great circle is defined.
+    #[error(
+        "track {track}: keys {key} and {} are opposite quaternions, between which as-authored has no path; flip one sign or use the shortest path",
+        key + 1
+    )]
+    Antipodal {
+        /// The track's place in the set.
+        track: usize,
+        /// The first of the two keys.
+        key: usize,
+    },
+    /// Under [`Outside::Mirror`] velocities would change their signs from copy to copy.
+    #[error("velocities are not mirrored; hold, loop or extrapolate them")]
+    MirroredVelocity,
+    /// Under [`Ends::Clamped`] a velocity is no number, or too large.
+    #[error(
+        "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",
+        velocity.x, velocity.y, velocity.z
+    )]
+    EndVelocity {
+        /// What was given.
+        velocity: glam::DVec3,
+    },
+    /// Under [`Ends::Loop`] the last key must repeat the first.
+    #[error(
+        "track {track}: the last key is {degrees:.3}° from the first; a loop needs the last key to repeat the first"
+    )]
+    OpenLoop {
+        /// The track's place in the set.
+        track: usize,
+        /// Angle between first and last key, degrees.
+        degrees: f64,
+    },
+}

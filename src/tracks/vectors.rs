@@ -1,0 +1,118 @@
+//! Translations and scales: keys that tracks may carry beside their rotations, at times
+//! of their own.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::{TrackError, TrackSet, check_times};
+
+/// Keys of a translation or of a scale.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct VectorTrack {
+    pub(crate) times: Vec<f64>,
+    pub(crate) keys: Vec<Vec3>,
+    /// With which the curve arrives at each key and leaves it, units a second; none where
+    /// none were given.
+    pub(crate) tangents: Vec<[Vec3; 2]>,
+}
+
+/// The vectors of a set's tracks, where they have any.
+pub(crate) type VectorTracks = Vec<Option<Arc<VectorTrack>>>;
+
+/// Which vectors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Channel {
+    Translation,
+    Scale,
+}
+
+impl TrackSet {
+    /// Gives a track translation keys, at seconds of their own, strictly increasing; with
+    /// tangents (arriving, leaving; units a second) for
+    /// [`VectorMethod::GltfCubic`](crate::VectorMethod::GltfCubic), or none.
+    ///
+    /// # Errors
+    /// When there is no such track, the lengths differ, or a number is not finite.
+    pub fn set_translations(
+        &mut self,
+        track: usize,
+        times: &[f64],
+        keys: &[Vec3],
+        tangents: &[[Vec3; 2]],
+    ) -> Result<(), TrackError> {
+        self.set_vectors(Channel::Translation, track, times, keys, tangents)
+    }
+
+    /// Gives a track scale keys; otherwise as [`TrackSet::set_translations`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_scales(
+        &mut self,
+        track: usize,
+        times: &[f64],
+        keys: &[Vec3],
+        tangents: &[[Vec3; 2]],
+    ) -> Result<(), TrackError> {
+        self.set_vectors(Channel::Scale, track, times, keys, tangents)
+    }
+
+    fn set_vectors(
+        &mut self,
+        channel: Channel,
+        track: usize,
+        times: &[f64],
+        keys: &[Vec3],
+        tangents: &[[Vec3; 2]],
+    ) -> Result<(), TrackError> {
+        let tracks = self.track_count();
+        if track >= tracks {
+            return Err(TrackError::NoSuchTrack { track, tracks });
+        }
+        check_times(track, times, keys.len())?;
+        let not_finite = |key| TrackError::DataNotFinite {
+            track,
+            key,
+            what: "vector or its tangent",
+        };
+        if !tangents.is_empty() && tangents.len() != keys.len() {
+            return Err(TrackError::DataLength {
+                track,
+                what: "tangents",
+                keys: keys.len(),
+                given: tangents.len(),
+            });
+        }
+        let bad_key = keys.iter().position(|key| !key.is_finite());
+        let is_bad = |both: &[Vec3; 2]| !both[0].is_finite() || !both[1].is_finite();
+        if let Some(key) = bad_key.or(tangents.iter().position(is_bad)) {
+            return Err(not_finite(key));
+        }
+        let own = (times[0], times[times.len() - 1]);
+        let (first, last) = self.span.unwrap_or(own);
+        self.span = Some((first.min(own.0), last.max(own.1)));
+        let vectors = match channel {
+            Channel::Translation => &mut self.translations,
+            Channel::Scale => &mut self.scales,
+        };
+        if vectors.len() < tracks {
+            vectors.resize(tracks, None);
+        }
+        vectors[track] = Some(Arc::new(VectorTrack {
+            times: times.to_vec(),
+            keys: keys.to_vec(),
+            tangents: tangents.to_vec(),
+        }));
+        Ok(())
+    }
+
+    /// The keys of a track's vectors, where it has any.
+    pub(crate) fn vectors(&self, channel: Channel, track: usize) -> Option<&VectorTrack> {
+        let vectors = match channel {
+            Channel::Translation => &self.translations,
+            Channel::Scale => &self.scales,
+        };
+        vectors.get(track)?.as_deref()
+    }
+}

@@ -1,0 +1,71 @@
+//! How translations and scales move between their keys.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A method of interpolation for vectors. What happens at the ends is as for rotations;
+/// clamped ends are at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum VectorMethod {
+    /// The key at or before the time.
+    Step,
+    /// Straight lines.
+    #[default]
+    Linear,
+    /// Cubics with tangents from the neighbouring keys; they ignore the time steps.
+    CatmullRom,
+    /// Cubics with the tangents of the parabola through three keys (Bessel, Overhauser
+    /// 1968).
+    BesselOverhauser,
+    /// glTF's CUBICSPLINE, with given tangents; 0 where none are.
+    GltfCubic,
+}
+
+impl VectorMethod {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Step,
+        Self::Linear,
+        Self::CatmullRom,
+        Self::BesselOverhauser,
+        Self::GltfCubic,
+    ];
+
+    /// The name by which programs call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Linear => "linear",
+            Self::CatmullRom => "catmull-rom",
+            Self::BesselOverhauser => "bessel-overhauser",
+            Self::GltfCubic => "gltf-cubic",
+        }
+    }
+}
+
+impl fmt::Display for VectorMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that is no method's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "there is no method `{name}` for vectors; there are step, linear, catmull-rom, bessel-overhauser, gltf-cubic"
+)]
+pub struct UnknownVectorMethod {
+    /// The name given.
+    pub name: String,
+}
+
+impl FromStr for VectorMethod {
+    type Err = UnknownVectorMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownVectorMethod> {
+        let found = Self::ALL.into_iter().find(|method| method.name() == name);
+        found.ok_or_else(|| UnknownVectorMethod {
+            name: name.to_owned(),
+        })
+    }
+}
