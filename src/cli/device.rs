@@ -144,6 +144,16 @@ impl Opened {
         self.engine.device_info().is_some()
     }
 
+    /// Chooses the device for so many rotations, where cost decides.
+    pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
+        if self.by_cost {
+            self.engine = Engine::auto(rotations)?;
+            self.label = self.engine.device_name().to_owned();
+            self.automatic = self.is_vulkan();
+        }
+        Ok(())
+    }
+
     /// Evaluates into `sink`, chunk by chunk. A device that nobody named may fail: the
     /// CPU gives the same bits, and goes on where it stopped.
     pub(crate) fn stream(
@@ -158,15 +168,9 @@ impl Opened {
             Layout::TrackMajor => 1,
             Layout::FrameMajor => set.track_count(),
         };
-        if self.by_cost {
-            let samples = frames
-                .resolve(set.track_count(), set.time_span())
-                .map_err(Error::from)?
-                .len();
-            self.engine = Engine::auto(set.track_count() * samples)?;
-            self.label = self.engine.device_name().to_owned();
-            self.automatic = self.is_vulkan();
-        }
+        let timeline = frames.resolve(set.track_count(), set.time_span());
+        let samples = timeline.map_err(Error::from)?.len();
+        self.choose(set.track_count() * samples)?;
         let chunk = CHUNK.max(row);
         let mut done = 0;
         let result = self

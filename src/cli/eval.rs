@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::formats::npy::ComponentOrder;
-use tumble::{Encoding, Interpolation, Layout, Method};
+use tumble::formats::poses::{Poses, TRANSFORM, WORLD};
+use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method, Skeleton};
 
 use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
@@ -13,8 +14,8 @@ use super::input::Inputs;
 use super::interpolation::{Manner, method};
 use super::output::{Format, ResultShape, Target};
 use super::time::{Samples, Sampling};
-use super::what::What;
-use super::{input, output, signals, words};
+use super::what::{PoseKind, What};
+use super::{input, output, room, signals, words};
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -180,6 +181,9 @@ impl Arguments {
             order: self.order.into(),
             encoding: self.what.encoding(self.encoding.into()),
         };
+        if let Some(kind) = self.what.poses() {
+            return self.poses(device, &result, &frames, kind, target);
+        }
         let started = Instant::now();
         let interpolation = Interpolation {
             quantity: self.what.quantity(),
@@ -188,14 +192,87 @@ impl Arguments {
         target.write_rotations(&result, |sink| {
             device.stream(&set, interpolation, &frames, layout, sink)
         })?;
+        self.tell(device, &result, target, started);
+        Ok(())
+    }
+
+    /// Whole poses, `[frame][track]`: of the boxes of a chain, each of which hangs at the
+    /// end of the one before it.
+    fn poses(
+        &self,
+        device: &mut Opened,
+        result: &ResultShape<'_>,
+        frames: &Frames,
+        kind: PoseKind,
+        target: &Target,
+    ) -> Result<(), Failure> {
+        let ResultShape {
+            name,
+            set,
+            timeline,
+            ..
+        } = *result;
+        // The rotations, and twice what becomes of them.
+        room::in_memory(name, set, frames, 5)?;
+        let started = Instant::now();
+        let interpolation = self.manner.with(self.method);
+        let length = set.box_length().unwrap_or(0.0);
+        let evaluated = device
+            .choose(set.track_count() * timeline.len())
+            .and_then(|()| {
+                let engine = &device.engine;
+                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+                match kind {
+                    PoseKind::World => {
+                        let chain = Skeleton::chain(set.track_count(), length);
+                        let world = engine.world(&local, &chain)?;
+                        let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
+                            let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
+                            [px, py, pz, x, y, z, w]
+                        });
+                        Ok(numbers.collect::<Vec<f32>>())
+                    }
+                    PoseKind::Transform => {
+                        let hung = |place: usize| match place % set.track_count() {
+                            0 => 0.0,
+                            _ => -length as f32,
+                        };
+                        let quats = local.as_quats().iter().enumerate();
+                        let numbers = quats.flat_map(|(place, q)| {
+                            [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
+                        });
+                        Ok(numbers.collect())
+                    }
+                }
+            });
+        let numbers = evaluated.map_err(|error: Error| Failure::evaluating(name, &error))?;
+        let components: &[&str] = match kind {
+            PoseKind::World => &WORLD,
+            PoseKind::Transform => &TRANSFORM,
+        };
+        let poses = Poses {
+            set,
+            timeline,
+            components,
+            numbers: &numbers,
+        };
+        target.write(None, |out| match target.format() {
+            Format::Csv => poses.write_csv(out),
+            Format::Npy | Format::Dat => poses.write_npy(out),
+        })?;
+        self.tell(device, result, target, started);
+        Ok(())
+    }
+
+    fn tell(&self, device: &Opened, result: &ResultShape<'_>, target: &Target, started: Instant) {
         words::note(&format!(
-            "{name}: {} × {}, {}, on {} in {} → {target}",
-            words::count(set.track_count(), "track"),
-            words::count(timeline.len(), "frame"),
+            "{}: {} × {}, {}, on {} in {} → {target}",
+            result.name,
+            words::count(result.set.track_count(), "track"),
+            words::count(result.timeline.len(), "frame"),
             self.method,
             device.label,
             words::duration(started.elapsed()),
         ));
-        Ok(())
     }
 }

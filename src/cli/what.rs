@@ -41,6 +41,10 @@ enum Output {
     Velocity,
     /// angular acceleration, rad/s²
     Acceleration,
+    /// (frames, tracks, 10): translation x y z, rotation x y z w, scale x y z
+    Transform,
+    /// (frames, tracks, 7): where each box hangs, and how it is turned in the world
+    World,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -59,6 +63,13 @@ enum AxesArgument {
     World,
 }
 
+/// What whole poses hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PoseKind {
+    Transform,
+    World,
+}
+
 fn sequence(name: &str) -> Result<EulerSequence, String> {
     name.parse().map_err(|_| {
         "give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
@@ -74,12 +85,21 @@ impl What {
             Major::Column => MatrixOrder::ColumnMajor,
         };
         match self.output {
-            Output::Quaternion => components,
+            Output::Quaternion | Output::Transform | Output::World => components,
             Output::AxisAngle => Encoding::AxisAngle,
             Output::Matrix => Encoding::Matrix3x3(order),
             Output::Matrix3x4 => Encoding::Matrix3x4(order),
             Output::Euler => Encoding::Euler(self.sequence),
             Output::Velocity | Output::Acceleration => Encoding::Vector,
+        }
+    }
+
+    /// Whether whole poses are written, and which.
+    pub(crate) fn poses(self) -> Option<PoseKind> {
+        match self.output {
+            Output::Transform => Some(PoseKind::Transform),
+            Output::World => Some(PoseKind::World),
+            _ => None,
         }
     }
 

@@ -7,6 +7,7 @@ mod lines;
 pub mod npy;
 mod number;
 pub mod output;
+pub mod poses;
 mod source;
 pub mod times;
 
