@@ -91,7 +91,7 @@ pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
 pub use method::{
     Axes, Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
-    Quantity,
+    Quantity, Speed,
 };
 pub use poses::WorldPoses;
 pub use rotations::{Layout, Rotations};

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use tumble::{Ends, METHODS, Method, Outside, Path};
+use tumble::{Ends, METHODS, Method, Outside, Path, Speed};
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -19,6 +19,9 @@ pub(crate) struct Manner {
         hide_default_value = true
     )]
     path: PathArgument,
+    /// How fast the curve is run through
+    #[arg(long, value_name = "SPEED", default_value = "as-keyed")]
+    speed: SpeedArgument,
     /// What lies before the first key
     #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
     before: OutsideArgument,
@@ -66,6 +69,10 @@ impl Manner {
             path: method.path.unwrap_or(path),
             ends: ends.unwrap_or(method.ends),
             quantity: tumble::Quantity::Rotation,
+            speed: match self.speed {
+                SpeedArgument::AsKeyed => Speed::AsKeyed,
+                SpeedArgument::Constant => Speed::Constant,
+            },
             before: self.before.into(),
             after: self.after.into(),
             tcb: tumble::Tcb {
@@ -91,6 +98,14 @@ enum EndsArgument {
     Loop,
     /// the first and the last segment stand still
     Frozen,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SpeedArgument {
+    /// as the key times say
+    AsKeyed,
+    /// at one angular speed all the way
+    Constant,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -19,6 +19,8 @@ pub struct Interpolation {
     pub tcb: Tcb,
     /// What of the rotation is asked for.
     pub quantity: Quantity,
+    /// How fast the curve is run through.
+    pub speed: Speed,
     /// What lies before a track's first key, and after its last.
     pub before: Outside,
     /// See `before`.
@@ -38,7 +40,8 @@ impl Interpolation {
     /// Whether arcs too are curves with a formula: for what follows from derivatives.
     pub(crate) fn is_by_formula(&self) -> bool {
         let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
-        self.quantity != Quantity::Rotation || extrapolates
+        let constant = self.speed == Speed::Constant;
+        self.quantity != Quantity::Rotation || extrapolates || constant
     }
 
     pub(crate) fn sides(&self) -> Sides {
@@ -64,6 +67,18 @@ pub enum Quantity {
     Acceleration(Axes),
 }
 
+/// How fast a track runs through its curve; no effect on [`STEP`](super::STEP).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Speed {
+    /// As the key times say.
+    #[default]
+    AsKeyed,
+    /// At one angular speed from the first key to the last (by arc length): the way is the
+    /// same, but inner keys are met when they are reached. Preparing takes some hundred
+    /// microseconds a key.
+    Constant,
+}
+
 /// Whose axes a vector is given in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axes {
@@ -81,6 +96,7 @@ impl From<Method> for Interpolation {
             ends: method.ends,
             tcb: Tcb::default(),
             quantity: Quantity::Rotation,
+            speed: Speed::AsKeyed,
             before: Outside::Hold,
             after: Outside::Hold,
         }

@@ -29,7 +29,7 @@ pub use c2::C2;
 pub use catmull_rom::CATMULL_ROM;
 pub use gltf_cubic::GLTF_CUBIC;
 pub use hermite::HERMITE;
-pub use interpolation::{Axes, Ends, Interpolation, InterpolationError, Path, Quantity};
+pub use interpolation::{Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed};
 pub use kochanek_bartels::KOCHANEK_BARTELS;
 pub use nlerp::NLERP;
 pub use shoemake::SHOEMAKE;

@@ -1,6 +1,9 @@
 //! A curve in f64, and the part of it that is fitted.
 
+use std::sync::Arc;
+
 use super::motion;
+use super::pace::Pace;
 use super::shape::Shape;
 use crate::branchless::{Quaternion, dot};
 use crate::formula::Numbers;
@@ -8,7 +11,7 @@ use crate::method::{Axes, Quantity};
 use crate::scalar::Jet;
 
 /// What lies between two keys, or a part of it.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Curve {
     pub(super) shape: &'static Shape,
     pub(super) numbers: Numbers,
@@ -16,6 +19,8 @@ pub(crate) struct Curve {
     pub(super) quantity: Quantity,
     /// Of the parameter, per second.
     pub(super) rate: f64,
+    /// Where it is run through at constant speed.
+    pub(super) pace: Option<Arc<Pace>>,
 }
 
 /// The part of an interval that is fitted: where it starts, and its length, in
@@ -59,8 +64,12 @@ impl Curve {
 
     /// What is asked for at `t`, 0 to 1 over its interval.
     pub(super) fn value_at(&self, t: f64) -> Quaternion {
-        if self.quantity != Quantity::Rotation {
-            let rotation = (self.shape.moving)(&self.numbers, Jet::parameter(t));
+        if self.quantity != Quantity::Rotation || self.pace.is_some() {
+            let parameter = match &self.pace {
+                Some(pace) => pace.parameter(self, t),
+                None => Jet::parameter(t),
+            };
+            let rotation = self.moving(parameter);
             return motion::value(self.quantity, rotation, self.rate);
         }
         let rotation = (self.shape.rotation)(&self.numbers, t);
@@ -73,7 +82,7 @@ impl Curve {
 
     /// What goes on from `t` at the velocity there; its parameter is seconds.
     pub(super) fn beyond(&self, t: f64) -> Self {
-        let rotation = (self.shape.moving)(&self.numbers, Jet::parameter(t));
+        let rotation = self.moving(Jet::parameter(t));
         let [x, y, z, _] = motion::value(Quantity::Velocity(Axes::Body), rotation, self.rate);
         let half = [0.5 * x, 0.5 * y, 0.5 * z];
         let shape = Shape::ROTATION_VECTOR;
@@ -86,7 +95,13 @@ impl Curve {
             piece: Piece::WHOLE,
             quantity: self.quantity,
             rate: 1.0,
+            pace: None,
         }
+    }
+
+    /// The rotation and its derivatives.
+    pub(super) fn moving(&self, parameter: Jet) -> [Jet; 4] {
+        (self.shape.moving)(&self.numbers, parameter)
     }
 
     /// The same rotations with the other sign.

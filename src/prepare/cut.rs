@@ -21,7 +21,7 @@ pub(super) struct Cutter {
 }
 
 /// A part of a curve.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Part {
     /// The interval that the curve is of.
     pub(super) interval: usize,
@@ -46,10 +46,22 @@ impl Cutter {
         for piece in curve.piece.halves() {
             self.waiting.push(Part {
                 interval,
-                curve: Curve { piece, ..curve },
+                curve: Curve {
+                    piece,
+                    ..curve.clone()
+                },
                 segment: None,
             });
         }
+    }
+
+    /// Adds the curve of an interval, to be cut where it does not fit whole.
+    pub(super) fn push_whole(&mut self, interval: usize, curve: Curve) {
+        self.waiting.push(Part {
+            interval,
+            curve,
+            segment: None,
+        });
     }
 
     /// The parts of the curves given since the last call.

@@ -7,9 +7,12 @@
 //! their sum, that of a power found directly would not.
 
 use super::curve::{Curve, Piece};
+use std::sync::Arc;
+
 use super::intervals::{Intervals, LANES};
 use super::motion;
 use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
+use super::pace::Pace;
 use super::shape::Shape;
 use crate::formula::{NUMBERS, Numbers};
 use crate::method::Quantity;
@@ -68,6 +71,8 @@ pub(super) struct FitBlock {
     pub(super) widths: Lane64,
     /// Of the parameter, per second.
     rates: Lane64,
+    /// Of curves that are run through at constant speed; for all of a block's, or none.
+    paces: Vec<Option<Arc<Pace>>>,
     pub(super) quantity: Quantity,
     count: usize,
     /// The coefficients of each power, for every lane.
@@ -108,6 +113,7 @@ impl FitBlock {
             middles: lane,
             widths: lane,
             rates: lane,
+            paces: Vec::new(),
             quantity,
             count: 0,
             coefficients: [[[0.0; 4]; LANES]; COEFFICIENTS],
@@ -126,6 +132,7 @@ impl FitBlock {
 
     pub(super) fn clear(&mut self) {
         self.count = 0;
+        self.paces.clear();
     }
 
     /// Lanes to work out: whole vectors, or those left over would be done one by one.
@@ -142,6 +149,9 @@ impl FitBlock {
             lanes[lane] = number;
         }
         self.rates[lane] = curve.rate;
+        if curve.pace.is_some() {
+            self.paces.push(curve.pace.clone());
+        }
         self.push_piece(curve.piece);
     }
 
@@ -177,6 +187,7 @@ impl FitBlock {
             piece: Piece::WHOLE,
             quantity: self.quantity,
             rate: self.rates[lane],
+            pace: self.paces.get(lane).cloned().flatten(),
         }
     }
 
@@ -184,7 +195,7 @@ impl FitBlock {
     pub(super) fn run(&mut self) {
         match self.quantity {
             _ if self.count == 0 => {}
-            Quantity::Rotation => (self.shape.fit)(self),
+            Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self),
             _ => motion::fit(self),
         }
     }
@@ -195,7 +206,8 @@ impl FitBlock {
     }
 
     fn is_entire(&self) -> bool {
-        self.shape.entire && self.quantity == Quantity::Rotation
+        let of_rotations = self.quantity == Quantity::Rotation && self.paces.is_empty();
+        self.shape.entire && of_rotations
     }
 
     /// Multiplies every lane's polynomial.

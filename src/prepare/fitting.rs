@@ -3,6 +3,7 @@
 
 use bytemuck::Zeroable;
 
+use super::curve::Curve;
 use super::cut::{Cutter, Part as CurvePart};
 use super::fit::{FitBlock, Tier, tier};
 use super::intervals::Intervals;
@@ -104,6 +105,13 @@ impl Fitting {
         }
     }
 
+    /// Adds an interval with any curve.
+    pub(super) fn push_curve(&mut self, place: Place, curve: Curve) {
+        self.cutter.push_whole(self.intervals.len(), curve);
+        let source = CurveSource::Parts(None);
+        self.intervals.push(Fitted { place, source });
+    }
+
     /// Fits the curves of a queue.
     fn run(&mut self, tier: Tier, prepared: &mut Prepared) {
         let queue = match tier {
@@ -169,7 +177,7 @@ impl Fitting {
 impl Prepared {
     fn part_source(&mut self, part: &CurvePart, spare: &mut Option<u32>) -> Source {
         let Some(segment) = part.segment else {
-            self.exact.push(part.curve);
+            self.exact.push(part.curve.clone());
             return Source::Exact(self.exact.len() as u32 - 1);
         };
         let segments = polynomials(self);

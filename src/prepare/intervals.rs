@@ -226,6 +226,7 @@ impl Intervals {
             piece: Piece::WHOLE,
             quantity,
             rate: self.rate(lane),
+            pace: None,
         }
     }
 

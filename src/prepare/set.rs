@@ -10,7 +10,7 @@ use super::steps::StepPreparation;
 use super::{NONE, Prepared};
 use crate::clock::{Ticks, Timeline};
 use crate::frame_rate::FrameRate;
-use crate::method::{Curves, Ends, Interpolation, InterpolationError, Quantity};
+use crate::method::{Curves, Ends, Interpolation, InterpolationError, Quantity, Speed};
 use crate::numeric::canonical;
 use crate::tracks::{Track, TrackSet};
 
@@ -27,7 +27,9 @@ pub(super) fn prepare(
         .into_par_iter()
         .map(|tracks| {
             let mut prepared = Prepared::new(interpolation);
-            if let Some(long) = tracks.clone().next().filter(|_| tracks.len() == 1) {
+            let alone = tracks.clone().next().filter(|_| tracks.len() == 1);
+            let in_pieces = interpolation.speed == Speed::AsKeyed;
+            if let (Some(long), true) = (alone, in_pieces) {
                 return prepare_long(set, long, interpolation);
             }
             Preparation::new(interpolation).push(&mut prepared, set, tracks)?;

@@ -8,6 +8,7 @@ use glam::Quat;
 use super::fitting::{Fitting, Place};
 use super::intervals::{Intervals, LANES, Stretch};
 use super::passes::Steps;
+use super::retime::Waiting;
 use super::set::Prepare;
 use super::{NONE, Part, Prepared};
 use crate::branchless::Vector;
@@ -15,7 +16,7 @@ use crate::cpu::in_lanes;
 use crate::cycle::Outside;
 use crate::frame_clock::FrameClock;
 use crate::frame_rate::FrameRate;
-use crate::method::{Ends, Given, Interpolation, InterpolationError, Quantity, Smooth};
+use crate::method::{Ends, Given, Interpolation, InterpolationError, Quantity, Smooth, Speed};
 use crate::numeric::round_quat;
 use crate::tracks::Track;
 
@@ -36,6 +37,8 @@ pub(crate) struct SmoothPreparation {
     intervals: Intervals,
     stretches: Vec<Stretch>,
     fitting: Fitting,
+    /// Curves that are to be run through at constant speed.
+    waiting: Waiting,
     /// What the signs of the keys so far make of the next.
     sign: f64,
     /// Where only intervals with a frame are wanted: the frames' rate and start.
@@ -54,6 +57,7 @@ impl SmoothPreparation {
             intervals: Intervals::new(path.flips_below()),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
+            waiting: Waiting::default(),
             sign: 1.0,
             frames: None,
         }
@@ -149,6 +153,7 @@ impl Prepare for SmoothPreparation {
 
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
         self.flush(prepared)?;
+        self.waiting.finish(prepared, &mut self.fitting);
         self.fitting.finish(prepared);
         Ok(self.sign as f32)
     }
@@ -230,7 +235,13 @@ impl SmoothPreparation {
                 let is_empty = |clock: FrameClock| {
                     clock.first_frame(place.start) == clock.first_frame(place.end)
                 };
-                if clock.is_some_and(is_empty) {
+                if self.interpolation.speed == Speed::Constant {
+                    let moves = !self.holds(&stretch, lane);
+                    let quantity = self.interpolation.quantity;
+                    let curve =
+                        moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
+                    self.waiting.push(place, curve);
+                } else if clock.is_some_and(is_empty) {
                     self.fitting.push_constant(place, NONE);
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);

@@ -112,6 +112,7 @@ fn line(from: DVec3, slope: DVec3) -> Curve {
         piece: Piece::WHOLE,
         quantity: Quantity::Rotation,
         rate: 1.0,
+        pace: None,
     }
 }
 

@@ -5,10 +5,11 @@ use glam::{DQuat, DVec3, Quat};
 
 use super::b_spline::b_spline;
 use super::c2;
+use super::pace::Pace;
 use super::quaternion::{exponential, invert, logarithm, multiply};
 use super::segment::{Basis, Segment};
 use super::tangents::Track;
-use crate::method::{Ends, Interpolation, Path};
+use crate::method::{Ends, Interpolation, Path, Speed};
 use crate::tracks;
 
 /// Which textbook curve.
@@ -50,6 +51,8 @@ pub enum Kind {
 pub struct Curve {
     track: Track,
     segments: Vec<Segment>,
+    /// Where it is run through at constant speed.
+    pace: Option<Pace>,
 }
 
 impl Curve {
@@ -74,7 +77,12 @@ impl Curve {
             [] => vec![interpolation.tcb; track.keys.len()],
             given => given.to_vec(),
         };
-        Self::build(kind, interpolation.ends, own)
+        let mut curve = Self::build(kind, interpolation.ends, own);
+        if interpolation.speed == Speed::Constant && kind != Kind::Step {
+            let pace = Pace::new(&curve.segments);
+            curve.pace = (pace.total() > 0.0).then_some(pace);
+        }
+        curve
     }
 
     fn build(kind: Kind, ends: Ends, track: Track) -> Self {
@@ -85,7 +93,11 @@ impl Curve {
         let segments = (0..track.last())
             .map(|i| segment(&track, kind, ends, i, &velocities))
             .collect();
-        Self { track, segments }
+        Self {
+            track,
+            segments,
+            pace: None,
+        }
     }
 
     /// The rotation at a time in seconds; before the first key and after the last
@@ -108,15 +120,36 @@ impl Curve {
     /// The angular velocity in the body frame, radians per second; zero outside the
     /// keys. At a key it is that of the later segment.
     pub fn velocity(&self, time: f64) -> DVec3 {
-        self.inside(time)
-            .map_or(DVec3::ZERO, |(i, t)| self.segment_velocity(i, t))
+        let Some((i, t)) = self.inside(time) else {
+            return DVec3::ZERO;
+        };
+        match &self.pace {
+            Some(pace) => {
+                let direction = self.segments[i].velocity(t).normalize_or_zero();
+                direction * (pace.total() / self.duration())
+            }
+            None => self.segment_velocity(i, t),
+        }
     }
 
     /// The angular acceleration in the body frame, radians per second squared; zero
     /// outside the keys. At a key it is that of the later segment.
     pub fn acceleration(&self, time: f64) -> DVec3 {
-        self.inside(time)
-            .map_or(DVec3::ZERO, |(i, t)| self.segment_acceleration(i, t))
+        let Some((i, t)) = self.inside(time) else {
+            return DVec3::ZERO;
+        };
+        let Some(pace) = &self.pace else {
+            return self.segment_acceleration(i, t);
+        };
+        // Only the direction changes.
+        let speed = pace.total() / self.duration();
+        let (velocity, bend) = (
+            self.segments[i].velocity(t),
+            self.segments[i].acceleration(t),
+        );
+        let direction = velocity.normalize_or_zero();
+        let rate = speed / velocity.length();
+        (bend - direction * bend.dot(direction)) * rate * rate
     }
 
     /// The angular velocity at parameter `t` of segment `i`; both sides of a key
@@ -136,8 +169,17 @@ impl Curve {
         (last > 0 && (times[0]..=times[last]).contains(&time)).then(|| self.locate(time))
     }
 
+    /// Seconds from the first key to the last.
+    fn duration(&self) -> f64 {
+        self.track.times[self.track.last()] - self.track.times[0]
+    }
+
     fn locate(&self, time: f64) -> (usize, f64) {
         let times = &self.track.times;
+        if let Some(pace) = &self.pace {
+            let part = (time - times[0]) / self.duration();
+            return pace.place(&self.segments, part.clamp(0.0, 1.0));
+        }
         let after = times.partition_point(|&key| key <= time);
         let i = after.saturating_sub(1).min(self.track.last() - 1);
         (i, (time - times[i]) / self.track.step(i))

@@ -7,6 +7,7 @@
 mod b_spline;
 mod c2;
 mod curve;
+mod pace;
 mod quaternion;
 mod segment;
 mod tangents;

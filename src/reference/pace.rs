@@ -1,0 +1,59 @@
+//! A curve at constant speed: how long it is, and where it is after a part of that.
+
+use super::segment::Segment;
+
+/// Panels of each segment; each is integrated by three points of Gauss.
+const PANELS: usize = 256;
+
+/// Lengths of curves, radians.
+pub(super) struct Pace {
+    /// How far the curve has turned at the end of every panel of every segment.
+    lengths: Vec<f64>,
+}
+
+impl Pace {
+    pub(super) fn new(segments: &[Segment]) -> Self {
+        let mut lengths = vec![0.0];
+        for segment in segments {
+            for panel in 0..PANELS {
+                let [from, to] = [panel, panel + 1].map(|panel| panel as f64 / PANELS as f64);
+                let before = lengths[lengths.len() - 1];
+                lengths.push(before + turned(segment, from, to));
+            }
+        }
+        Self { lengths }
+    }
+
+    pub(super) fn total(&self) -> f64 {
+        self.lengths[self.lengths.len() - 1]
+    }
+
+    /// The segment, and its parameter, where the curve has turned by that part of its
+    /// length, 0 to 1.
+    pub(super) fn place(&self, segments: &[Segment], part: f64) -> (usize, f64) {
+        let target = part * self.total();
+        let panels = self.lengths.len() - 1;
+        let after = self.lengths.partition_point(|&length| length <= target);
+        let panel = after.saturating_sub(1).min(panels - 1);
+        let segment = panel / PANELS;
+        let from = (panel % PANELS) as f64 / PANELS as f64;
+        let rest = target - self.lengths[panel];
+        let (mut low, mut high) = (from, from + 1.0 / PANELS as f64);
+        for _ in 0..60 {
+            let middle = (low + high) / 2.0;
+            if turned(&segments[segment], from, middle) < rest {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (segment, (low + high) / 2.0)
+    }
+}
+
+fn turned(segment: &Segment, from: f64, to: f64) -> f64 {
+    let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
+    let speed = |x: f64| segment.velocity(middle + half * x).length();
+    let far = 0.6f64.sqrt();
+    half * (5.0 * speed(-far) + 8.0 * speed(0.0) + 5.0 * speed(far)) / 9.0
+}
