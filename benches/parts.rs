@@ -4,7 +4,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
-use tumble::{Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, TrackSet};
+use tumble::{Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, TrackSet, method};
 
 fn main() {
     divan::main();
@@ -34,14 +34,23 @@ fn one_thread() -> Engine {
     Engine::with_options(Device::Cpu, &options).expect("a CPU")
 }
 
-/// Keys to segments, per key; steps of 3 degrees are motion capture's, of 60 an
-/// animator's.
-#[divan::bench(args = [0.05, 1.0])]
-fn prepare(bencher: Bencher<'_, '_>, step: f32) {
-    let (engine, set) = (one_thread(), set(step));
+/// Keys to segments, per key, for each method.
+#[divan::bench(args = METHODS.map(|method| method.name))]
+fn prepare(bencher: Bencher<'_, '_>, method: &str) {
+    let method = tumble::Method::named(method).expect("in the list");
+    let (engine, set) = (one_thread(), set(1.0));
     bencher
         .counter(ItemsCount::new(TRACKS * KEYS))
-        .bench(|| engine.upload(&set, METHODS[2]));
+        .bench(|| engine.upload(&set, method));
+}
+
+/// The same for Bessel-Overhauser with steps of 3 degrees, which are motion capture's.
+#[divan::bench]
+fn prepare_gentle(bencher: Bencher<'_, '_>) {
+    let (engine, set) = (one_thread(), set(0.05));
+    bencher
+        .counter(ItemsCount::new(TRACKS * KEYS))
+        .bench(|| engine.upload(&set, method::BESSEL_OVERHAUSER));
 }
 
 /// Segments to rotations, per rotation, for each method.

@@ -90,8 +90,8 @@ pub use euler::{EulerSequence, UnknownSequence};
 pub use frame_rate::FrameRate;
 pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
 pub use method::{
-    Axes, Continuity, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method, Path,
-    Quantity, Speed,
+    Axes, Continuity, Cost, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method,
+    Path, Quantity, Speed,
 };
 pub use poses::WorldPoses;
 pub use rotations::{Layout, Rotations};

@@ -10,9 +10,10 @@ use tumble::{
     Transfer, VectorWidth, method,
 };
 
-const ENDS: [Ends; 4] = [
+const ENDS: [Ends; 5] = [
     Ends::Parabolic,
     Ends::Natural,
+    Ends::Secant,
     Ends::Clamped {
         start: DVec3::new(1.0, -2.0, 0.5),
         end: DVec3::ZERO,

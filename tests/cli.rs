@@ -376,3 +376,71 @@ fn bench_measures_every_workload_in_one_run() {
         }
     }
 }
+
+/// Every output, as NPY and as CSV: its shape, and that it says what it holds.
+#[test]
+fn outputs_have_their_shapes_and_names() {
+    let place = sample_folder();
+    for (output, shape, first) in [
+        ("quaternion", vec![2, 3, 4], "box1.w"),
+        ("axis-angle", vec![2, 3, 4], "box1.x"),
+        ("matrix", vec![2, 3, 3, 3], "box1.m00"),
+        ("matrix-3x4", vec![2, 3, 3, 4], "box1.m00"),
+        ("euler", vec![2, 3, 3], "box1.x1"),
+        ("velocity", vec![2, 3, 3], "box1.x"),
+        ("acceleration", vec![2, 3, 3], "box1.x"),
+        ("transform", vec![3, 2, 10], "box1.tx"),
+        ("world", vec![3, 2, 7], "box1.px"),
+    ] {
+        let of = |out: &str| {
+            let line = [
+                "eval",
+                "a.dat",
+                "--output",
+                output,
+                "--fps",
+                "1",
+                "--overwrite",
+                "-o",
+                out,
+            ];
+            succeed(place.path(), &line);
+            fs::read(place.path().join(out)).unwrap()
+        };
+        let (found, numbers) = read_npy(&of("out.npy"));
+        assert_eq!(found, shape, "{output}");
+        let text = String::from_utf8(of("out.csv")).unwrap();
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert_eq!((lines.len(), lines[0][2]), (4, first), "{output}");
+        // The last frame of the first track: the same bits in both.
+        let each = numbers.len() / 6;
+        let start = if shape[0] == 3 { 4 * each } else { 2 * each };
+        let mut own = numbers[start..start + each].to_vec();
+        if output == "quaternion" {
+            own.rotate_right(1);
+        }
+        let written = lines[3][2..2 + each]
+            .iter()
+            .map(|number| number.parse().unwrap());
+        assert_eq!(bits(written), own, "{output}");
+    }
+    for (wrong, says) in [
+        (
+            ["--output", "euler", "--sequence", "XXY"],
+            "no two neighbours the same",
+        ),
+        (
+            ["--output", "matrix", "--encoding", "f16"],
+            "for quaternions",
+        ),
+        (
+            ["--output", "velocity", "--after", "mirror"],
+            "not mirrored",
+        ),
+    ] {
+        let line = [&["eval", "a.dat", "-o", "no.npy"][..], &wrong].concat();
+        let refused = run(place.path(), &line);
+        assert!(refused.words.contains(says), "{}", refused.words);
+        assert!(!place.path().join("no.npy").exists());
+    }
+}

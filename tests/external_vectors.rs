@@ -328,7 +328,6 @@ fn rpy(angle: f64) -> DQuat {
 /// missing it takes log(1) = 0 for it; a last key equal to the first closes the curve.
 #[test]
 fn gz_math_squad() {
-    // log(q_0⁻¹ q_1) of helpers that all turn about one axis is half of the step.
     let helper = |key: DQuat, neighbours: &[DQuat]| {
         let log = |to: &DQuat| (key.inverse() * *to).to_scaled_axis();
         let sum: DVec3 = neighbours.iter().map(log).sum();
@@ -341,7 +340,6 @@ fn gz_math_squad() {
     assert_near(found, [0.998089, 0.0315333, 0.0427683, 0.0315333], 1e-5);
     let found = squad([b, helper(b, &[a, c]), helper(c, &[b]), c], 0.2);
     assert_near(found, [0.978787, 0.107618, 0.137159, 0.107618], 1e-5);
-    // The inner helper is the engine's too: its curve has the same first half, nearly.
     let closed = set_of(&[0.0, 1.0, 2.0], &[rpy(0.0), rpy(0.4), rpy(0.0)]);
     let looped = Interpolation {
         ends: Ends::Loop,

@@ -27,6 +27,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "continuity": method.continuity.to_string(),
                 "continuity_on_even_keys": method.continuity_on_even_keys.to_string(),
                 "interpolates": method.interpolates,
+                "symmetric": method.symmetric,
+                "nanoseconds_a_key": method.cost.key,
+                "nanoseconds_a_rotation": method.cost.rotation,
             })
         });
         return words::json(&methods);
@@ -42,12 +45,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .max()
         .unwrap_or(0);
     let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{:width$}  {:smooth$}  ns: key rotation  use",
+        "method", "continuity"
+    );
     for method in METHODS {
         let _ = writeln!(
             text,
-            "{:width$}  {:smooth$}  {}",
+            "{:width$}  {:smooth$}  {:>5.0} {:>8.1}  {}",
             method.name,
             method.smoothness(),
+            method.cost.key,
+            method.cost.rotation,
             method.summary
         );
     }

@@ -1,7 +1,7 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
 use super::ends::End;
-use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
 use crate::branchless::{Vector, exp, product, ratio, scaled, sum};
 use crate::cpu::in_lanes;
 use crate::formula::Product;
@@ -26,6 +26,10 @@ pub const B_SPLINE: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 670.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::BSpline,
     curves: Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing))),
 };

@@ -1,7 +1,7 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -22,6 +22,10 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 370.0,
+        rotation: 2.3,
+    },
     reference: reference::Kind::BesselOverhauser,
     curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)),
 };

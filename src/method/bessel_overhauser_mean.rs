@@ -1,7 +1,7 @@
 //! Bessel-Overhauser by the mean of the slopes: the parabola through three keys, in
 //! logarithms.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -24,6 +24,10 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 2200.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::BesselOverhauserMean,
     curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>)),
 };

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec3};
 
 use super::ends::End;
-use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
 use crate::branchless::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
@@ -34,6 +34,10 @@ pub const C2: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Secant,
     path: None,
+    cost: Cost {
+        key: 1500.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::C2,
     curves: Curves::Smooth(
         Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities)),

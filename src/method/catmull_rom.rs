@@ -1,6 +1,6 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -22,6 +22,10 @@ pub const CATMULL_ROM: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 330.0,
+        rotation: 2.3,
+    },
     reference: reference::Kind::CatmullRom,
     curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)),
 };

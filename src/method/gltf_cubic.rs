@@ -1,6 +1,8 @@
 //! The cubic spline of glTF.
 
-use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Path, Smooth};
+use super::{
+    Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Path, Smooth,
+};
 use crate::branchless::{Quaternion, Vector, length};
 use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
@@ -24,6 +26,10 @@ pub const GLTF_CUBIC: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: Some(Path::AsAuthored),
+    cost: Cost {
+        key: 930.0,
+        rotation: 3.2,
+    },
     reference: reference::Kind::GltfCubic,
     curves: Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers))),
 };

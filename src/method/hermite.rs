@@ -1,6 +1,6 @@
 //! Given angular velocities at the keys.
 
-use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
+use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
 use crate::branchless::scaled;
 use crate::cpu::in_lanes;
 use crate::prepare::{BetweenHandles, Intervals, Shape, Stretch};
@@ -24,6 +24,10 @@ pub const HERMITE: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 420.0,
+        rotation: 2.4,
+    },
     reference: reference::Kind::Hermite,
     curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers))),
 };

@@ -1,6 +1,8 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use super::{Continuity, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends};
+use super::{
+    Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends,
+};
 use crate::branchless::{Algebra, Vector, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -24,6 +26,10 @@ pub const KOCHANEK_BARTELS: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 2200.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::KochanekBartels,
     curves: Curves::Smooth(
         Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),

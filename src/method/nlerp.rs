@@ -1,6 +1,6 @@
 //! Normalised linear interpolation.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, Vector};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -22,6 +22,10 @@ pub const NLERP: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 430.0,
+        rotation: 2.3,
+    },
     reference: reference::Kind::Nlerp,
     curves: Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>)),
 };

@@ -1,6 +1,6 @@
 //! Shoemake's first approach, as lectured, and the rule of all three.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, Vector, dot, scaled, sum};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -22,6 +22,10 @@ pub const SHOEMAKE: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 3400.0,
+        rotation: 3.2,
+    },
     reference: reference::Kind::Shoemake,
     curves: Curves::Smooth(Smooth::new(
         Shape::DE_CASTELJAU,

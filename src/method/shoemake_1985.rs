@@ -1,7 +1,7 @@
 //! Shoemake's construction, as published.
 
 use super::shoemake::Bisector;
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::prepare::Shape;
 use crate::reference;
 
@@ -21,6 +21,10 @@ pub const SHOEMAKE_1985: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 2100.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::Shoemake1985,
     curves: Curves::Smooth(Smooth::new(
         Shape::DE_CASTELJAU,

@@ -1,6 +1,6 @@
 //! Spherical linear interpolation.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth};
 use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
 
@@ -19,6 +19,10 @@ pub const SLERP: Method = Method {
     form: Form::Arc,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 50.0,
+        rotation: 1.3,
+    },
     reference: reference::Kind::Slerp,
     curves: Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves)),
 };

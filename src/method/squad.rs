@@ -1,6 +1,6 @@
 //! Spherical quadrangle interpolation.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method, Smooth, ends};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, Vector, scaled, sum};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -20,6 +20,10 @@ pub const SQUAD: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 1300.0,
+        rotation: 2.7,
+    },
     reference: reference::Kind::Squad,
     curves: Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>)),
 };

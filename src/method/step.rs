@@ -1,6 +1,6 @@
 //! Keys that are held.
 
-use super::{Continuity, Curves, Ends, Form, Keys, Method};
+use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method};
 use crate::reference;
 
 /// The key at or before the time: for what switches and does not move.
@@ -18,6 +18,10 @@ pub const STEP: Method = Method {
     form: Form::Polynomial,
     ends: Ends::Parabolic,
     path: None,
+    cost: Cost {
+        key: 40.0,
+        rotation: 0.8,
+    },
     reference: reference::Kind::Step,
     curves: Curves::Steps,
 };

@@ -11,6 +11,7 @@ use crate::engine::{Engine, Error};
 use crate::method::{Axes, Interpolation, Quantity};
 use crate::reference::{Curve, angle_between};
 use crate::rotations::{Layout, Rotations};
+use crate::skeleton::Skeleton;
 use crate::tracks::TrackSet;
 
 /// What was found of one output.
@@ -75,6 +76,7 @@ pub(super) fn verify(
     }
     let (clip, layout) = (engine.upload(set, interpolation)?, Layout::TrackMajor);
     let rotations = cpu.evaluate(set, interpolation, frames)?;
+    outputs.push(world(engine, &cpu, set, &rotations)?);
     let rotations: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
     let mut expected = Vec::new();
     for encoding in Encoding::KINDS {
@@ -107,6 +109,45 @@ pub(super) fn verify(
         });
     }
     Ok(outputs)
+}
+
+/// The tracks as a chain, walked down.
+fn world(
+    engine: &Engine,
+    cpu: &Engine,
+    set: &TrackSet,
+    local: &Rotations,
+) -> Result<OutputVerification, Error> {
+    let (tracks, samples) = (set.track_count(), local.samples());
+    let length = set
+        .box_length()
+        .filter(|length| length.is_finite())
+        .unwrap_or(1.0);
+    let chain = Skeleton::chain(tracks, length);
+    let found = engine.world(local, &chain)?;
+    let expected = cpu.world(local, &chain)?;
+    let pairs = found.as_slice().iter().zip(expected.as_slice());
+    let bits = |values: &[f32; 4]| values.map(f32::to_bits);
+    let differing = pairs.filter(|(found, expected)| bits(found) != bits(expected));
+    let mut output = OutputVerification {
+        output: "world".to_owned(),
+        values: found.as_slice().len() as u64,
+        differing: differing.count() as u64,
+        max_error: 0.0,
+        // Each box adds its own rounding.
+        error_bound: 1e-6 + 4e-7 * tracks as f64,
+    };
+    for sample in 0..samples {
+        let mut above = DQuat::IDENTITY;
+        for track in 0..tracks {
+            let own = local.get(track, sample).unwrap_or(Quat::NAN);
+            above = (above * own.as_dquat()).normalize();
+            let rotation = found.rotation(track, sample).unwrap_or(Quat::NAN);
+            let error = worse(angle_between(rotation.as_dquat(), above));
+            output.max_error = output.max_error.max(error);
+        }
+    }
+    Ok(output)
 }
 
 fn exact(rotation: [f32; 4]) -> DQuat {

@@ -159,5 +159,16 @@ for letters in ["xyz", "XYZ"]:
         lever = np.abs(np.sin(middle) if sequence[0] == sequence[2] else np.cos(middle))
         check(f"euler {sequence}", np.radians(apart) * np.minimum(1, lever)[..., None], 2e-6)
 
+# The chain: each box hangs at the end of the one before it.
+length = float(path.read_text().split("\n", 1)[0].split()[2])
+world = evaluate(path, "--output", "world")
+above, hung = Rotation.identity(len(world)), np.zeros((len(world), 3))
+for track in range(raw.shape[1]):
+    if track > 0:
+        hung = hung + above.apply([0, -length, 0])
+    above = above * Rotation.from_quat(quats[track])
+    check("world, positions", np.abs(world[:, track, :3] - hung) / length, 1e-6)
+    check("world, rotations", angles(world[:, track, 3:], above.as_quat()), 1e-6)
+
 for what, error in worst.items():
     print(f"{what}: {error:.1e}")
