@@ -97,11 +97,13 @@ impl Clip {
                 needed,
             });
         }
+        let timeline = self.data.folded(timeline);
         let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
-        self.evaluate_window_into(timeline, &whole, output)
+        self.evaluate_window_into(&timeline, &whole, output)
     }
 
-    /// Evaluates a window of the result, which `output` fits.
+    /// Evaluates a window of the result, which `output` fits; explicit times are folded
+    /// into the keys.
     pub(crate) fn evaluate_window_into(
         &self,
         timeline: &Timeline,
@@ -109,10 +111,7 @@ impl Clip {
         output: &mut [Quat],
     ) -> Result<(), Error> {
         match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => {
-                let timeline = self.data.folded(timeline);
-                Ok(engine.evaluate(&self.data, &timeline, window, output)?)
-            }
+            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
             (Backend::Vulkan(_), _) => {
                 let bytes = bytemuck::cast_slice_mut(output);
                 self.evaluate_bytes_into(timeline, window, Encoding::F32, bytes)
@@ -128,7 +127,6 @@ impl Clip {
         output: &mut [u8],
     ) -> Result<(), Error> {
         self.check_encoding(encoding)?;
-        let timeline = &*self.data.folded(timeline);
         match (&*self.engine.backend, &self.buffers) {
             (Backend::Cpu(engine), _) => {
                 Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
@@ -169,6 +167,7 @@ impl Clip {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let mut output = bytemuck::zeroed_vec(whole.len() * encoding.bytes());
+        let timeline = self.data.folded(&timeline);
         self.evaluate_bytes_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
     }
@@ -190,6 +189,7 @@ impl Clip {
         if given != needed {
             return Err(Error::OutputBytes { given, needed });
         }
+        let timeline = self.data.folded(&timeline);
         self.evaluate_bytes_into(&timeline, &whole, encoding, output)
     }
 }

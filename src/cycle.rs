@@ -3,8 +3,11 @@
 
 use std::ops::Range;
 
+use rayon::iter::Either;
+
 use crate::clock::{Ticks, Timeline};
 use crate::frame_clock::FrameClock;
+use crate::frame_rate::FrameRate;
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -76,18 +79,29 @@ impl Sides {
 
     /// The samples of a track with keys from `first` to `last` seconds, cut where its
     /// copies meet. What copy a sample is in does not depend on the samples asked for.
+    #[inline]
     pub(crate) fn cycles(
         self,
         (first, last): (f64, f64),
         timeline: &Timeline,
         samples: Range<usize>,
-    ) -> Vec<Cycle> {
-        let Ticks::Frames { rate, start } = timeline.ticks else {
-            return vec![Cycle::own(samples)]; // their times are folded
-        };
-        if !self.repeats() || last <= first {
-            return vec![Cycle::own(samples)];
+    ) -> impl Iterator<Item = Cycle> {
+        match timeline.ticks {
+            Ticks::Frames { rate, start } if self.repeats() && last > first => Either::Right(
+                self.copies((first, last), (rate, start), samples)
+                    .into_iter(),
+            ),
+            // Explicit times are folded.
+            _ => Either::Left(std::iter::once(Cycle::own(samples))),
         }
+    }
+
+    fn copies(
+        self,
+        (first, last): (f64, f64),
+        (rate, start): (FrameRate, f64),
+        samples: Range<usize>,
+    ) -> Vec<Cycle> {
         let clock = FrameClock::new(rate, start, last);
         let (from, to) = (clock.boundary(first).frame, clock.boundary(last).frame);
         let length = to - from;
@@ -145,7 +159,7 @@ mod tests {
         };
         let timeline = Frames::fps(10).between(-2.0, 5.0).resolve(1, None).unwrap();
         let span = (0.25, 1.25);
-        let whole = sides.cycles(span, &timeline, 0..71);
+        let whole: Vec<Cycle> = sides.cycles(span, &timeline, 0..71).collect();
         assert_eq!(whole.len(), 8);
         let mut next = 0;
         for cycle in &whole {

@@ -68,6 +68,7 @@ impl Clip {
     ) -> Result<(), E> {
         let timeline = self.timeline(frames).map_err(Error::from)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let timeline = self.data.folded(&timeline);
         let fill = |window: &Window, output: &mut [Quat]| {
             self.evaluate_window_into(&timeline, window, output)
         };

@@ -424,6 +424,36 @@ fn outputs_have_their_shapes_and_names() {
             .map(|number| number.parse().unwrap());
         assert_eq!(bits(written), own, "{output}");
     }
+    // Both boxes hang from the world: neither moves the other.
+    let line = [
+        "eval",
+        "a.dat",
+        "--output",
+        "world",
+        "--parents",
+        "-1,-1",
+        "-o",
+        "apart.npy",
+    ];
+    succeed(place.path(), &line);
+    let (_, apart) = read_npy(&fs::read(place.path().join("apart.npy")).unwrap());
+    assert!(apart.chunks(7).all(|pose| pose[..3] == [0, 0, 0]));
+    let parents = |list: &str| {
+        let line = [
+            "eval",
+            "a.dat",
+            "--output",
+            "world",
+            "--parents",
+            list,
+            "-o",
+            "no.npy",
+        ];
+        run(place.path(), &line).words
+    };
+    assert!(parents("-1").contains("1 entries for 2 tracks"));
+    assert!(parents("1,0").contains("hangs from itself"));
+    assert!(parents("-2,0").contains("-2 is no track"));
     for (wrong, says) in [
         (
             ["--output", "euler", "--sequence", "XXY"],

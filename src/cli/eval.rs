@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use tumble::formats::npy::ComponentOrder;
 use tumble::formats::poses::{Poses, TRANSFORM, WORLD};
-use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method, Skeleton};
+use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method};
 
 use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
@@ -217,6 +217,10 @@ impl Arguments {
         let started = Instant::now();
         let interpolation = self.manner.with(self.method);
         let length = set.box_length().unwrap_or(0.0);
+        let skeleton = self
+            .what
+            .skeleton(set.track_count(), length)
+            .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
         let evaluated = device
             .choose(set.track_count() * timeline.len())
             .and_then(|()| {
@@ -224,8 +228,7 @@ impl Arguments {
                 let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
                 match kind {
                     PoseKind::World => {
-                        let chain = Skeleton::chain(set.track_count(), length);
-                        let world = engine.world(&local, &chain)?;
+                        let world = engine.world(&local, &skeleton)?;
                         let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
                             let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
                             [px, py, pz, x, y, z, w]

@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Eval(eval::Arguments),
+    Eval(Box<eval::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),

@@ -1,9 +1,10 @@
 //! Arguments that say what of each rotation is written.
 
 use clap::{Args, ValueEnum};
-use tumble::{Axes, Encoding, EulerSequence, MatrixOrder, Quantity};
+use glam::Vec3;
+use tumble::{Axes, Encoding, EulerSequence, MatrixOrder, Quantity, Skeleton};
 
-#[derive(Debug, Clone, Copy, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct What {
     /// What to write of each rotation
     #[arg(
@@ -19,6 +20,14 @@ pub(crate) struct What {
     /// matrix: how it lies in memory
     #[arg(long, value_enum, default_value = "row")]
     major: Major,
+    /// world: each track's parent, counted from 0, -1 for none [default: a chain, -1,0,1 …]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    parents: Option<Vec<i64>>,
     /// velocity, acceleration: whose axes
     #[arg(long, value_enum, default_value = "body")]
     axes: AxesArgument,
@@ -79,7 +88,7 @@ fn sequence(name: &str) -> Result<EulerSequence, String> {
 
 impl What {
     /// How it is stored; quaternions as `components` says.
-    pub(crate) fn encoding(self, components: Encoding) -> Encoding {
+    pub(crate) fn encoding(&self, components: Encoding) -> Encoding {
         let order = match self.major {
             Major::Row => MatrixOrder::RowMajor,
             Major::Column => MatrixOrder::ColumnMajor,
@@ -94,8 +103,34 @@ impl What {
         }
     }
 
+    /// Which track hangs from which, at the ends of boxes of that length.
+    pub(crate) fn skeleton(&self, tracks: usize, length: f64) -> Result<Skeleton, String> {
+        let Some(parents) = &self.parents else {
+            return Ok(Skeleton::chain(tracks, length));
+        };
+        if parents.len() != tracks {
+            let given = parents.len();
+            return Err(format!("--parents has {given} entries for {tracks} tracks"));
+        }
+        let parents: Vec<Option<usize>> = parents
+            .iter()
+            .map(|&parent| match parent {
+                -1 => Ok(None),
+                _ => usize::try_from(parent)
+                    .map(Some)
+                    .map_err(|_| format!("--parents: {parent} is no track; -1 is none")),
+            })
+            .collect::<Result<_, _>>()?;
+        let hung = |parent: &Option<usize>| match parent {
+            None => Vec3::ZERO,
+            Some(_) => Vec3::new(0.0, -length as f32, 0.0),
+        };
+        let offsets = parents.iter().map(hung).collect();
+        Skeleton::new(parents, offsets).map_err(|error| format!("--parents: {error}"))
+    }
+
     /// Whether whole poses are written, and which.
-    pub(crate) fn poses(self) -> Option<PoseKind> {
+    pub(crate) fn poses(&self) -> Option<PoseKind> {
         match self.output {
             Output::Transform => Some(PoseKind::Transform),
             Output::World => Some(PoseKind::World),
@@ -103,7 +138,7 @@ impl What {
         }
     }
 
-    pub(crate) fn quantity(self) -> Quantity {
+    pub(crate) fn quantity(&self) -> Quantity {
         let axes = match self.axes {
             AxesArgument::Body => Axes::Body,
             AxesArgument::World => Axes::World,

@@ -153,12 +153,16 @@ impl ClipData {
         track: usize,
         timeline: &Timeline,
         samples: Range<usize>,
-    ) -> Vec<Cycle> {
+    ) -> impl Iterator<Item = Cycle> {
+        let span = self.track_span(track).unwrap_or_default();
         let sides = self.interpolation.sides();
-        match self.parts.get(self.tracks[track]) {
-            Some(&first) => sides.cycles(self.part(first).part.span, timeline, samples),
-            None => vec![Cycle::own(samples)],
-        }
+        sides.cycles(span, timeline, samples)
+    }
+
+    /// The first and the last key time of a track.
+    fn track_span(&self, track: usize) -> Option<(f64, f64)> {
+        let &first = self.parts.get(self.tracks[track])?;
+        Some(self.part(first).part.span)
     }
 
     /// The timeline, with explicit times folded into the keys of their tracks.
@@ -167,9 +171,9 @@ impl ClipData {
         if !sides.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
             return Cow::Borrowed(timeline);
         }
-        let folded = |track: usize, time: f64| match self.parts.get(self.tracks[track]) {
-            Some(&first) => sides.folded(self.part(first).part.span, time),
-            None => time,
+        let folded = |track: usize, time: f64| {
+            self.track_span(track)
+                .map_or(time, |span| sides.folded(span, time))
         };
         Cow::Owned(timeline.map_times(self.track_count(), folded))
     }

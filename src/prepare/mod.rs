@@ -175,7 +175,7 @@ impl Prepared {
         part: &Part,
         timeline: &Timeline,
         samples: Range<usize>,
-    ) -> Vec<Cycle> {
+    ) -> impl Iterator<Item = Cycle> {
         self.sides.cycles(part.span, timeline, samples)
     }
 
