@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::clock::FramesError;
-use crate::frame_clock::{FrameClock, in_frames};
+use crate::frame_clock::{Clock, CopyClock, in_frames};
 use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::schedule::{COUNTABLE, Distance, Emit, Parameter, Run, RunSource, clip};
 
@@ -13,7 +13,7 @@ impl Prepared {
     pub(crate) fn backward_runs(
         &self,
         part: &Part,
-        clock: FrameClock,
+        clock: CopyClock,
         samples: Range<usize>,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {

@@ -47,6 +47,10 @@ impl Cycle {
             offset: 0.0,
         }
     }
+
+    pub(crate) fn is_own(&self) -> bool {
+        self.sign == 1.0 && self.offset == 0.0
+    }
 }
 
 /// Both sides of a track.
@@ -77,20 +81,22 @@ impl Sides {
         }
     }
 
-    /// The samples of a track with keys from `first` to `last` seconds, cut where its
-    /// copies meet. What copy a sample is in does not depend on the samples asked for.
+    /// The samples of a track, cut where its copies meet; `span` is when its keys start and
+    /// end, seconds, or nothing where there are no copies. What copy a sample is in does not depend on the samples asked for.
     #[inline]
     pub(crate) fn cycles(
         self,
-        (first, last): (f64, f64),
+        span: Option<(f64, f64)>,
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = Cycle> {
-        match timeline.ticks {
-            Ticks::Frames { rate, start } if self.repeats() && last > first => Either::Right(
-                self.copies((first, last), (rate, start), samples)
-                    .into_iter(),
-            ),
+        match (&timeline.ticks, span) {
+            (&Ticks::Frames { rate, start }, Some((first, last)))
+                if self.repeats() && last > first =>
+            {
+                let copies = self.copies((first, last), (rate, start), samples);
+                Either::Right(copies.into_iter())
+            }
             // Explicit times are folded.
             _ => Either::Left(std::iter::once(Cycle::own(samples))),
         }
@@ -158,7 +164,7 @@ mod tests {
             after: Outside::Loop,
         };
         let timeline = Frames::fps(10).between(-2.0, 5.0).resolve(1, None).unwrap();
-        let span = (0.25, 1.25);
+        let span = Some((0.25, 1.25));
         let whole: Vec<Cycle> = sides.cycles(span, &timeline, 0..71).collect();
         assert_eq!(whole.len(), 8);
         let mut next = 0;

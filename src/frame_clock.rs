@@ -40,9 +40,6 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
 pub(crate) struct FrameClock {
     rate: FrameRate,
     start: f64,
-    /// Of a copy's frame coordinates; 1 and 0 for the track itself.
-    sign: f64,
-    offset: f64,
     /// Frames by which the rounding of a key's time may move it.
     rounding: f64,
 }
@@ -63,28 +60,7 @@ impl FrameClock {
         Self {
             rate,
             start,
-            sign: 1.0,
-            offset: 0.0,
             rounding,
-        }
-    }
-
-    /// Whether it counts the frames of the track itself.
-    pub(crate) fn is_own(self) -> bool {
-        self.sign == 1.0 && self.offset == 0.0
-    }
-
-    pub(crate) fn frames_a_second(self) -> f64 {
-        self.rate.frames_in(1.0)
-    }
-
-    /// The frames of a copy of the track.
-    pub(crate) fn of_copy(self, cycle: &Cycle) -> Self {
-        Self {
-            sign: cycle.sign,
-            offset: cycle.offset,
-            rounding: self.rounding + 4.0 * f64::EPSILON * cycle.offset.abs(),
-            ..self
         }
     }
 
@@ -92,9 +68,13 @@ impl FrameClock {
     /// a key returns the key at hour 24 too.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
-        let exact = self.rate.frames_in(time - self.start) * self.sign + self.offset;
+        self.settled(self.rate.frames_in(time - self.start), self.rounding)
+    }
+
+    #[inline(always)]
+    fn settled(self, exact: f64, rounding: f64) -> Boundary {
         let whole = nearest_whole(exact);
-        let frame = if (exact - whole).abs() <= self.rounding {
+        let frame = if (exact - whole).abs() <= rounding {
             whole
         } else {
             exact
@@ -109,7 +89,68 @@ impl FrameClock {
         self.boundary(time).first as usize
     }
 
-    pub(crate) fn time(self, frame: usize) -> f64 {
+    fn time(self, frame: usize) -> f64 {
         self.start + self.rate.time_of(frame as u64)
+    }
+}
+
+/// What tells where a track's spans lie among the frames.
+pub(crate) trait Clock: Copy {
+    /// Where a time lies.
+    fn boundary(self, time: f64) -> Boundary;
+    /// The track's own time at a frame, where the frames are the track's own.
+    fn own_time(self, frame: usize) -> Option<f64>;
+    /// Frames in a second.
+    fn rate(self) -> f64;
+}
+
+impl Clock for FrameClock {
+    #[inline(always)]
+    fn boundary(self, time: f64) -> Boundary {
+        Self::boundary(self, time)
+    }
+
+    #[inline(always)]
+    fn own_time(self, frame: usize) -> Option<f64> {
+        Some(self.time(frame))
+    }
+
+    #[inline(always)]
+    fn rate(self) -> f64 {
+        self.rate.frames_in(1.0)
+    }
+}
+
+/// The frames of a copy of a track.
+#[derive(Clone, Copy)]
+pub(crate) struct CopyClock {
+    own: FrameClock,
+    sign: f64,
+    offset: f64,
+}
+
+impl CopyClock {
+    pub(crate) fn new(own: FrameClock, cycle: &Cycle) -> Self {
+        Self {
+            own,
+            sign: cycle.sign,
+            offset: cycle.offset,
+        }
+    }
+}
+
+impl Clock for CopyClock {
+    fn boundary(self, time: f64) -> Boundary {
+        let own = self.own.rate.frames_in(time - self.own.start);
+        let rounding = self.own.rounding + 4.0 * f64::EPSILON * self.offset.abs();
+        self.own.settled(own * self.sign + self.offset, rounding)
+    }
+
+    fn own_time(self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn rate(self) -> f64 {
+        Clock::rate(self.own)
     }
 }

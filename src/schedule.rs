@@ -7,9 +7,9 @@ use std::ops::Range;
 
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
-use crate::frame_clock::{FrameClock, finite_scale, in_frames};
+use crate::frame_clock::{Clock, CopyClock, FrameClock, finite_scale, in_frames};
 use crate::numeric::round_quat;
-use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::prepare::{Beyond, NONE, Part, Prepared, Source};
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]
@@ -79,11 +79,12 @@ impl Prepared {
         let samples = cycle.samples.clone();
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let clock = FrameClock::new(*rate, *start, part.end).of_copy(cycle);
-                if cycle.sign < 0.0 {
-                    return self.backward_runs(part, clock, samples, emit);
+                let clock = FrameClock::new(*rate, *start, part.end);
+                if cycle.is_own() {
+                    self.frame_runs(part, clock, samples, emit)
+                } else {
+                    self.copy_runs(part, CopyClock::new(clock, cycle), cycle, emit)
                 }
-                self.frame_runs(part, clock, samples, emit)
             }
             Ticks::Times { times, stride } => {
                 let own = &times[part.track * stride..];
@@ -112,11 +113,27 @@ impl Prepared {
         round_quat(self.exact[index as usize].value(t))
     }
 
+    /// Apart from the rest, which stays small.
+    #[inline(never)]
+    fn copy_runs(
+        &self,
+        part: &Part,
+        clock: CopyClock,
+        cycle: &Cycle,
+        emit: &mut impl Emit,
+    ) -> Result<(), FramesError> {
+        let samples = cycle.samples.clone();
+        if cycle.sign < 0.0 {
+            return self.backward_runs(part, clock, samples, emit);
+        }
+        self.frame_runs(part, clock, samples, emit)
+    }
+
     #[inline(always)]
     fn frame_runs(
         &self,
         part: &Part,
-        clock: FrameClock,
+        clock: impl Clock,
         samples: Range<usize>,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
@@ -128,16 +145,19 @@ impl Prepared {
             let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
             clip(0, begin.first as usize, &samples, part.before, emit);
         }
-        if part.from_before != NONE {
+        if let Some(from) = part.beyond.as_ref().map(|beyond| beyond.from_before)
+            && from != NONE
+        {
             let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
             let before = 0..begin.first as usize;
-            extrapolate(before, &samples, part.from_before, clock, begin.frame, emit);
+            extrapolate(before, &samples, from, clock, begin.frame, emit);
         }
         // The span that holds the first sample; a time's own rounding may put it one
         // further.
         let mut skipped = 0;
-        if samples.start > 0 && clock.is_own() {
-            let first_time = clock.time(samples.start);
+        if samples.start > 0
+            && let Some(first_time) = clock.own_time(samples.start)
+        {
             let found = starts.partition_point(|&start| start <= first_time);
             skipped = found.saturating_sub(2);
         }
@@ -204,24 +224,25 @@ impl Prepared {
                 });
             }
         }
-        if part.after != NONE {
-            let end = clock.boundary(part.end);
-            let mut first = end.first as usize;
-            if part.at_end != NONE && first as f64 == end.frame {
-                clip(first, first + 1, &samples, part.at_end, emit);
-                first += 1;
+        let Some(beyond) = &part.beyond else {
+            if part.after != NONE {
+                let end = clock.boundary(part.end);
+                clip(end.first as usize, usize::MAX, &samples, part.after, emit);
             }
+            return Ok(());
+        };
+        let end = clock.boundary(part.end);
+        let mut first = end.first as usize;
+        if beyond.at_end != NONE && first as f64 == end.frame {
+            clip(first, first + 1, &samples, beyond.at_end, emit);
+            first += 1;
+        }
+        if part.after != NONE {
             clip(first, usize::MAX, &samples, part.after, emit);
         }
-        if part.from_after != NONE {
-            let end = clock.boundary(part.end);
-            let mut first = end.first as usize;
-            if part.at_end != NONE && first as f64 == end.frame {
-                clip(first, first + 1, &samples, part.at_end, emit);
-                first += 1;
-            }
+        if beyond.from_after != NONE {
             let after = first..usize::MAX;
-            extrapolate(after, &samples, part.from_after, clock, end.frame, emit);
+            extrapolate(after, &samples, beyond.from_after, clock, end.frame, emit);
         }
         Ok(())
     }
@@ -256,15 +277,21 @@ impl Prepared {
                     let source = self.time_source(part.spans.start + i, end);
                     (open..end, Some(source))
                 }
-            } else if time == part.end && part.at_end != NONE {
-                (time..time.next_up(), constant_source(part.at_end))
+            } else if let Some(beyond) = &part.beyond {
+                sample += outside(
+                    self,
+                    part,
+                    beyond,
+                    &times[sample..samples.end],
+                    sample,
+                    emit,
+                );
+                continue;
             } else if time >= part.end {
-                let source = beyond(part.after, part.from_after, part.end);
-                (part.end..f64::INFINITY, source)
+                (part.end..f64::INFINITY, constant_source(part.after))
             } else {
                 let begin = starts.first().copied().unwrap_or(part.end);
-                let source = beyond(part.before, part.from_before, begin);
-                (f64::NEG_INFINITY..begin, source)
+                (f64::NEG_INFINITY..begin, constant_source(part.before))
             };
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
@@ -301,9 +328,46 @@ impl Prepared {
     }
 }
 
+/// Emits the run that the first of some times, outside a part's keys, is in; how many of
+/// them that takes. Apart, so that what is usual stays small.
+#[inline(never)]
+fn outside(
+    prepared: &Prepared,
+    part: &Part,
+    beyond: &Beyond,
+    times: &[f64],
+    sample: usize,
+    emit: &mut impl Emit,
+) -> usize {
+    let time = times[0];
+    let starts = &prepared.spans.starts[part.spans.clone()];
+    let begin = starts.first().copied().unwrap_or(part.end);
+    let (covered, source) = if time < begin {
+        let source = source_beyond(part.before, beyond.from_before, begin);
+        (f64::NEG_INFINITY..begin, source)
+    } else if time == part.end && beyond.at_end != NONE {
+        (time..time.next_up(), constant_source(beyond.at_end))
+    } else {
+        let source = source_beyond(part.after, beyond.from_after, part.end);
+        (part.end..f64::INFINITY, source)
+    };
+    let count = times
+        .iter()
+        .take_while(|time| covered.contains(time))
+        .count();
+    if let Some(source) = source {
+        emit.run(Run {
+            sample,
+            count,
+            source,
+        });
+    }
+    count
+}
+
 /// What gives the samples outside the keys: a constant, or a curve from the end on, or
 /// another part.
-fn beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
+fn source_beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
     match (constant_source(constant), curve) {
         (None, NONE) => None,
         (None, index) => Some(RunSource::Exact {
@@ -319,11 +383,12 @@ fn beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
 
 /// Emits those of the samples `outside` the keys that are asked for, on a curve whose
 /// parameter is seconds from the frame coordinate `end`.
+#[inline(never)]
 fn extrapolate(
     outside: Range<usize>,
     samples: &Range<usize>,
     index: u32,
-    clock: FrameClock,
+    clock: impl Clock,
     end: f64,
     emit: &mut impl Emit,
 ) {
@@ -339,7 +404,7 @@ fn extrapolate(
                 index,
                 parameter: Parameter::Frames {
                     start: end,
-                    frames: clock.frames_a_second(),
+                    frames: clock.rate(),
                 },
             },
         });
@@ -397,7 +462,7 @@ impl SpanBlock {
 
     /// At most [`Self::LEN`] spans; `next` is where the last of them ends.
     #[inline(always)]
-    fn fill(&mut self, clock: FrameClock, starts: &[f64], next: f64, extents: &[f64]) {
+    fn fill(&mut self, clock: impl Clock, starts: &[f64], next: f64, extents: &[f64]) {
         let count = starts.len();
         let frame = &mut self.frame[..count];
         let first = &mut self.first[..count];

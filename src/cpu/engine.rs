@@ -150,9 +150,16 @@ impl CpuEngine {
         first: usize,
         row: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
-        for cycle in clip.cycles(track, timeline, first..first + row.len()) {
+        let samples = first..first + row.len();
+        if !clip.interpolation.sides().repeats() {
+            let cycle = Cycle::own(samples.clone());
+            return clip
+                .parts_of(track, timeline, samples)
+                .try_for_each(|part| self.part(part, timeline, &cycle, row));
+        }
+        for cycle in clip.cycles(track, timeline, samples) {
             let own = &mut row[cycle.samples.start - first..cycle.samples.end - first];
-            clip.parts_of(track, timeline, &cycle)
+            clip.parts_in(track, &cycle)
                 .try_for_each(|part| self.part(part, timeline, &cycle, own))?;
         }
         Ok(())

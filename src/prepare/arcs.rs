@@ -211,6 +211,7 @@ impl Prepare for ArcPreparation {
         spans.keys.extend(first_key..last_key);
         let sources = (segments..segments + count).map(Source::Segment);
         spans.sources.extend(sources);
+        let beyond = prepared.copies(track);
         prepared.parts.push(Part {
             track: index,
             spans: first_span..first_span + intervals.len(),
@@ -221,10 +222,7 @@ impl Prepare for ArcPreparation {
             } else {
                 NONE
             },
-            at_end: NONE,
-            from_before: NONE,
-            from_after: NONE,
-            span: (track.times[0], track.times[track.times.len() - 1]),
+            beyond,
         });
         for key in intervals {
             if self.block.count == LANES {

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use glam::Vec3;
-use rayon::iter::Either;
 use rayon::prelude::*;
 
 use super::set::prepare;
@@ -120,20 +119,18 @@ impl ClipData {
         self.span
     }
 
-    /// The parts of one track that may hold any of `samples`, in order of time.
+    /// The parts of one track that may hold any of `samples` of the track itself, in order
+    /// of time.
+    #[inline]
     pub(crate) fn parts_of(
         &self,
         track: usize,
         timeline: &Timeline,
-        cycle: &Cycle,
+        samples: Range<usize>,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let samples = &cycle.samples;
         let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
         let own = match timeline.ticks {
-            _ if cycle.sign < 0.0 => {
-                return Either::Right(all.iter().rev().map(|&place| self.part(place)));
-            }
-            Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() && cycle.offset == 0.0 => {
+            Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time(track, samples.start);
                 let last = timeline.time(track, samples.end - 1);
                 // One more on either side: a time within its rounding of a boundary
@@ -144,7 +141,22 @@ impl ClipData {
             }
             _ => all,
         };
-        Either::Left(own.iter().map(|&place| self.part(place)))
+        own.iter().map(|&place| self.part(place))
+    }
+
+    /// The parts of one track in the order in which a copy of it meets them.
+    pub(crate) fn parts_in(
+        &self,
+        track: usize,
+        cycle: &Cycle,
+    ) -> impl Iterator<Item = PartRef<'_>> {
+        let all = self.tracks[track]..self.tracks[track + 1];
+        let count = all.len();
+        let backwards = cycle.sign < 0.0;
+        (0..count).map(move |i| {
+            let place = if backwards { count - 1 - i } else { i };
+            self.part(self.parts[all.start + place])
+        })
     }
 
     /// The copies of a track among some samples.
@@ -154,15 +166,19 @@ impl ClipData {
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = Cycle> {
-        let span = self.track_span(track).unwrap_or_default();
         let sides = self.interpolation.sides();
+        let span = match sides.repeats() {
+            true => self.track_span(track),
+            false => None,
+        };
         sides.cycles(span, timeline, samples)
     }
 
-    /// The first and the last key time of a track.
+    /// The first and the last key time of a track, where copies of it are asked for.
     fn track_span(&self, track: usize) -> Option<(f64, f64)> {
         let &first = self.parts.get(self.tracks[track])?;
-        Some(self.part(first).part.span)
+        let beyond = self.part(first).part.beyond.as_ref()?;
+        Some(beyond.span)
     }
 
     /// The timeline, with explicit times folded into the keys of their tracks.

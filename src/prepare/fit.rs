@@ -14,7 +14,7 @@ use super::motion;
 use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
 use super::pace::Pace;
 use super::shape::Shape;
-use crate::formula::{NUMBERS, Numbers};
+use crate::formula::Numbers;
 use crate::method::Quantity;
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
@@ -65,7 +65,8 @@ pub(super) fn tier(energy: f64) -> Option<Tier> {
 pub(super) struct FitBlock {
     pub(super) shape: &'static Shape,
     tier: Tier,
-    pub(super) numbers: [Lane64; NUMBERS],
+    /// Each curve's own numbers.
+    pub(super) numbers: Vec<Lane64>,
     /// The middle of the piece to fit, and its width.
     pub(super) middles: Lane64,
     pub(super) widths: Lane64,
@@ -109,7 +110,7 @@ impl FitBlock {
         Self {
             shape,
             tier,
-            numbers: shape.shared.map(|number| [number; LANES]),
+            numbers: vec![lane; shape.own],
             middles: lane,
             widths: lane,
             rates: lane,
@@ -144,8 +145,7 @@ impl FitBlock {
     /// Adds a piece of a curve; the block is not full.
     pub(super) fn push(&mut self, curve: &Curve) {
         let lane = self.count;
-        let own = self.shape.own;
-        for (lanes, &number) in self.numbers[..own].iter_mut().zip(&curve.numbers) {
+        for (lanes, &number) in self.numbers.iter_mut().zip(&curve.numbers) {
             lanes[lane] = number;
         }
         self.rates[lane] = curve.rate;
@@ -158,8 +158,7 @@ impl FitBlock {
     /// Adds the curve in a lane of `intervals`; the block is not full.
     pub(super) fn push_from(&mut self, intervals: &Intervals, from: usize) {
         let lane = self.count;
-        let own = self.shape.own;
-        for (lanes, curves) in self.numbers[..own].iter_mut().zip(&intervals.numbers) {
+        for (lanes, curves) in self.numbers.iter_mut().zip(&intervals.numbers) {
             lanes[lane] = curves[from];
         }
         self.rates[lane] = intervals.rate(from);
@@ -173,17 +172,18 @@ impl FitBlock {
         self.count += 1;
     }
 
-    /// The numbers of a lane.
+    /// A curve's own numbers; 0 behind them.
     #[inline(always)]
     pub(super) fn numbers_of(&self, lane: usize) -> Numbers {
-        std::array::from_fn(|i| self.numbers[i][lane])
+        let own = &self.numbers[..];
+        std::array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
     }
 
     /// The whole curve in a lane.
     pub(super) fn curve(&self, lane: usize) -> Curve {
         Curve {
             shape: self.shape,
-            numbers: self.numbers_of(lane),
+            numbers: self.shape.with(|i| self.numbers[i][lane]),
             piece: Piece::WHOLE,
             quantity: self.quantity,
             rate: self.rates[lane],

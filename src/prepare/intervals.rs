@@ -11,7 +11,6 @@ use std::ops::Range;
 use super::curve::{Curve, Piece};
 use super::shape::Shape;
 use crate::branchless::{self, Quaternion, Vector};
-use crate::formula::NUMBERS;
 use crate::method::Quantity;
 use crate::tracks::Track;
 
@@ -33,6 +32,8 @@ pub(crate) struct Stretch {
     pub(super) intervals: Range<usize>,
     /// Intervals of the whole track.
     pub(crate) all: usize,
+    /// When the whole track starts and ends, seconds.
+    pub(super) span: (f64, f64),
     /// The track's place in the set.
     pub(super) track: usize,
     /// Its place in the prepared parts.
@@ -88,13 +89,14 @@ pub(crate) struct Intervals {
     pub(super) outward: [Lane; 4],
     pub(super) inward: [Lane; 4],
     /// What the formula takes.
-    pub(super) numbers: [Lane; NUMBERS],
+    pub(super) numbers: Vec<Lane>,
     /// How far the curve goes: the sum of the squares of its half-rotation vectors.
     pub(super) energies: Lane,
 }
 
 impl Intervals {
-    pub(super) fn new(noise: f64) -> Self {
+    /// For curves that take so many numbers of their own.
+    pub(super) fn new(noise: f64, numbers: usize) -> Self {
         let lane = [0.0; ROOM];
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
@@ -113,7 +115,7 @@ impl Intervals {
             signs: [1.0; ROOM],
             outward: [lane; 4],
             inward: [lane; 4],
-            numbers: [lane; NUMBERS],
+            numbers: vec![lane; numbers],
             energies: lane,
         }
     }
@@ -216,13 +218,9 @@ impl Intervals {
 
     /// The curve of an interval.
     pub(super) fn curve(&self, lane: usize, shape: &'static Shape, quantity: Quantity) -> Curve {
-        let mut numbers = shape.shared;
-        for (number, lanes) in numbers[..shape.own].iter_mut().zip(&self.numbers) {
-            *number = lanes[lane];
-        }
         Curve {
             shape,
-            numbers,
+            numbers: shape.with(|i| self.numbers[i][lane]),
             piece: Piece::WHOLE,
             quantity,
             rate: self.rate(lane),

@@ -38,6 +38,7 @@ use crate::clock::Timeline;
 use crate::cycle::{Cycle, Sides};
 use crate::method::Interpolation;
 use crate::segment::Segments;
+use crate::tracks::Track;
 
 /// No constant.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -90,7 +91,15 @@ pub(crate) struct Part {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// The constant at exactly the last key; [`NONE`] where it is `after`.
+    /// What else is at its ends, where that is more than two constants. Apart: a crowd has
+    /// a million parts.
+    pub(crate) beyond: Option<Box<Beyond>>,
+}
+
+/// What lies at a track's ends and outside its keys.
+#[derive(Debug, Clone)]
+pub(crate) struct Beyond {
+    /// The constant at exactly the last key; [`NONE`] where it is what is held after it.
     pub(crate) at_end: u32,
     /// The exact curves that go on before the first key and behind the last, their
     /// parameter seconds from there; [`NONE`] where constants are held.
@@ -98,6 +107,25 @@ pub(crate) struct Part {
     pub(crate) from_after: u32,
     /// When the whole track starts and ends, seconds.
     pub(crate) span: (f64, f64),
+}
+
+impl Beyond {
+    pub(crate) fn new(times: &[f64]) -> Self {
+        Self {
+            at_end: NONE,
+            from_before: NONE,
+            from_after: NONE,
+            span: (times[0], times[times.len() - 1]),
+        }
+    }
+}
+
+impl Part {
+    /// What is at its ends, to be filled in.
+    fn beyond(&mut self, times: (f64, f64)) -> &mut Beyond {
+        let new = || Box::new(Beyond::new(&[times.0, times.1]));
+        self.beyond.get_or_insert_with(new)
+    }
 }
 
 impl Spans {
@@ -159,9 +187,14 @@ impl Prepared {
             spans: part.spans.start + spans..part.spans.end + spans,
             before: shift(part.before),
             after: shift(part.after),
-            at_end: shift(part.at_end),
-            from_before: place(part.from_before, exact),
-            from_after: place(part.from_after, exact),
+            beyond: part.beyond.map(|beyond| {
+                Box::new(Beyond {
+                    at_end: shift(beyond.at_end),
+                    from_before: place(beyond.from_before, exact),
+                    from_after: place(beyond.from_after, exact),
+                    ..*beyond
+                })
+            }),
             ..part
         }));
         self.segments.append(other.segments);
@@ -176,7 +209,14 @@ impl Prepared {
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = Cycle> {
-        self.sides.cycles(part.span, timeline, samples)
+        let span = part.beyond.as_ref().map(|beyond| beyond.span);
+        self.sides.cycles(span, timeline, samples)
+    }
+
+    /// What a part needs from the start, where copies of its track are asked for.
+    fn copies(&self, track: Track) -> Option<Box<Beyond>> {
+        let new = || Box::new(Beyond::new(track.times));
+        self.sides.repeats().then(new)
     }
 
     fn constant(&mut self, value: [f32; 4]) -> u32 {

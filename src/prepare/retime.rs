@@ -60,13 +60,10 @@ fn retime(
     }
     if let (true, Some(place)) = (paced.is_empty(), still) {
         // It does not move at all.
-        let Part {
-            before,
-            from_before,
-            ..
-        } = prepared.parts[part];
-        let held = match (before, place.key) {
+        let Part { before, beyond, .. } = &prepared.parts[part];
+        let held = match (*before, place.key) {
             (NONE, NONE) => {
+                let from_before = beyond.as_ref().map_or(0, |beyond| beyond.from_before);
                 let value = prepared.exact[from_before as usize].value(0.0);
                 prepared.constant(round_quat(value))
             }
@@ -95,9 +92,10 @@ fn retime(
             start + seconds * (done / total)
         };
         curve.rate = 1.0 / (to - from);
-        if last && prepared.parts[part].at_end != NONE {
-            let at_end = prepared.parts[part].at_end as usize;
-            prepared.constants[at_end] = round_quat(curve.value_at(1.0));
+        if let (true, Some(beyond)) = (last, &prepared.parts[part].beyond)
+            && beyond.at_end != NONE
+        {
+            prepared.constants[beyond.at_end as usize] = round_quat(curve.value_at(1.0));
         }
         let place = Place {
             start: from,
@@ -108,12 +106,12 @@ fn retime(
             fitting.push_curve(place, curve);
         }
     }
-    for beyond in [
-        prepared.parts[part].from_before,
-        prepared.parts[part].from_after,
-    ] {
-        if beyond != NONE {
-            prepared.exact[beyond as usize].set_speed(total / seconds);
+    let Some(beyond) = &prepared.parts[part].beyond else {
+        return;
+    };
+    for goes_on in [beyond.from_before, beyond.from_after] {
+        if goes_on != NONE {
+            prepared.exact[goes_on as usize].set_speed(total / seconds);
         }
     }
 }

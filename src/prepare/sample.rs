@@ -21,10 +21,10 @@ pub(super) struct Expanded {
     pub(super) powers: [[Lane32; 3]; 3],
 }
 
-/// By the expanded cubic, in f32.
-pub(super) struct Expansion;
+/// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
+pub(super) struct Expansion<const OWN_BASIS: bool>;
 
-impl Sampling for Expansion {
+impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
     #[inline(always)]
     fn sample<const PAIRS: usize>(
         block: &mut FitBlock,
@@ -38,14 +38,14 @@ impl Sampling for Expansion {
             squares: [lane; 3],
             powers: [[lane; 3]; 3],
         };
-        block.expand(count, &mut expanded);
+        block.expand::<OWN_BASIS>(count, &mut expanded);
         expanded.sample(count, nodes, samples);
     }
 }
 
 impl FitBlock {
     #[inline(always)]
-    pub(super) fn expand(&mut self, count: usize, expanded: &mut Expanded) {
+    fn expand<const OWN_BASIS: bool>(&mut self, count: usize, expanded: &mut Expanded) {
         let Expanded {
             terms,
             squares,
@@ -60,14 +60,13 @@ impl FitBlock {
             let [vx, vy, vz] = &rest[3 * j..][..3] else {
                 unreachable!("three of them")
             };
-            let basis = &self.numbers[Product::BASIS + 4 * j..][..4];
-            let at = |lane: usize| {
-                [
-                    basis[0][lane],
-                    basis[1][lane],
-                    basis[2][lane],
-                    basis[3][lane],
-                ]
+            let place = Product::BASIS + 4 * j;
+            // A copy: what is written below could be what a reference shows.
+            let shared: [f64; 4] = std::array::from_fn(|c| self.shape.shared[place + c]);
+            let own = self.numbers.get(place..place + 4).unwrap_or_default();
+            let at = |lane: usize| match OWN_BASIS {
+                true => [own[0][lane], own[1][lane], own[2][lane], own[3][lane]],
+                false => shared,
             };
             for lane in 0..count {
                 let [c0, c1, c2, c3] = at(lane);

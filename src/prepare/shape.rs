@@ -45,6 +45,15 @@ impl Shape {
         }
     }
 
+    /// A curve's numbers: its own, and what it shares with all.
+    pub(super) fn with(&self, own: impl Fn(usize) -> f64) -> Numbers {
+        let mut numbers = self.shared;
+        for (i, number) in numbers[..self.own].iter_mut().enumerate() {
+            *number = own(i);
+        }
+        numbers
+    }
+
     /// The numbers of the same rotations with the other sign.
     pub(super) fn negated(&self, numbers: &Numbers) -> Numbers {
         let mut negated = *numbers;
@@ -61,13 +70,13 @@ impl Shape {
         own: Product::BASIS,
         shared: Product::BERNSTEIN,
         entire: true,
-        fit: fit::<Expansion>,
+        fit: fit::<Expansion<false>>,
         ..Self::of::<Product>(NUMBERS, 1)
     };
     /// [`Product`] with a basis of each curve's own.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
-        fit: fit::<Expansion>,
+        fit: fit::<Expansion<true>>,
         ..Self::of::<Product>(NUMBERS, 1)
     };
     /// [`DeCasteljau`].

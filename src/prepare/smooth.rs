@@ -54,7 +54,7 @@ impl SmoothPreparation {
                 ..*interpolation
             },
             smooth,
-            intervals: Intervals::new(path.flips_below()),
+            intervals: Intervals::new(path.flips_below(), smooth.shape.own),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
             waiting: Waiting::default(),
@@ -98,16 +98,14 @@ impl Prepare for SmoothPreparation {
             }
         };
         let part = prepared.parts.len();
+        let beyond = prepared.copies(track);
         prepared.parts.push(Part {
             track: index,
             spans: 0..0,
             end: track.times[intervals.end],
             before: held(intervals.start == 0, first_key, self.interpolation.before),
             after: held(intervals.end == all, last_key, self.interpolation.after),
-            at_end: NONE,
-            from_before: NONE,
-            from_after: NONE,
-            span: (track.times[0], track.times[track.times.len() - 1]),
+            beyond,
         });
         let looped = matches!(self.interpolation.ends, Ends::Loop);
         // Two keys are joined by constant velocity, whatever lies beside them.
@@ -131,6 +129,7 @@ impl Prepare for SmoothPreparation {
                 lane: self.intervals.count,
                 intervals: from..to,
                 all,
+                span: (track.times[0], track.times[all]),
                 track: index,
                 part,
                 key: if meets_keys {
@@ -291,11 +290,11 @@ impl SmoothPreparation {
             let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
             prepared.exact.push(curve.beyond(t));
             let place = prepared.exact.len() as u32 - 1;
-            let part = &mut prepared.parts[stretch.part];
+            let beyond = prepared.parts[stretch.part].beyond(stretch.span);
             if t == 0.0 {
-                part.from_before = place;
+                beyond.from_before = place;
             } else {
-                part.from_after = place;
+                beyond.from_after = place;
             }
         }
     }
@@ -329,7 +328,8 @@ impl SmoothPreparation {
                 prepared.parts[stretch.part].after = after;
             }
             if quantity != Quantity::Rotation {
-                prepared.parts[stretch.part].at_end = prepared.constant(at_end);
+                let at_end = prepared.constant(at_end);
+                prepared.parts[stretch.part].beyond(stretch.span).at_end = at_end;
             }
         }
     }

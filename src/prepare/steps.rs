@@ -45,16 +45,14 @@ impl Prepare for StepPreparation {
         prepared.constants.extend(keys.map(value));
         let first_span = prepared.spans.len();
         let all = track.keys.len() - 1;
+        let beyond = prepared.copies(track);
         prepared.parts.push(Part {
             track: index,
             spans: first_span..first_span + intervals.len(),
             end: track.times[intervals.end],
             before: if intervals.start == 0 { first } else { NONE },
             after: if intervals.end == all { last } else { NONE },
-            at_end: NONE,
-            from_before: NONE,
-            from_after: NONE,
-            span: (track.times[0], track.times[track.times.len() - 1]),
+            beyond,
         });
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], 0.0, Source::Constant(constant), NONE);

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::curve::{Curve, Piece};
 use super::fitting::polynomials;
 use super::shape::Shape;
-use super::{NONE, Part, Prepared, Source};
+use super::{Beyond, NONE, Part, Prepared, Source};
 use crate::branchless::ratio;
 use crate::cycle::Outside;
 use crate::method::{Ends, Interpolation, Quantity};
@@ -71,16 +71,21 @@ pub(super) fn add(
         }
     }
     let held = |beyond: u32, key: u32| if beyond == NONE { key } else { NONE };
+    let times = (track.times[0], track.times[last]);
+    let goes_on = beyond != [NONE; 2];
     prepared.parts.push(Part {
         track: index,
         spans: first_span..first_span + last,
         end: track.times[last],
         before: held(beyond[0], first_key),
         after: held(beyond[1], first_key + last as u32),
-        at_end: NONE,
-        from_before: beyond[0],
-        from_after: beyond[1],
-        span: (track.times[0], track.times[last]),
+        beyond: (goes_on || prepared.sides.repeats()).then(|| {
+            Box::new(Beyond {
+                from_before: beyond[0],
+                from_after: beyond[1],
+                ..Beyond::new(&[times.0, times.1])
+            })
+        }),
     });
 }
 
