@@ -40,7 +40,9 @@ const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
 fn pipelines() -> Vec<(String, Vec<String>)> {
     let mut pipelines = vec![(
         "canary".to_owned(),
-        ["sine_cosine", "canary"].map(str::to_owned).to_vec(),
+        ["sine_cosine", "arc_tangent", "canary"]
+            .map(str::to_owned)
+            .to_vec(),
     )];
     for form in FORMS {
         for (clock, distance) in CLOCKS {

@@ -18,6 +18,8 @@ struct Reply {
     cancellation: f32,
     sine: f32,
     cosine: f32,
+    root: f32,
+    arc_tangent: f32,
 }
 
 @group(0) @binding(0) var<storage, read> probes: array<Probe>;
@@ -46,5 +48,7 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     reply.cancellation = (a * c + b) - a * c;
     reply.sine = turn.x;
     reply.cosine = turn.y;
+    reply.root = root(a * a + c * c);
+    reply.arc_tangent = arc_tangent(a, c);
     replies[index] = reply;
 }

@@ -73,6 +73,7 @@ mod segment;
 mod skeleton;
 pub mod spirv;
 mod stream;
+mod time_runs;
 mod tracks;
 mod transforms;
 mod vector_method;

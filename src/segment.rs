@@ -91,6 +91,8 @@ pub(crate) struct Reply {
     pub(crate) cancellation: f32,
     pub(crate) sine: f32,
     pub(crate) cosine: f32,
+    pub(crate) root: f32,
+    pub(crate) arc_tangent: f32,
 }
 
 macro_rules! assert_layout {
@@ -157,7 +159,9 @@ assert_layout!(
     conversion = REPLY_CONVERSION,
     cancellation = REPLY_CANCELLATION,
     sine = REPLY_SINE,
-    cosine = REPLY_COSINE
+    cosine = REPLY_COSINE,
+    root = REPLY_ROOT,
+    arc_tangent = REPLY_ARC_TANGENT
 );
 
 /// The segments of one clip, all of one form.

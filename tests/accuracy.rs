@@ -188,11 +188,19 @@ fn arbitrary_times_are_within_the_bounds() {
 
 #[test]
 fn every_option_is_within_the_bounds() {
-    let set = smooth_set(4, 0.0, 2.0);
+    let mut set = smooth_set(4, 0.0, 2.0);
+    // Also too short to have an inner key, or more than one.
+    for (from, keys) in [(0, 2), (1, 2), (2, 3), (3, 4)] {
+        let track = set.track(from);
+        let (times, keys) = (track.times[..keys].to_vec(), track.keys[..keys].to_vec());
+        set.push("short", &times, &keys).unwrap();
+    }
     let spin = glam::DVec3::new(0.5, -1.0, 0.25);
     for method in METHODS {
         for ends in [
+            Ends::Parabolic,
             Ends::Natural,
+            Ends::Secant,
             Ends::Clamped {
                 start: spin,
                 end: -spin,

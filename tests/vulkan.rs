@@ -4,15 +4,15 @@ mod support;
 
 use support::{first_difference, hostile_set, vulkan_devices};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Transfer, VulkanBuffer,
-    VulkanError, method,
+    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Skeleton, Transfer,
+    VulkanBuffer, VulkanError, method,
 };
 
 #[test]
 fn every_device_passes_every_canary() {
     for device in vulkan_devices() {
         let engine = Engine::new(device).unwrap();
-        assert_eq!(engine.canaries().len(), 10);
+        assert_eq!(engine.canaries().len(), 12);
         for canary in engine.canaries() {
             assert!(canary.total > 0, "{canary:?}");
             assert_eq!(canary.differing, 0, "{}: {canary:?}", engine.device_name());
@@ -41,6 +41,7 @@ fn the_validation_layer_has_nothing_to_say() {
         }
     };
     let set = hostile_set(2, 64);
+    let reference = [glam::Quat::IDENTITY; 64];
     let requests = [
         Frames::fps(60).between(0.0, 20.0),
         Frames::at(vec![0.5, 0.25, 7.0]),
@@ -51,11 +52,16 @@ fn the_validation_layer_has_nothing_to_say() {
             options.transfer = transfer;
             options.memory = Some(1_000_000);
             let engine = Engine::with_options(device.clone(), &options).unwrap();
-            for method in METHODS {
+            // Constants alone, and both forms.
+            for method in [method::STEP, method::SLERP, method::C2] {
                 let clip = engine.upload(&set, method).unwrap();
                 for frames in &requests {
                     for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                        clip.evaluate_as(frames, layout).unwrap();
+                        let poses = clip.evaluate_as(frames, layout).unwrap();
+                        engine.blend(&[(&poses, 0.5), (&poses, 1.0)]).unwrap();
+                        engine.mix(&poses, &poses, 0.5).unwrap();
+                        engine.add(&poses, &poses, &reference, 0.5).unwrap();
+                        engine.world(&poses, &Skeleton::chain(64, 1.0)).unwrap();
                         for encoding in Encoding::KINDS {
                             clip.evaluate_encoded(frames, layout, encoding).unwrap();
                         }

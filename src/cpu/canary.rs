@@ -1,5 +1,6 @@
 //! Twin of `shaders/canary.wgsl`: the same names, the same order.
 
+use super::arc_tangent::{arc_tangent, root};
 use super::sine_cosine::sine_cosine;
 use crate::segment::{Probe, Reply};
 
@@ -16,5 +17,7 @@ pub(crate) fn reply(probe: Probe) -> Reply {
         cancellation: (a * c + b) - a * c,
         sine: turn.0,
         cosine: turn.1,
+        root: root(a * a + c * c),
+        arc_tangent: arc_tangent(a, c),
     }
 }

@@ -154,7 +154,7 @@ fn expressions(
     submission.wait()?;
     let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
 
-    let canaries: [(&str, Value); 8] = [
+    let canaries: [(&str, Value); 10] = [
         ("contraction", |reply| reply.contraction),
         ("re-association of a sum", |reply| reply.reassociation),
         ("rounding to nearest even", |reply| reply.rounding),
@@ -163,6 +163,8 @@ fn expressions(
         ("cancellation", |reply| reply.cancellation),
         ("sine", |reply| reply.sine),
         ("cosine", |reply| reply.cosine),
+        ("root", |reply| reply.root),
+        ("arc tangent", |reply| reply.arc_tangent),
     ];
     let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
     let count = |value: Value| {

@@ -102,7 +102,11 @@ fn solve(track: Track, window: Range<isize>, interpolation: &Interpolation) -> (
     let steps: Vec<Step> = (first..last)
         .map(|i| Step::new(track, i.rem_euclid(all.max(1)) as usize, noise))
         .collect();
-    let end_at = |at_end: bool, end: End| if at_end { end } else { End::Secant };
+    // Two keys are joined by slerp, whatever the ends.
+    let end_at = |at_end: bool, end: End| match at_end && all > 1 {
+        true => end,
+        false => End::Secant,
+    };
     let start = end_at(!closed && first == 0, interpolation.ends.start());
     let end = end_at(!closed && last == all, interpolation.ends.end());
     (first, Spline::new(&steps, [start, end]).velocities())
