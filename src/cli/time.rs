@@ -102,7 +102,7 @@ impl Samples {
         if start < first || end > last {
             words::warning(&format!(
                 "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-                 beyond them tracks hold their end values"
+                 beyond them tracks are held, or as --before and --after say"
             ));
         }
         frames

@@ -74,8 +74,9 @@ pub enum Speed {
     #[default]
     AsKeyed,
     /// At one angular speed from the first key to the last (by arc length): the way is the
-    /// same, but inner keys are met when they are reached. Preparing takes some hundred
-    /// microseconds a key.
+    /// same, but inner keys are met when they are reached. Preparing takes milliseconds a
+    /// key. Where a curve had been slow its velocity turns aside fast: velocities are then
+    /// within 1e-5, accelerations within 1e-3 of the largest.
     Constant,
 }
 

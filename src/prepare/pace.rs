@@ -64,8 +64,8 @@ impl Pace {
             return from;
         }
         let mut u = from + (high - low) * (rest / whole).clamp(0.0, 1.0);
+        let mut excess = turned(curve, from, u) - rest;
         for _ in 0..40 {
-            let excess = turned(curve, from, u) - rest;
             if excess > 0.0 {
                 high = u;
             } else {
@@ -78,9 +78,16 @@ impl Pace {
             } else {
                 0.5 * (low + high)
             };
-            if (next - u).abs() <= 1e-14 {
+            let step = next - u;
+            if step.abs() <= 1e-14 {
                 return next;
             }
+            // A short step needs no refinement.
+            excess += if step.abs() < 1e-3 {
+                gauss(curve, u, next)
+            } else {
+                turned(curve, u, next)
+            };
             u = next;
         }
         u
@@ -99,7 +106,7 @@ fn refined(curve: &Curve, from: f64, to: f64, whole: f64, halvings: u32) -> f64 
     let middle = 0.5 * (from + to);
     let halves = [gauss(curve, from, middle), gauss(curve, middle, to)];
     let sum = halves[0] + halves[1];
-    if halvings == 0 || (sum - whole).abs() <= 1e-10 * (1.0 + sum) {
+    if halvings == 0 || (sum - whole).abs() <= 1e-13 * (1.0 + sum) {
         return sum;
     }
     refined(curve, from, middle, halves[0], halvings - 1)
