@@ -2,6 +2,8 @@
 // inverse.
 // Twin: src/cpu/matrix.rs.
 
+@group(0) @binding(4) var<storage, read_write> rotations: array<f32>;
+
 struct Rows {
     first: vec3f,
     second: vec3f,
@@ -27,6 +29,9 @@ fn rows(rotation: vec4f, detail: u32) -> Rows {
     return rows;
 }
 
-fn settled(row: vec3f) -> vec3f {
-    return canonical(vec4f(row, 0.0)).xyz;
+fn put(place: u32, row: vec3f) {
+    let settled = canonical(vec4f(row, 0.0));
+    rotations[place] = settled.x;
+    rotations[place + 1u] = settled.y;
+    rotations[place + 2u] = settled.z;
 }

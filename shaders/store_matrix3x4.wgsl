@@ -1,22 +1,14 @@
 // Rotations as 3 × 4 matrices without a translation, twelve numbers each.
 
-@group(0) @binding(4) var<storage, read_write> rotations: array<f32>;
-
-fn put(place: u32, row: vec3f) {
-    rotations[place] = row.x;
-    rotations[place + 1u] = row.y;
-    rotations[place + 2u] = row.z;
-}
-
 fn store(place: u32, rotation: vec4f) {
     let detail = launch.detail;
     let rows = rows(rotation, detail);
     // Rows have a fourth number; columns have a fourth of them.
     let length = select(4u, 3u, detail == 1u);
     let first = place * 12u;
-    put(first, settled(rows.first));
-    put(first + length, settled(rows.second));
-    put(first + 2u * length, settled(rows.third));
+    put(first, rows.first);
+    put(first + length, rows.second);
+    put(first + 2u * length, rows.third);
     rotations[first + 11u] = 0.0;
     rotations[first + select(3u, 9u, detail == 1u)] = 0.0;
     rotations[first + select(7u, 10u, detail == 1u)] = 0.0;

@@ -55,7 +55,7 @@ fn vector<S: Scalar>(numbers: &Numbers, place: usize, k: S) -> [S; 3] {
 
 /// The Hamilton product `a b`.
 #[inline(always)]
-pub(crate) fn product<S: Scalar>(a: [S; 4], b: [S; 4]) -> [S; 4] {
+fn product<S: Scalar>(a: [S; 4], b: [S; 4]) -> [S; 4] {
     [
         a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
         a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],

@@ -2,7 +2,7 @@
 //! logarithms.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, ratio, scaled, sum};
+use crate::branchless::{Algebra, Vector, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -37,13 +37,24 @@ struct Rule;
 impl HandleRule for Rule {
     #[inline(always)]
     fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
-        let left = scaled(before.log, ratio(after.duration, before.duration));
-        let right = scaled(after.log, ratio(before.duration, after.duration));
-        let both = before.duration + after.duration;
-        let tangent = scaled(sum(left, right), ratio(1.0, 3.0 * both));
         Handles {
-            incoming: scaled(tangent, before.duration),
-            outgoing: scaled(tangent, after.duration),
+            incoming: handle(before, after, before.duration, [1.0; 2]),
+            outgoing: handle(before, after, after.duration, [1.0; 2]),
         }
     }
+}
+
+/// The handle towards an interval that lasts `duration`: of the slopes of both sides, each
+/// weighted by the other side's step, and by a weight of its own.
+#[inline(always)]
+pub(super) fn handle(
+    before: Interval,
+    after: Interval,
+    duration: f64,
+    [left, right]: [f64; 2],
+) -> Vector {
+    let left = scaled(before.log, ratio(after.duration, before.duration) * left);
+    let right = scaled(after.log, ratio(before.duration, after.duration) * right);
+    let both = before.duration + after.duration;
+    scaled(sum(left, right), ratio(1.0, 3.0 * both) * duration)
 }

@@ -1,9 +1,10 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
+use super::bessel_overhauser_mean::handle;
 use super::{
     Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends,
 };
-use crate::branchless::{Algebra, Vector, ratio, scaled, sum};
+use crate::branchless::Algebra;
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 use crate::tracks::Track;
@@ -53,17 +54,13 @@ impl HandleRule for Rule {
     fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
         let [tension, continuity, bias, _] = after.key;
         let tight = 1.0 - tension;
-        let left = scaled(before.log, ratio(after.duration, before.duration));
-        let right = scaled(after.log, ratio(before.duration, after.duration));
-        let both = before.duration + after.duration;
-        let handle = |corner: f64, duration: f64| -> Vector {
-            let left = scaled(left, tight * (1.0 + corner) * (1.0 + bias));
-            let right = scaled(right, tight * (1.0 - corner) * (1.0 - bias));
-            scaled(sum(left, right), ratio(1.0, 3.0 * both) * duration)
+        let weights = |corner: f64| {
+            let left = tight * (1.0 + corner) * (1.0 + bias);
+            [left, tight * (1.0 - corner) * (1.0 - bias)]
         };
         Handles {
-            incoming: handle(-continuity, before.duration),
-            outgoing: handle(continuity, after.duration),
+            incoming: handle(before, after, before.duration, weights(-continuity)),
+            outgoing: handle(before, after, after.duration, weights(continuity)),
         }
     }
 }

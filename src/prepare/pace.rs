@@ -7,6 +7,9 @@ use crate::scalar::Jet;
 /// Parts whose lengths are kept.
 const PARTS: usize = 8;
 
+/// Of the parameter: by so little no rotation is seen to move.
+const NEXT_TO_REST: f64 = 1e-9;
+
 /// Points and weights of Gauss and Legendre of degree 9, from -1 to 1.
 const GAUSS: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
@@ -40,7 +43,9 @@ impl Pace {
     /// The curve's own parameter where it has turned by that part of its length, with its
     /// derivatives by that part.
     pub(super) fn parameter(&self, curve: &Curve, part: f64) -> Jet {
+        // Where it starts from rest it has no direction; next to there it has.
         let u = self.place(curve, part * self.total());
+        let u = u.clamp(NEXT_TO_REST, 1.0 - NEXT_TO_REST);
         let (velocity, acceleration) = rates(curve, u);
         let speed = length(velocity).max(1e-12);
         let first = self.total() / speed;

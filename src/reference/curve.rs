@@ -125,7 +125,9 @@ impl Curve {
         };
         match &self.pace {
             Some(pace) => {
-                let direction = self.segments[i].velocity(t).normalize_or_zero();
+                // Next to where it may start from rest, without a direction.
+                let moving = t.clamp(1e-6, 1.0 - 1e-6);
+                let direction = self.segments[i].velocity(moving).normalize_or_zero();
                 direction * (pace.total() / self.duration())
             }
             None => self.segment_velocity(i, t),
