@@ -7,8 +7,12 @@ use crate::scalar::Jet;
 /// Parts whose lengths are kept.
 const PARTS: usize = 8;
 
-/// Of the parameter: by so little no rotation is seen to move.
-const NEXT_TO_REST: f64 = 1e-9;
+/// Slower than this part of its mean speed a curve is at rest, or just leaves it.
+const SLOW: f64 = 1e-4;
+
+/// Of the parameter: a curve that starts from rest has turned by a billionth of its length
+/// there, and its direction is known to seven digits.
+const NEXT_TO_REST: f64 = 1e-5;
 
 /// Points and weights of Gauss and Legendre of degree 9, from -1 to 1.
 const GAUSS: [(f64, f64); 5] = [
@@ -43,10 +47,13 @@ impl Pace {
     /// The curve's own parameter where it has turned by that part of its length, with its
     /// derivatives by that part.
     pub(super) fn parameter(&self, curve: &Curve, part: f64) -> Jet {
-        // Where it starts from rest it has no direction; next to there it has.
-        let u = self.place(curve, part * self.total());
-        let u = u.clamp(NEXT_TO_REST, 1.0 - NEXT_TO_REST);
-        let (velocity, acceleration) = rates(curve, u);
+        let mut u = self.place(curve, part * self.total());
+        let (mut velocity, mut acceleration) = rates(curve, u);
+        if length(velocity) < SLOW * self.total() {
+            // Where it starts from rest it has no direction; next to there it has.
+            u = u.clamp(NEXT_TO_REST, 1.0 - NEXT_TO_REST);
+            (velocity, acceleration) = rates(curve, u);
+        }
         let speed = length(velocity).max(1e-12);
         let first = self.total() / speed;
         let along: f64 = velocity.iter().zip(acceleration).map(|(v, a)| v * a).sum();
