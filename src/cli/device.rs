@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use ash::vk;
 use clap::Args;
+use glam::Quat;
 use tumble::{
     Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, TrackSet, VulkanError,
 };
@@ -195,6 +196,25 @@ impl Opened {
                     })
             }
             result => result,
+        }
+    }
+
+    /// As [`Opened::stream`], all of it.
+    pub(crate) fn collect(
+        &mut self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vec<Quat>, Error> {
+        let mut rotations = Vec::new();
+        let collected = self.stream(set, interpolation, frames, layout, &mut |chunk| {
+            rotations.extend_from_slice(chunk.rotations);
+            Ok(())
+        });
+        match collected {
+            Ok(()) | Err(Ended::Writing(_)) => Ok(rotations), // nothing was written
+            Err(Ended::Evaluating(error)) => Err(error),
         }
     }
 }

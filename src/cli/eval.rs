@@ -171,7 +171,7 @@ impl Arguments {
         let layout = match (self.layout, target.format()) {
             (LayoutArgument::Track, Format::Npy) => Layout::TrackMajor,
             // A row of CSV holds one frame.
-            (LayoutArgument::Frame, _) | (_, Format::Csv | Format::Dat) => Layout::FrameMajor,
+            (LayoutArgument::Frame, _) | (_, Format::Csv) => Layout::FrameMajor,
         };
         let result = ResultShape {
             name: &name,
@@ -259,9 +259,9 @@ impl Arguments {
             components,
             numbers: &numbers,
         };
-        target.write(None, |out| match target.format() {
+        target.write(|out| match target.format() {
             Format::Csv => poses.write_csv(out),
-            Format::Npy | Format::Dat => poses.write_npy(out),
+            Format::Npy => poses.write_npy(out),
         })?;
         self.tell(device, result, target, started);
         Ok(())

@@ -6,7 +6,7 @@ use clap::Args;
 use tumble::generate::{Generate, Steps};
 
 use super::exit::Failure;
-use super::output::{Format, Target};
+use super::place::Place;
 use super::words;
 
 /// Write a keyframe file of swinging boxes; the same seed gives the same file
@@ -61,11 +61,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     generate
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;
-    let target = Target::new(&arguments.out, Format::Dat, arguments.overwrite, &[])?;
-    target.write(None, |out| generate.write(out))?;
+    let place = Place::new(&arguments.out, arguments.overwrite, &[])?;
+    place.write(None, |out| generate.write(out))?;
     words::note(&format!(
-        "{} × {}, {} s, seed {} → {target}",
-        words::count(arguments.boxes as usize, "box").replace("boxs", "boxes"),
+        "{} × {}, {} s, seed {} → {place}",
+        words::boxes(arguments.boxes as usize),
         words::count(arguments.keys as usize, "key"),
         arguments.seconds,
         arguments.seed,

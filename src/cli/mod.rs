@@ -4,6 +4,7 @@
 //! the exit codes mean.
 
 mod bench;
+mod colours;
 mod completions;
 mod device;
 mod devices;
@@ -16,6 +17,9 @@ mod input;
 mod interpolation;
 mod methods;
 mod output;
+mod picture;
+mod place;
+mod plot;
 mod progress;
 mod room;
 mod signals;
@@ -69,6 +73,7 @@ pub(crate) enum Command {
     Info(info::Arguments),
     Generate(generate::Arguments),
     Methods(methods::Arguments),
+    Plot(Box<plot::Arguments>),
     Bench(bench::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -83,6 +88,7 @@ impl Command {
             Self::Info(arguments) => info::run(&arguments),
             Self::Generate(arguments) => generate::run(&arguments),
             Self::Methods(arguments) => methods::run(&arguments),
+            Self::Plot(arguments) => plot::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),

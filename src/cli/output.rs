@@ -1,22 +1,22 @@
-//! Outputs: planned and checked before any work, written whole or not at all.
+//! Results of evaluations: where they go, planned and checked before any work, and
+//! how they are written.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use glam::Quat;
 use tumble::formats::csv::CsvWriter;
 use tumble::formats::npy::{ComponentOrder, NpyWriter};
-use tumble::formats::output::{Output, check_target};
 use tumble::{Chunk, Encoding, Error, Layout, Timeline, TrackSet};
 
-use super::exit::{BROKEN_PIPE, Failure, OUTPUT};
+use super::exit::Failure;
+use super::place::{self, Place};
 use super::progress::Progress;
-use super::signals::{self, Writing};
-use super::stream::{Measured, Stream};
-use super::{input, room};
+use super::stream::Stream;
+use super::{input, room, signals};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -25,9 +25,6 @@ pub(crate) enum Format {
     Npy,
     /// text, a row for each frame
     Csv,
-    /// Keyframes.
-    #[value(skip)]
-    Dat,
 }
 
 /// Rotations handed to a writer at once: 4 MB.
@@ -36,11 +33,8 @@ const PIECE: usize = 1 << 18;
 /// Where one result goes.
 #[derive(Debug)]
 pub(crate) struct Target {
-    path: PathBuf,
+    place: Place,
     format: Format,
-    overwrite: bool,
-    /// Files that it must not be.
-    inputs: Vec<PathBuf>,
 }
 
 /// One target for each input. Refuses what cannot be meant, before any work:
@@ -58,12 +52,11 @@ pub(crate) fn plan(
     }
     let output = output.unwrap_or(Path::new("-"));
     let targets = match inputs {
-        [_] => vec![Target::new(
-            output,
-            choose(output, format)?,
-            overwrite,
-            inputs,
-        )?],
+        [_] => {
+            let format = choose(output, format)?;
+            let place = Place::new(output, overwrite, inputs)?;
+            vec![Target { place, format }]
+        }
         _ if input::is_standard(output) => {
             return Err(Failure::usage(
                 "several inputs need a directory for their results: -o DIRECTORY",
@@ -73,7 +66,7 @@ pub(crate) fn plan(
     };
     // The surest check is to try; they are all in one directory.
     if let Some(target) = targets.first() {
-        target.try_out()?;
+        target.place.try_out()?;
     }
     Ok(targets)
 }
@@ -101,8 +94,7 @@ fn in_folder(
     overwrite: bool,
 ) -> Result<Vec<Target>, Failure> {
     let shown = folder.display();
-    let exists = folder.is_dir();
-    if !exists && (folder.exists() || Format::of(folder).is_some()) {
+    if !folder.is_dir() && (folder.exists() || Format::of(folder).is_some()) {
         return Err(Failure::usage(format!(
             "{shown}: several inputs need a directory for their results, not one file"
         )));
@@ -135,18 +127,12 @@ fn in_folder(
         }
         paths.push(target);
     }
-    if !exists {
-        std::fs::create_dir(folder).map_err(|error| {
-            Failure::new(
-                OUTPUT,
-                format!("{shown}: the directory could not be made: {error}"),
-            )
-        })?;
-    }
-    paths
-        .iter()
-        .map(|path| Target::new(path, format, overwrite, &[]))
-        .collect()
+    place::folder(folder)?;
+    let target = |path: &PathBuf| {
+        let place = Place::new(path, overwrite, &[])?;
+        Ok(Target { place, format })
+    };
+    paths.iter().map(target).collect()
 }
 
 impl Format {
@@ -170,7 +156,6 @@ impl Format {
         name.push(match self {
             Self::Npy => ".npy",
             Self::Csv => ".csv",
-            Self::Dat => ".dat",
         });
         name.into()
     }
@@ -179,43 +164,14 @@ impl Format {
     fn rotation_bytes(self, encoding: Encoding) -> f64 {
         match self {
             Self::Npy => encoding.bytes() as f64,
-            Self::Csv | Self::Dat => 8.0, // four times a digit and a comma
+            Self::Csv => 8.0, // four times a digit and a comma
         }
     }
 }
 
 impl Target {
-    /// Checks everything that can be checked without writing.
-    pub(crate) fn new(
-        path: &Path,
-        format: Format,
-        overwrite: bool,
-        inputs: &[PathBuf],
-    ) -> Result<Self, Failure> {
-        if !input::is_standard(path) {
-            check_target(path, overwrite, inputs).map_err(|error| Failure::output(&error))?;
-        }
-        Ok(Self {
-            path: path.to_owned(),
-            format,
-            overwrite,
-            inputs: inputs.to_vec(),
-        })
-    }
-
     pub(crate) fn format(&self) -> Format {
         self.format
-    }
-
-    /// Opens and drops the output: its directory may be read-only.
-    fn try_out(&self) -> Result<(), Failure> {
-        let _writing = Writing::begin();
-        self.open().map(drop)
-    }
-
-    fn open(&self) -> Result<Output, Failure> {
-        Output::create(&self.path, self.overwrite, &self.inputs)
-            .map_err(|error| Failure::output(&error))
     }
 
     /// Refuses a result for which the disk has no room.
@@ -226,37 +182,23 @@ impl Target {
         samples: usize,
         encoding: Encoding,
     ) -> Result<(), Failure> {
-        if input::is_standard(&self.path) {
+        if self.place.is_standard() {
             return Ok(());
         }
         let bytes = tracks as f64 * samples as f64 * self.format.rotation_bytes(encoding);
-        let folder = match self.path.parent() {
+        let folder = match self.place.path().parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
         };
         room::on_disk(name, (tracks, samples), bytes, folder)
     }
 
-    /// Runs `write`; a file appears under its name once it is whole.
+    /// Writes what `write` has to say; see [`Place::write`].
     pub(crate) fn write(
         &self,
-        progress: Option<Measured>,
         write: impl FnOnce(&mut Stream) -> io::Result<()>,
     ) -> Result<(), Failure> {
-        // Standard output has nothing to clean up: a signal may end it at once.
-        let _writing = (!input::is_standard(&self.path)).then(Writing::begin);
-        let mut stream = Stream::new(self.open()?, progress);
-        // What a buffer still holds can fail too.
-        let result = write(&mut stream).and_then(|()| stream.flush());
-        let (output, broken_pipe) = stream.into_output();
-        if let Some(stopped) = signals::stopped() {
-            return Err(stopped);
-        }
-        match result {
-            Ok(()) => output.commit().map_err(|error| Failure::output(&error)),
-            Err(_) if broken_pipe => Err(Failure::quiet(BROKEN_PIPE)),
-            Err(error) => Err(Failure::writing(&self.to_string(), &error)),
-        }
+        self.place.write(None, write)
     }
 
     /// Writes one result, chunk by chunk, while `evaluate` makes the next.
@@ -268,13 +210,13 @@ impl Target {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
         let (progress, measure): (_, fn(&[u8]) -> u64) = match self.format {
             Format::Csv => (Progress::new("writing", samples as u64 + 1), lines),
-            Format::Npy | Format::Dat => {
+            Format::Npy => {
                 let total = (tracks * samples * result.encoding.bytes()) as u64;
                 (Progress::new("writing", total), length)
             }
         };
         let mut unevaluated = None;
-        let written = self.write(Some((progress, measure)), |out| {
+        let written = self.place.write(Some((progress, measure)), |out| {
             let mut writer = ResultWriter::Waiting(out);
             let evaluated = evaluate(&mut |chunk| {
                 let taken = writer.write(self.format, result, chunk.rotations);
@@ -398,9 +340,6 @@ impl<'a> ResultWriter<'a, '_> {
 
 impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if input::is_standard(&self.path) {
-            return f.write_str("standard output");
-        }
-        write!(f, "{}", self.path.display())
+        self.place.fmt(f)
     }
 }

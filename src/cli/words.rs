@@ -65,6 +65,14 @@ pub(crate) fn count(number: usize, noun: &str) -> String {
     }
 }
 
+/// `1 box`, `4 boxes`.
+pub(crate) fn boxes(number: usize) -> String {
+    match number {
+        1 => "1 box".to_owned(),
+        _ => format!("{number} boxes"),
+    }
+}
+
 /// `78.6 MB`, in decimal units, as file managers and drives count.
 pub(crate) fn bytes(bytes: f64) -> String {
     let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];

@@ -1,0 +1,71 @@
+//! Colours of methods, boxes and components: the same in plots, pages and pictures.
+//! The common ones are Okabe and Ito's, which people with any colour vision tell apart.
+
+use tumble::{METHODS, Method};
+
+/// Red, green, blue.
+pub(crate) type Colour = [u8; 3];
+
+pub(crate) const INK: Colour = [0x22, 0x26, 0x2b];
+pub(crate) const PALE: Colour = [0x6b, 0x72, 0x7a];
+pub(crate) const GRID: Colour = [0xe3, 0xe6, 0xea];
+pub(crate) const AXIS: Colour = [0x9a, 0xa1, 0xa9];
+
+const VERMILLION: Colour = [0xd5, 0x5e, 0x00];
+const BLUE: Colour = [0x00, 0x72, 0xb2];
+const GREEN: Colour = [0x00, 0x9e, 0x73];
+const PINK: Colour = [0xcc, 0x79, 0xa7];
+const SKY: Colour = [0x56, 0xb4, 0xe9];
+const ORANGE: Colour = [0xe6, 0x9f, 0x00];
+
+/// Of w, x, y and z.
+pub(crate) const COMPONENTS: [Colour; 4] = [INK, VERMILLION, GREEN, BLUE];
+
+/// Of the boxes of a chain, from the first on, and again.
+pub(crate) const BOXES: [Colour; 6] = [BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION];
+
+/// Of the methods without a colour of that list.
+const OTHERS: [Colour; 9] = [
+    [0x7f, 0x7f, 0x7f],
+    [0xbc, 0x9a, 0x00],
+    [0x8c, 0x56, 0x4b],
+    [0x94, 0x67, 0xbd],
+    [0xc4, 0x4e, 0x52],
+    [0x4d, 0x93, 0x2a],
+    [0x3b, 0x4c, 0xc0],
+    [0x17, 0x8f, 0x9e],
+    [0xa3, 0x00, 0x59],
+];
+
+/// A method has one colour, wherever it is drawn.
+pub(crate) fn of_method(method: Method) -> Colour {
+    common(method.name).unwrap_or_else(|| {
+        let others = METHODS.iter().filter(|other| common(other.name).is_none());
+        let place = others.take_while(|&&other| other != method).count();
+        OTHERS[place % OTHERS.len()]
+    })
+}
+
+fn common(name: &str) -> Option<Colour> {
+    Some(match name {
+        "slerp" => VERMILLION,
+        "catmull-rom" => BLUE,
+        "bessel-overhauser" => GREEN,
+        "b-spline" => PINK,
+        "c2" => SKY,
+        "squad" => ORANGE,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_methods_share_a_colour() {
+        let mut colours = METHODS.map(of_method);
+        colours.sort_unstable();
+        assert!(colours.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+}

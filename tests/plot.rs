@@ -1,0 +1,351 @@
+//! Pictures: what is in them, read back from SVG and PNG.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+
+use program::{pendulum, run, sample_folder, succeed};
+use roxmltree::{Document, Node};
+
+const SLERP: &str = "#D55E00";
+const BESSEL_OVERHAUSER: &str = "#009E73";
+/// Of an SVG's units, for one of its pixels.
+const FINER: f64 = 10.0;
+
+/// An SVG file's marks.
+struct Marks {
+    texts: Vec<String>,
+    /// Stroke and points of every line.
+    lines: Vec<(String, Vec<(f64, f64)>)>,
+    dots: Vec<(f64, f64)>,
+}
+
+fn number(node: Node<'_, '_>, name: &str) -> f64 {
+    node.attribute(name).unwrap().parse().unwrap()
+}
+
+impl Marks {
+    fn of(path: &Path) -> Self {
+        let text = fs::read_to_string(path).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let named =
+            |name: &'static str| document.descendants().filter(move |n| n.has_tag_name(name));
+        let points = |line: Node<'_, '_>| {
+            let numbers = line.attribute("points").unwrap().split([' ', ',']);
+            let numbers: Vec<f64> = numbers.filter_map(|number| number.parse().ok()).collect();
+            numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
+        };
+        Self {
+            texts: named("text")
+                .map(|text| text.text().unwrap().trim().to_owned())
+                .collect(),
+            lines: named("polyline")
+                .map(|line| (line.attribute("stroke").unwrap().to_owned(), points(line)))
+                .collect(),
+            dots: named("circle")
+                .map(|dot| (number(dot, "cx"), number(dot, "cy")))
+                .collect(),
+        }
+    }
+
+    /// Curves of that colour; the legend's mark is a line of two points.
+    fn curves(&self, colour: &str) -> Vec<&Vec<(f64, f64)>> {
+        let own = self
+            .lines
+            .iter()
+            .filter(|line| line.0 == colour && line.1.len() > 2);
+        own.map(|line| &line.1).collect()
+    }
+
+    fn says(&self, text: &str) -> bool {
+        self.texts.iter().any(|own| own == text)
+    }
+}
+
+fn plot(place: &Path, arguments: &[&str]) -> Marks {
+    let line = [
+        &["plot", "a.dat", "-o", "out.svg", "--overwrite"],
+        arguments,
+    ]
+    .concat();
+    let run = succeed(place, &line);
+    assert!(
+        run.words.contains("1 picture of 1 input, on "),
+        "{}",
+        run.words
+    );
+    Marks::of(&place.join("out.svg"))
+}
+
+/// Would catch a component mistaken for another, a wrong order of boxes, and an axis that
+/// does not show the values it says.
+#[test]
+fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
+    let place = sample_folder();
+    let (times, keys) = pendulum();
+    // z of box 1 and x of box 2 are what turns.
+    for (dimension, title, track, component) in [
+        ("4", "dimension 4: z of box 1", 0, 2),
+        ("6", "dimension 6: x of box 2", 1, 0),
+    ] {
+        let marks = plot(
+            place.path(),
+            &["--dimension", dimension, "-m", "slerp", "--fps", "50"],
+        );
+        assert!(marks.says(title), "{:?}", marks.texts);
+        assert!(marks.says("slerp") && marks.says("key") && marks.says("frame (50 per second)"));
+        let [curve] = marks.curves(SLERP)[..] else {
+            panic!("one curve, not {}", marks.curves(SLERP).len());
+        };
+        assert_eq!(curve.len(), 101);
+        // A dot for each key, and one in the legend, which comes first.
+        let dots = &marks.dots[1..];
+        assert_eq!(dots.len(), times.len());
+        let values: Vec<f64> = (0..times.len())
+            .map(|key| keys[track * times.len() + key].to_array()[component].into())
+            .collect();
+        let height = (dots[1].1 - dots[0].1) / (values[1] - values[0]);
+        let width = (dots[1].0 - dots[0].0) / (times[1] - times[0]);
+        assert!(height < 0.0 && width > 0.0, "up is more, right is later");
+        for ((dot, value), time) in dots.iter().zip(&values).zip(&times) {
+            let expected = (
+                dots[0].0 + width * (time - times[0]),
+                dots[0].1 + height * (value - values[0]),
+            );
+            let off = (dot.0 - expected.0).hypot(dot.1 - expected.1);
+            assert!(off < FINER / 2.0, "{dot:?} is not at {expected:?}");
+            let near = curve.iter().map(|p| (p.0 - dot.0).hypot(p.1 - dot.1));
+            assert!(
+                near.fold(f64::INFINITY, f64::min) < FINER / 2.0,
+                "off the curve"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_box_has_a_panel_and_every_method_a_curve() {
+    let place = sample_folder();
+    let marks = plot(place.path(), &[]);
+    assert!(marks.says("box 1: dimensions 1 to 4") && marks.says("box 2: dimensions 5 to 8"));
+    for (name, colour) in [
+        ("w", "#22262B"),
+        ("x", "#D55E00"),
+        ("y", "#009E73"),
+        ("z", "#0072B2"),
+    ] {
+        assert!(marks.says(name));
+        assert_eq!(marks.curves(colour).len(), 2, "{name}");
+    }
+    assert_eq!(marks.dots.len(), 1 + 2 * 4 * 5);
+    let marks = plot(place.path(), &["-m", "slerp,bessel-overhauser,slerp"]);
+    assert_eq!(marks.curves(SLERP).len(), 8);
+    assert_eq!(marks.curves(BESSEL_OVERHAUSER).len(), 8);
+    let marks = plot(place.path(), &["--box", "2", "-m", "all"]);
+    assert!(marks.says("dimension 5: w of box 2") && !marks.says("dimension 1: w of box 1"));
+    for method in tumble::METHODS {
+        assert!(marks.says(method.name), "{method}");
+    }
+}
+
+#[test]
+fn speed_error_and_sphere_are_drawn_for_each_box() {
+    let place = sample_folder();
+    let both = |show| ["--show", show, "-m", "slerp,bessel-overhauser"];
+    let marks = plot(place.path(), &both("speed"));
+    assert!(marks.says("angular speed, rad/s") && marks.says("box 2"));
+    assert_eq!(marks.curves(SLERP).len(), 2);
+    // Slerp's speed: four plateaus, so five heights or fewer but more than one.
+    let mut heights: Vec<i64> = marks.curves(SLERP)[0]
+        .iter()
+        .map(|p| (p.1 / FINER) as i64)
+        .collect();
+    heights.dedup();
+    assert!((2..=5).contains(&heights.len()), "{heights:?}");
+
+    let marks = plot(place.path(), &both("error"));
+    assert!(marks.says("error, rad") && marks.says("bound") && marks.says("1e-7"));
+    assert!(marks.curves(SLERP).len() >= 2, "in pieces: keys are exact");
+
+    let marks = plot(place.path(), &both("sphere"));
+    assert_eq!(marks.dots.len(), 1 + 2 * 5);
+    assert!(!marks.curves(SLERP).is_empty() && !marks.curves(BESSEL_OVERHAUSER).is_empty());
+}
+
+#[test]
+fn png_shows_the_same_picture() {
+    let place = sample_folder();
+    succeed(
+        place.path(),
+        &[
+            "plot",
+            "a.dat",
+            "-m",
+            "slerp",
+            "--dimension",
+            "4",
+            "-o",
+            "out.png",
+        ],
+    );
+    let file = fs::File::open(place.path().join("out.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file))
+        .read_info()
+        .unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    let marks = plot(place.path(), &["-m", "slerp", "--dimension", "4"]);
+    // In the middle of a key's dot is the key's colour; two pixels for each of SVG's.
+    for &(x, y) in &marks.dots {
+        let (x, y) = ((x / FINER * 2.0) as usize, (y / FINER * 2.0) as usize);
+        let at = (y * info.width as usize + x) * 3;
+        assert_eq!(pixels[at..at + 3], [0x22, 0x26, 0x2b], "at {x}, {y}");
+    }
+    let curve = pixels
+        .chunks(3)
+        .filter(|pixel| *pixel == [0xd5, 0x5e, 0x00])
+        .count();
+    assert!(curve > 1000, "{curve} pixels of the curve");
+}
+
+#[test]
+fn a_report_has_every_figure_and_a_page_that_shows_them() {
+    let place = sample_folder();
+    fs::rename(place.path().join("b.dat"), place.path().join("b & c.dat")).unwrap();
+    succeed(
+        place.path(),
+        &["plot", "--report", "a.dat", "b & c.dat", "-o", "report"],
+    );
+    let folder = place.path().join("report");
+    let page = fs::read_to_string(folder.join("index.html")).unwrap();
+    let shown: Vec<&str> = page
+        .split("<img src=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+        .collect();
+    // Two dimensions (a set of two boxes has no 16th: its last) by three methods and all,
+    // then speed, error and sphere.
+    assert_eq!(shown.len(), 2 * (2 * 4 + 3));
+    for address in &shown {
+        let file = address.replace("%20", " ").replace("%26", "&");
+        let marks = Marks::of(&folder.join(&file));
+        assert!(!marks.lines.is_empty(), "{file}");
+    }
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), shown.len() + 1);
+    for name in [
+        "a-slerp-dimension-2.svg",
+        "a-all-dimension-8.svg",
+        "b%20%26%20c-sphere.svg",
+    ] {
+        assert!(shown.contains(&name), "{name} in {shown:?}");
+    }
+    assert!(page.contains("<h2>b &amp; c.dat</h2>") && page.contains("a key every 0.5000 s"));
+    let again = run(place.path(), &["plot", "--report", "a.dat", "-o", "report"]);
+    assert!(again.code == 2 && again.words.contains("index.html: exists; give --overwrite"));
+}
+
+#[test]
+fn a_directory_gets_a_picture_for_each_box_or_dimension() {
+    let place = sample_folder();
+    succeed(
+        place.path(),
+        &["plot", "a.dat", "b.dat", "--show", "speed", "-o", "out"],
+    );
+    succeed(
+        place.path(),
+        &[
+            "plot",
+            "a.dat",
+            "--dimension",
+            "2,8",
+            "--format",
+            "png",
+            "-o",
+            "out",
+        ],
+    );
+    let mut names: Vec<String> = fs::read_dir(place.path().join("out"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let expected = [
+        "a-dimension-2.png",
+        "a-dimension-8.png",
+        "a-speed-box-1.svg",
+        "a-speed-box-2.svg",
+        "b-speed-box-1.svg",
+        "b-speed-box-2.svg",
+    ];
+    assert_eq!(names, expected);
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
+    let place = sample_folder();
+    fs::write(place.path().join("old.svg"), "old").unwrap();
+    for (arguments, message) in [
+        (
+            "plot a.dat -o x.svg --dimension 9",
+            "there is no dimension 9: a.dat has 2 boxes, dimensions 1 to 8 (w x y z of box 1, then of box 2 …)",
+        ),
+        (
+            "plot a.dat -o x.svg --dimension 0",
+            "there is no dimension 0: a.dat has 2 boxes",
+        ),
+        (
+            "plot a.dat -o x.svg --box 3",
+            "there is no box 3: a.dat has 2 boxes",
+        ),
+        (
+            "plot a.dat -o x.jpg",
+            "x.jpg: end the picture in .svg or .png, or give a directory",
+        ),
+        (
+            "plot a.dat b.dat -o x.svg",
+            "several inputs need a directory",
+        ),
+        (
+            "plot a.dat -o x.svg --report",
+            "a report has many pictures; give a directory",
+        ),
+        (
+            "plot a.dat folder/a.dat -o x --report",
+            "would share the pictures' names",
+        ),
+        (
+            "plot a.dat -o x.svg --show speed --dimension 2",
+            "--dimension is for components",
+        ),
+        (
+            "plot a.dat -o x.svg --dimension 2 --box 1",
+            "cannot be used with",
+        ),
+        (
+            "plot a.dat -o old.svg",
+            "old.svg: exists; give --overwrite to replace it",
+        ),
+        ("plot a.dat -o x.svg -m slurp", "slerp"),
+    ] {
+        let line: Vec<&str> = arguments.split(' ').collect();
+        let run = run(place.path(), &line);
+        assert_eq!(run.code, 2, "{arguments}: {}", run.words);
+        assert!(run.words.contains(message), "{arguments}: {}", run.words);
+        assert!(!place.path().join("x.svg").exists(), "{arguments}");
+    }
+    assert_eq!(fs::read(place.path().join("old.svg")).unwrap(), b"old");
+    let many = succeed(
+        place.path(),
+        &["generate", "--boxes", "65", "-o", "many.dat"],
+    );
+    assert!(many.words.contains("65 boxes"));
+    let run = run(place.path(), &["plot", "many.dat", "-o", "x.svg"]);
+    assert!(
+        run.code == 2
+            && run
+                .words
+                .contains("65 panels in one picture cannot be read")
+    );
+}
