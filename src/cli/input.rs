@@ -42,6 +42,22 @@ pub(crate) fn name(path: &Path) -> String {
     }
 }
 
+/// `folder/walk.dat` is `walk.dat` in titles.
+pub(crate) fn file_name(path: &Path) -> String {
+    match path.file_name() {
+        Some(name) if !is_standard(path) => name.to_string_lossy().into_owned(),
+        _ => name(path),
+    }
+}
+
+/// `folder/walk.dat` is `walk` in the names of pictures.
+pub(crate) fn stem(path: &Path) -> String {
+    match path.file_stem() {
+        Some(stem) if !is_standard(path) => stem.to_string_lossy().into_owned(),
+        _ => "stdin".to_owned(),
+    }
+}
+
 impl Inputs {
     /// The inputs without repetitions, each of which earns a warning. Standard
     /// input can be taken only once.

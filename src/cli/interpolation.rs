@@ -161,3 +161,14 @@ pub(crate) fn methods() -> impl TypedValueParser<Value = Selection> {
         Selection(Method::named(&name).map_or_else(|| METHODS.to_vec(), |method| vec![method]))
     })
 }
+
+/// The methods of several selections, each once.
+pub(crate) fn chosen(selections: &[Selection]) -> Vec<Method> {
+    let mut methods: Vec<Method> = Vec::new();
+    for method in selections.iter().flat_map(|selection| &selection.0) {
+        if !methods.contains(method) {
+            methods.push(*method);
+        }
+    }
+    methods
+}

@@ -26,6 +26,7 @@ mod signals;
 mod stream;
 mod time;
 mod verify;
+mod view;
 mod what;
 mod words;
 
@@ -74,6 +75,7 @@ pub(crate) enum Command {
     Generate(generate::Arguments),
     Methods(methods::Arguments),
     Plot(Box<plot::Arguments>),
+    View(Box<view::Arguments>),
     Bench(bench::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -89,6 +91,7 @@ impl Command {
             Self::Generate(arguments) => generate::run(&arguments),
             Self::Methods(arguments) => methods::run(&arguments),
             Self::Plot(arguments) => plot::run(&arguments),
+            Self::View(arguments) => view::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),

@@ -30,10 +30,10 @@ pub(crate) struct Sampling {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "start", "end"])]
     times: Option<PathBuf>,
     /// Where to start, seconds [default: the first key]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     start: Option<f64>,
     /// Where to end, seconds [default: the last key]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
 }
 
@@ -82,30 +82,43 @@ impl Sampling {
 impl Samples {
     /// The samples for one set; says when they pass its keys.
     pub(crate) fn of(&self, set: &TrackSet, name: &str) -> Frames {
-        let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-        let (frames, start, end) = match self {
-            Self::Rate {
-                rate,
-                start: None,
-                end: None,
-            } => return Frames::rate(*rate),
-            Self::Rate { rate, start, end } => {
-                let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
-                (Frames::rate(*rate).between(start, end), start, end)
-            }
+        match self {
+            Self::Rate { rate, start, end } => in_frames(*rate, *start, *end, set, name),
             Self::Times(times) => {
                 let start = times.iter().copied().fold(f64::INFINITY, f64::min);
                 let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                (Frames::at(times.clone()), start, end)
+                warn_beyond(start, end, set, name);
+                Frames::at(times.clone())
             }
-        };
-        if start < first || end > last {
-            words::warning(&format!(
-                "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-                 beyond them tracks are held, or as --before and --after say"
-            ));
         }
-        frames
+    }
+}
+
+/// Frames from a time to a time, else from the first key to the last; says when they pass
+/// the keys.
+pub(crate) fn in_frames(
+    rate: FrameRate,
+    start: Option<f64>,
+    end: Option<f64>,
+    set: &TrackSet,
+    name: &str,
+) -> Frames {
+    if (start, end) == (None, None) {
+        return Frames::rate(rate);
+    }
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
+    warn_beyond(start, end, set, name);
+    Frames::rate(rate).between(start, end)
+}
+
+fn warn_beyond(start: f64, end: f64, set: &TrackSet, name: &str) {
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    if start < first || end > last {
+        words::warning(&format!(
+            "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
+             beyond them tracks are held, or as --before and --after say"
+        ));
     }
 }
 
@@ -118,7 +131,8 @@ fn broadcast_rate(rate: FrameRate) -> Option<FrameRate> {
         .find(|exact| (rate.per_second() / exact.per_second() - 1.0).abs() < MEANT)
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+/// Parses a time.
+pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(time) if time.is_finite() => Ok(time),
         _ => Err(format!(

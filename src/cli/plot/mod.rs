@@ -17,7 +17,7 @@ use tumble::{Interpolation, Method, TrackSet, method};
 use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
 use super::input::{self, Inputs};
-use super::interpolation::{Manner, Selection, methods};
+use super::interpolation::{Manner, Selection, chosen, methods};
 use super::place::{self, Place};
 use super::progress::Progress;
 use super::time::Sampling;
@@ -179,7 +179,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
         let set = arguments.inputs.load(path)?;
-        let source = Source::new(file_name(path), &set, &interpolations, &samples)?;
+        let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, &name)?;
         let pictures = match &out {
             Out::One(file) => vec![(
@@ -187,7 +187,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 together(&subjects, interpolations.len(), &name)?,
             )],
             Out::Folder(folder) => {
-                let stem = stem(path);
+                let stem = input::stem(path);
                 let file = |(label, subject): (String, Subject)| {
                     let name = format!("{stem}-{label}.{}", studio.format.extension());
                     (folder.join(name), subject)
@@ -269,12 +269,7 @@ impl Subjects {
 
 impl Arguments {
     fn methods(&self) -> Vec<Method> {
-        let mut methods: Vec<Method> = Vec::new();
-        for method in self.methods.iter().flat_map(|selection| &selection.0) {
-            if !methods.contains(method) {
-                methods.push(*method);
-            }
-        }
+        let methods = chosen(&self.methods);
         match (methods.is_empty(), self.report) {
             (false, _) => methods,
             (true, false) => vec![method::BESSEL_OVERHAUSER],
@@ -388,21 +383,5 @@ impl Studio {
         place.write(None, |out| out.write_all(&bytes))?;
         self.drawn += 1;
         Ok(())
-    }
-}
-
-/// `folder/walk.dat` is `walk.dat` in titles.
-fn file_name(path: &Path) -> String {
-    match path.file_name() {
-        Some(name) if !input::is_standard(path) => name.to_string_lossy().into_owned(),
-        _ => input::name(path),
-    }
-}
-
-/// `folder/walk.dat` is `walk` in the names of pictures.
-fn stem(path: &Path) -> String {
-    match path.file_stem() {
-        Some(stem) if !input::is_standard(path) => stem.to_string_lossy().into_owned(),
-        _ => "stdin".to_owned(),
     }
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
 
 use super::curves::{NAMES, Source, Subject};
-use super::{Arguments, PANELS, Studio, file_name, stem};
+use super::{Arguments, PANELS, Studio};
 use crate::cli::exit::Failure;
 use crate::cli::input;
 use crate::cli::place::Place;
@@ -44,7 +44,7 @@ pub(super) fn write(
     for (place, path) in inputs.iter().enumerate() {
         if let Some(other) = inputs[..place]
             .iter()
-            .find(|other| stem(other) == stem(path))
+            .find(|other| input::stem(other) == input::stem(path))
         {
             return Err(Failure::usage(format!(
                 "{} and {} would share the pictures' names; put them into reports of their own",
@@ -61,7 +61,7 @@ pub(super) fn write(
     for path in &inputs {
         let set = progress.suspend(|| arguments.inputs.load(path))?;
         let chapter = Chapter {
-            title: file_name(path),
+            title: input::file_name(path),
             facts: facts(&set),
             figures: figures(
                 studio,
@@ -98,12 +98,16 @@ fn figures(
     folder: &Path,
     progress: &mut Progress,
 ) -> Result<Vec<Shown>, Failure> {
-    let name = file_name(path);
+    let name = input::file_name(path);
     let mut shown = Vec::new();
     let mut draw = |studio: &mut Studio, methods, label: &str, caption, subject: &Subject| {
         let source = Source::new(name.clone(), set, methods, samples)?;
         let figure = source.figure(&mut studio.device, subject)?;
-        let file = format!("{}-{label}.{}", stem(path), studio.format.extension());
+        let file = format!(
+            "{}-{label}.{}",
+            input::stem(path),
+            studio.format.extension()
+        );
         studio.draw(&figure, &folder.join(&file))?;
         shown.push(Shown { file, caption });
         progress.advance(1);

@@ -1,0 +1,92 @@
+// The results that the page carries: unpacked, and looked at. Nothing here makes a
+// rotation that the engine has not made.
+
+async function inflated(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+const doubles = async (text) => new Float64Array((await inflated(text)).buffer);
+
+// Each sample is stored as its difference from the one before it, all low bytes before
+// all high bytes, which packs better.
+async function differences(text, stride) {
+  const bytes = await inflated(text);
+  const length = bytes.length / 2;
+  const values = new Uint16Array(length);
+  for (let i = 0; i < length; i++) {
+    const difference = bytes[i] | (bytes[length + i] << 8);
+    values[i] = i < stride ? difference : values[i - stride] + difference;
+  }
+  return values;
+}
+
+/** One input: its boxes, sample times, keys, and results by each method. */
+export class Set {
+  constructor(stored) {
+    this.stored = stored;
+    this.name = stored.name;
+    this.boxes = stored.boxes;
+    this.length = stored.length;
+    this.results = new Map();
+  }
+
+  async unpack() {
+    if (this.times) return;
+    this.times = await doubles(this.stored.times);
+    this.keyTimes = await doubles(this.stored.keyTimes);
+    this.keys = new Int16Array((await differences(this.stored.keys, 4)).buffer);
+  }
+
+  /** The rotations by a method, [sample][box][xyzw] as 16-bit integers, and the speeds. */
+  async result(method) {
+    if (!this.results.has(method)) {
+      const stored = this.stored.results.find((result) => result.method === method);
+      const rotations = await differences(stored.rotations, this.boxes * 4);
+      const speeds = await differences(stored.speeds, this.boxes);
+      this.results.set(method, {
+        method,
+        rotations: new Int16Array(rotations.buffer),
+        speeds,
+        fastest: stored.fastest,
+      });
+    }
+    return this.results.get(method);
+  }
+
+  get samples() {
+    return this.times.length;
+  }
+
+  /** The last sample that is not after a time. */
+  sampleAt(time) {
+    let low = 0;
+    let high = this.samples - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.times[middle] <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** Key times of a box, and where its keys begin in `keys`. */
+  keysOf(box) {
+    const { sharedKeys, keyCounts } = this.stored;
+    if (sharedKeys) {
+      return { times: this.keyTimes, first: box * this.keyTimes.length };
+    }
+    let first = 0;
+    for (let i = 0; i < box; i++) first += keyCounts[i];
+    return { times: this.keyTimes.subarray(first, first + keyCounts[box]), first };
+  }
+}
+
+/** A stored rotation's components x y z w, of length 1. */
+export function rotation(result, boxes, sample, box) {
+  const at = (sample * boxes + box) * 4;
+  const q = [0, 1, 2, 3].map((i) => result.rotations[at + i] / 32767);
+  const length = Math.hypot(...q) || 1;
+  return q.map((component) => component / length);
+}

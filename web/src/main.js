@@ -1,0 +1,384 @@
+// What is shown, and what people do to it.
+
+import { Set as Input, rotation } from "./data.js";
+import { Plots } from "./plots.js";
+import { Stage } from "./scene.js";
+
+const element = (id) => document.getElementById(id);
+const stored = JSON.parse(element("data").textContent);
+const inputs = stored.sets.map((set) => new Input(set));
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+
+const state = {
+  input: inputs[0],
+  method: stored.first,
+  other: "",
+  pairing: "ghost",
+  apart: false,
+  box: 0,
+  picked: false,
+  time: 0,
+  sample: 0,
+  playing: false,
+  loop: true,
+  speed: 1,
+};
+let results = [];
+let stage = null;
+const plots = new Plots({ components: element("components"), speeds: element("speeds") }, (time) => seek(time));
+
+function colours() {
+  const style = getComputedStyle(document.documentElement);
+  const probe = document.createElement("i");
+  document.body.append(probe);
+  // What light-dark() comes to.
+  const value = (name) => {
+    probe.style.color = style.getPropertyValue(`--${name}`);
+    return getComputedStyle(probe).color;
+  };
+  const names = ["ground", "panel", "ink", "pale", "line", "accent"];
+  const theme = Object.fromEntries(names.map((name) => [name, value(name)]));
+  probe.remove();
+  theme.methods = Object.fromEntries(stored.methods.map((method) => [method.name, method.colour]));
+  return theme;
+}
+
+function fill(select, entries) {
+  select.replaceChildren(
+    ...entries.map(([value, text, title]) => {
+      const option = new Option(text, value);
+      if (title) option.title = title;
+      return option;
+    }),
+  );
+}
+
+/** Loads the results asked for and draws everything anew. */
+let loading = Promise.resolve();
+function load(refit = false) {
+  loading = loading.then(async () => {
+    const { input, method, other } = state;
+    await input.unpack();
+    const names = other && other !== method ? [method, other] : [method];
+    results = await Promise.all(names.map((name) => input.result(name)));
+    state.box = Math.min(state.box, input.boxes - 1);
+    if (stage) {
+      const ghost = state.pairing === "ghost";
+      const pair = results.length > 1 ? { ghost, colours: ghost ? [colourOf(other)] : stored.boxColours } : null;
+      stage.fill(input.boxes, input.length, stored.boxColours, pair);
+      if (refit) {
+        stage.measure(results, input.samples, state.apart);
+        stage.frame(side());
+      }
+      stage.paint(picked());
+    }
+    tell();
+    drawPlots();
+    show(Math.min(state.sample, input.samples - 1));
+  });
+  return loading;
+}
+
+// The first box is shown until somebody chooses one, which is lit then.
+const picked = () => (state.picked ? state.box : -1);
+const side = () => results.length > 1 && state.pairing === "side";
+const colourOf = (name) => stored.methods.find((method) => method.name === name).colour;
+
+/** Menus, names and legend as the state is. */
+function tell() {
+  const { input } = state;
+  element("title").textContent = input.name;
+  document.title = `${input.name} · Tumble`;
+  element("set").value = String(inputs.indexOf(input));
+  element("method").value = state.method;
+  element("other").value = state.other;
+  element("pairing").value = state.pairing;
+  element("pairing-field").hidden = results.length < 2;
+  element("pairing-field").style.display = results.length < 2 ? "none" : "";
+  element("arrangement").value = state.apart ? "apart" : "chain";
+  element("speed").value = String(state.speed);
+  element("loop").checked = state.loop;
+  element("box").max = String(input.boxes);
+  element("box").value = String(state.box + 1);
+  element("time").max = String(input.samples - 1);
+  const legend = results.map(({ method }, i) => {
+    const entry = document.createElement("span");
+    const place = side() ? ["left: ", "right: "][i] : ["", "ghost: "][i];
+    entry.textContent = place + method;
+    entry.style.setProperty("--mark", colourOf(method));
+    return entry;
+  });
+  element("legend").replaceChildren(...legend);
+}
+
+function drawPlots() {
+  plots.show(state.input, results, state.box, colours());
+  plots.now(state.input.times[state.sample] ?? 0);
+}
+
+/** Shows a sample. */
+function show(sample) {
+  const { input } = state;
+  state.sample = sample;
+  const time = input.times[sample];
+  if (!state.playing) state.time = time;
+  if (stage) stage.place(results, sample, { apart: state.apart, side: side() });
+  plots.now(time);
+  element("time").value = String(sample);
+  element("time").setAttribute("aria-valuetext", `${time.toFixed(3)} seconds`);
+  element("clock").textContent = `${time.toFixed(3)} s, sample ${sample + 1} of ${input.samples}`;
+  const [x, y, z, w] = rotation(results[0], input.boxes, sample, state.box);
+  element("box-values").textContent = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
+}
+
+const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4);
+
+/** Goes to the sample nearest to a time. */
+function seek(time) {
+  const { times, samples } = state.input;
+  let sample = state.input.sampleAt(time);
+  if (sample + 1 < samples && times[sample + 1] - time < time - times[sample]) sample += 1;
+  state.time = times[sample];
+  show(sample);
+}
+
+function step(samples) {
+  play(false);
+  show(Math.min(Math.max(state.sample + samples, 0), state.input.samples - 1));
+}
+
+function toKey(direction) {
+  play(false);
+  const now = state.input.times[state.sample];
+  const { times } = state.input.keysOf(state.box);
+  const near = 1e-9 * Math.max(1, Math.abs(now));
+  const found = direction > 0 ? times.find((time) => time > now + near) : times.findLast((time) => time < now - near);
+  if (found !== undefined) seek(found);
+}
+
+function play(playing) {
+  const { times, samples } = state.input;
+  if (playing && state.sample === samples - 1) {
+    state.time = times[0];
+    show(0);
+  }
+  state.playing = playing;
+  element("play").textContent = playing ? "Pause" : "Play";
+  element("play").setAttribute("aria-pressed", String(playing));
+}
+
+function advance(seconds) {
+  const { times, samples } = state.input;
+  const last = times[samples - 1];
+  state.time += seconds * state.speed;
+  if (state.time > last) {
+    const length = last - times[0];
+    if (state.loop && length > 0) {
+      state.time = times[0] + ((state.time - times[0]) % length);
+    } else {
+      state.time = last;
+      play(false);
+    }
+  }
+  show(state.input.sampleAt(state.time));
+}
+
+function setMethod(name) {
+  if (!stored.methods.some((method) => method.name === name)) return; // not in this page
+  state.method = name;
+  load();
+}
+
+function setOther(name, pairing = state.pairing) {
+  const refit = pairing !== state.pairing || !name !== !state.other;
+  Object.assign(state, { other: name, pairing });
+  load(refit && (pairing === "side" || stage?.span !== undefined));
+}
+
+/** Off, ghost, side by side, off. */
+function nextPairing() {
+  const names = stored.methods.map((method) => method.name);
+  const other = ["slerp", "bessel-overhauser", ...names].find((name) => name !== state.method && names.includes(name));
+  if (!other) return;
+  if (!state.other) setOther(other, "ghost");
+  else if (state.pairing === "ghost") setOther(other, "side");
+  else setOther("", "ghost");
+}
+
+function arrange(apart) {
+  state.apart = apart;
+  load(true);
+}
+
+function chooseBox(box) {
+  const boxes = state.input.boxes;
+  state.box = Math.min(Math.max(box, 0), boxes - 1);
+  state.picked = true;
+  stage?.paint(picked());
+  tell();
+  drawPlots();
+  show(state.sample);
+}
+
+function faster(steps) {
+  const place = Math.min(Math.max(SPEEDS.indexOf(state.speed) + steps, 0), SPEEDS.length - 1);
+  state.speed = SPEEDS[place];
+  tell();
+}
+
+function loop(on) {
+  state.loop = on;
+  tell();
+}
+
+function theme() {
+  const root = document.documentElement;
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const now = root.dataset.theme ?? (dark ? "dark" : "light");
+  root.dataset.theme = now === "dark" ? "light" : "dark";
+  dress();
+}
+
+function dress() {
+  const found = colours();
+  stage?.theme({ ground: found.panel, line: found.line, pale: found.pale });
+  if (results.length > 0) drawPlots();
+}
+
+const help = () => element("help").showModal();
+
+const KEYS = [
+  ["space", " ", "play or pause", () => play(!state.playing)],
+  ["← →", ["ArrowLeft", "ArrowRight"], "one sample back or on; in the view, turn it", (key) => step(key === "ArrowLeft" ? -1 : 1)],
+  ["[ ]", ["[", "]"], "to the key before, to the next key", (key) => toKey(key === "[" ? -1 : 1)],
+  ["Home End", ["Home", "End"], "to the start, to the end", (key) => step(key === "Home" ? -Infinity : Infinity)],
+  ["s", "s", "slerp", () => setMethod("slerp")],
+  ["c", "c", "catmull-rom", () => setMethod("catmull-rom")],
+  ["b", "b", "bessel-overhauser", () => setMethod("bessel-overhauser")],
+  ["m", "m", "choose any other method", () => element("method").focus()],
+  ["g", "g", "compare with another method: ghost, side by side, off", nextPairing],
+  ["a", "a", "boxes as a chain, or apart", () => arrange(!state.apart)],
+  ["n p", ["n", "p"], "curves of the next box, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
+  ["- +", ["-", "+", "="], "slower, faster", (key) => faster(key === "-" ? -1 : 1)],
+  ["l", "l", "loop", () => loop(!state.loop)],
+  ["r", "r", "the whole view again", () => stage?.frame(side())],
+  ["t", "t", "light or dark", theme],
+  ["?", "?", "these keys", help],
+];
+
+function pressed(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
+  const { target, key } = event;
+  // Menus and fields have keys of their own; a button, space and enter.
+  if (target.matches("select, input[type=number]")) return;
+  if (target.matches("input[type=range]") && /^(Arrow|Home|End|Page)/.test(key)) return;
+  if (target.matches("button, input[type=checkbox]") && (key === " " || key === "Enter")) return;
+  if (target === element("stage") && key.startsWith("Arrow")) {
+    const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+    stage?.turn(...turns[key]);
+    event.preventDefault();
+    return;
+  }
+  if (target === element("stage") && (key === "PageUp" || key === "PageDown")) {
+    stage?.zoom(key === "PageUp" ? 0.9 : 1.1);
+    event.preventDefault();
+    return;
+  }
+  const found = KEYS.find(([, keys]) => [keys].flat().includes(key));
+  if (found) {
+    event.preventDefault();
+    found[3](key);
+  }
+}
+
+function listen() {
+  const on = (id, event, act) => element(id).addEventListener(event, act);
+  addEventListener("keydown", pressed);
+  on("play", "click", () => play(!state.playing));
+  on("to-start", "click", () => step(-Infinity));
+  on("key-before", "click", () => toKey(-1));
+  on("key-after", "click", () => toKey(1));
+  on("time", "input", (event) => {
+    play(false);
+    show(Number(event.target.value));
+  });
+  on("speed", "change", (event) => {
+    state.speed = Number(event.target.value);
+  });
+  on("loop", "change", (event) => loop(event.target.checked));
+  on("set", "change", (event) => {
+    Object.assign(state, { input: inputs[Number(event.target.value)], sample: 0, time: 0 });
+    load(true);
+  });
+  on("method", "change", (event) => setMethod(event.target.value));
+  on("other", "change", (event) => setOther(event.target.value));
+  on("pairing", "change", (event) => setOther(state.other, event.target.value));
+  on("arrangement", "change", (event) => arrange(event.target.value === "apart"));
+  on("box", "change", (event) => chooseBox(Number(event.target.value) - 1 || 0));
+  on("theme", "click", theme);
+  on("help-open", "click", help);
+  let down = null;
+  on("stage", "pointerdown", (event) => (down = [event.clientX, event.clientY]));
+  on("stage", "click", (event) => {
+    const moved = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4;
+    const box = stage && !moved ? stage.pick(event.clientX, event.clientY) : -1;
+    if (box >= 0) chooseBox(box);
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
+}
+
+function menus() {
+  const methods = stored.methods.map(({ name, summary, colour }) => [name, name, summary]);
+  fill(element("set"), inputs.map((input, i) => [String(i), input.name]));
+  element("set-field").style.display = inputs.length > 1 ? "" : "none";
+  fill(element("method"), methods);
+  fill(element("other"), [["", "nothing"], ...methods]);
+  fill(element("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]));
+  element("keys").replaceChildren(
+    ...KEYS.flatMap(([label, , text]) => {
+      const [term, what] = [document.createElement("dt"), document.createElement("dd")];
+      term.textContent = label;
+      what.textContent = text;
+      return [term, what];
+    }),
+  );
+  element("about").textContent =
+    `Rotations made by tumble ${stored.version} on ${stored.device}, kept in 16 bits a component; ` +
+    "this page interpolates nothing. three.js and uPlot are under the MIT licence; see the page's source.";
+}
+
+async function start() {
+  menus();
+  listen();
+  try {
+    // Where boxes are many, smooth edges cost a browser without a graphics card a third of its speed.
+    const many = Math.max(...inputs.map((input) => input.boxes)) > 256;
+    stage = new Stage(element("stage"), !many);
+  } catch (error) {
+    element("trouble").hidden = false;
+    element("trouble").textContent = `The boxes cannot be drawn, this browser has no WebGL (${error.message}); the curves are below.`;
+  }
+  dress();
+  await load(true);
+  let before = performance.now();
+  const frame = (now) => {
+    const between = now - before;
+    before = now;
+    // A page that was hidden goes on where it was.
+    if (state.playing) advance(Math.min(between, 250) / 1000);
+    stage?.draw(between);
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+// For tests, and for the curious.
+globalThis.tumble = {
+  state,
+  seek,
+  loaded: () => loading,
+  shown: (box, group = 0) => stage.groups[group].shown(box, state.apart),
+  frames: () => stage.drawn,
+  pixelRatio: () => stage.ratio,
+  ready: start(),
+};

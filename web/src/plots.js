@@ -1,0 +1,126 @@
+// The chosen box's components and angular speed over time, by uPlot.
+
+import uPlot from "uplot";
+
+const NAMES = ["w", "x", "y", "z"];
+const PLACES = [3, 0, 1, 2]; // of w x y z in x y z w
+
+/** One component of a box at every sample; no jump where the sign of a quaternion flips. */
+function components(result, boxes, box, samples) {
+  const columns = NAMES.map(() => new Float64Array(samples));
+  const before = [0, 0, 0, 0];
+  for (let sample = 0; sample < samples; sample++) {
+    const at = (sample * boxes + box) * 4;
+    const values = PLACES.map((place) => result.rotations[at + place] / 32767);
+    const product = values.reduce((sum, value, i) => sum + value * before[i], 0);
+    const sign = product < 0 ? -1 : 1;
+    for (let i = 0; i < 4; i++) {
+      before[i] = values[i] * sign;
+      columns[i][sample] = before[i];
+    }
+  }
+  return columns;
+}
+
+/** Keys as values at the samples nearest to them, nothing elsewhere. */
+function keyDots(set, box, columns) {
+  const dots = NAMES.map(() => new Array(set.samples).fill(null));
+  const { times, first } = set.keysOf(box);
+  times.forEach((time, key) => {
+    if (time < set.times[0] || time > set.times[set.samples - 1]) return;
+    let sample = set.sampleAt(time);
+    if (sample + 1 < set.samples && set.times[sample + 1] - time < time - set.times[sample]) sample += 1;
+    const values = PLACES.map((place) => set.keys[(first + key) * 4 + place] / 32767);
+    const product = values.reduce((sum, value, i) => sum + value * columns[i][sample], 0);
+    values.forEach((value, i) => (dots[i][sample] = product < 0 ? -value : value));
+  });
+  return dots;
+}
+
+export class Plots {
+  constructor(elements, seek) {
+    this.elements = elements;
+    this.seek = seek;
+    this.charts = [];
+    new ResizeObserver(() => this.fit()).observe(elements.components);
+  }
+
+  width() {
+    return Math.max(this.elements.components.clientWidth - 12, 200);
+  }
+
+  fit() {
+    for (const chart of this.charts) chart.setSize({ width: this.width(), height: chart.height });
+    if (this.time !== undefined) this.now(this.time);
+  }
+
+  /** Draws anew: for another box, method or theme. */
+  show(set, results, box, theme) {
+    for (const chart of this.charts) chart.destroy();
+    const { samples, boxes } = set;
+    const [shown, other] = results.map((result) => components(result, boxes, box, samples));
+    const dots = keyDots(set, box, shown);
+    const dashed = { dash: [5, 4], width: 1.5 };
+    const line = (label, stroke, extra) => ({ label, stroke, width: 2, points: { show: false }, ...extra });
+    const colours = [theme.ink, "#d55e00", "#009e73", theme.accent];
+    const series = NAMES.map((name, i) => line(name, colours[i]));
+    const data = [set.times, ...shown];
+    if (other) {
+      NAMES.forEach((name, i) => series.push(line(`${name}, ${results[1].method}`, colours[i], dashed)));
+      data.push(...other);
+    }
+    NAMES.forEach((name, i) => {
+      const points = { show: true, size: 7, fill: colours[i], stroke: theme.panel, width: 1 };
+      series.push({ label: `key ${name}`, class: "key", stroke: colours[i], paths: () => null, points });
+      data.push(dots[i]);
+    });
+    const speeds = results.map((result) => {
+      const column = new Float64Array(samples);
+      for (let sample = 0; sample < samples; sample++) {
+        column[sample] = (result.speeds[sample * boxes + box] / 65535) * result.fastest;
+      }
+      return column;
+    });
+    const speedSeries = results.map((result, i) =>
+      line(`angular speed, ${result.method}, rad/s`, theme.methods[result.method], i ? dashed : {}),
+    );
+    this.charts = [
+      this.chart(this.elements.components, 240, series, data, theme),
+      this.chart(this.elements.speeds, 150, speedSeries, [set.times, ...speeds], theme),
+    ];
+  }
+
+  chart(element, height, series, data, theme) {
+    const axis = { stroke: theme.pale, grid: { stroke: theme.line, width: 1 }, ticks: { stroke: theme.line } };
+    const seconds = (_, values) => values.map((value) => `${value} s`);
+    const options = {
+      width: this.width(),
+      height,
+      scales: { x: { time: false } },
+      legend: { live: false },
+      cursor: { drag: { x: false, y: false }, points: { show: false }, y: false },
+      axes: [{ ...axis, values: seconds }, { ...axis, size: 46 }],
+      series: [{ label: "time, s" }, ...series],
+    };
+    const chart = new uPlot(options, data, element);
+    chart.now = document.createElement("div");
+    chart.now.className = "now";
+    chart.over.append(chart.now);
+    const go = (event) => this.seek(chart.posToVal(event.clientX - chart.over.getBoundingClientRect().left, "x"));
+    chart.over.addEventListener("pointerdown", (event) => {
+      go(event);
+      chart.over.setPointerCapture(event.pointerId);
+      chart.over.onpointermove = go;
+      chart.over.onpointerup = () => (chart.over.onpointermove = null);
+    });
+    return chart;
+  }
+
+  /** Moves the cursors. */
+  now(time) {
+    this.time = time;
+    for (const chart of this.charts) {
+      chart.now.style.transform = `translateX(${chart.valToPos(time, "x")}px)`;
+    }
+  }
+}

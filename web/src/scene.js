@@ -1,0 +1,266 @@
+// The boxes, drawn by three.js.
+
+import {
+  Box3, BoxGeometry, Color, DirectionalLight, Euler, GridHelper, HemisphereLight, InstancedMesh,
+  MathUtils, Matrix4, MeshLambertMaterial, PerspectiveCamera, Quaternion, Raycaster, Scene,
+  Vector2, Vector3, WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+// Frames slower than this are drawn with fewer pixels.
+const SLOW = 30;
+const COARSEST = 0.5;
+
+/** Where the boxes of one result stand at a sample. */
+class Boxes {
+  constructor(count, length, colours, ghost) {
+    const breadth = length * 0.28;
+    const geometry = new BoxGeometry(breadth, length * 0.96, breadth);
+    geometry.translate(0, -length / 2, 0); // it hangs from the origin
+    const material = new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    this.mesh = new InstancedMesh(geometry, material, count);
+    this.mesh.frustumCulled = false;
+    this.length = length;
+    this.ghost = ghost;
+    this.colours = colours;
+    this.paint(-1);
+  }
+
+  /** Colours the boxes; the chosen one (-1: none) is lighter. */
+  paint(chosen) {
+    const colour = new Color();
+    for (let box = 0; box < this.mesh.count; box++) {
+      colour.set(this.colours[box % this.colours.length]);
+      if (box === chosen) colour.lerp(new Color(0xffffff), 0.35);
+      this.mesh.setColorAt(box, colour);
+    }
+    this.mesh.instanceColor.needsUpdate = true;
+  }
+
+  /** Box i hangs at the end of box i-1, turned in its frame; or each in a place of its own. */
+  place(result, sample, { apart, shift }) {
+    const count = this.mesh.count;
+    const matrices = this.mesh.instanceMatrix.array;
+    const own = new Quaternion();
+    const turned = new Quaternion();
+    const hung = new Vector3(shift, 0, 0);
+    const along = new Vector3();
+    const one = new Vector3(1, 1, 1);
+    const matrix = new Matrix4();
+    for (let box = 0; box < count; box++) {
+      const at = (sample * count + box) * 4;
+      own.fromArray(result.rotations, at).normalize();
+      if (apart) {
+        turned.copy(own);
+        hung.copy(cell(box, count, this.length)).x += shift;
+      } else {
+        turned.multiply(own).normalize();
+      }
+      matrix.compose(hung, turned, one).toArray(matrices, box * 16);
+      hung.add(along.set(0, -this.length, 0).applyQuaternion(turned));
+    }
+    this.mesh.instanceMatrix.needsUpdate = true;
+  }
+
+  /** The rotation that a box shows, seen from the box it hangs from: read back from what is drawn. */
+  shown(box, apart) {
+    const world = new Quaternion();
+    const parent = new Quaternion();
+    const matrix = new Matrix4();
+    const read = (index, into) => {
+      this.mesh.getMatrixAt(index, matrix);
+      matrix.decompose(new Vector3(), into, new Vector3());
+    };
+    read(box, world);
+    if (box > 0 && !apart) read(box - 1, parent);
+    return parent.invert().multiply(world).toArray();
+  }
+
+  dispose() {
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+    this.mesh.dispose();
+  }
+}
+
+/** Places side by side, in rows. */
+function cell(box, count, length) {
+  const columns = Math.ceil(Math.sqrt(count));
+  const x = (box % columns) - (columns - 1) / 2;
+  const z = Math.floor(box / columns) - (Math.ceil(count / columns) - 1) / 2;
+  return new Vector3(x, 0, z).multiplyScalar(length * 2.3);
+}
+
+export class Stage {
+  constructor(element, antialias) {
+    this.element = element;
+    this.renderer = new WebGLRenderer({ antialias });
+    this.renderer.domElement.setAttribute("aria-hidden", "true");
+    element.append(this.renderer.domElement);
+    this.ratio = Math.min(devicePixelRatio, 2);
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(38, 1, 0.1, 1000);
+    this.sky = new HemisphereLight(0xffffff, 0x8a8f98, 2);
+    this.sun = new DirectionalLight(0xffffff, 2.2);
+    this.sun.position.set(2, 4, 3);
+    this.scene.add(this.sky, this.sun);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.addEventListener("change", () => (this.stale = true));
+    this.drawn = 0;
+    this.slow = 0;
+    this.stale = true;
+    new ResizeObserver(() => this.resize()).observe(element);
+    this.resize();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(this.ratio);
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.stale = true;
+  }
+
+  /** New boxes: of one result, or of two. */
+  fill(count, length, colours, others) {
+    for (const boxes of this.groups ?? []) {
+      this.scene.remove(boxes.mesh);
+      boxes.dispose();
+    }
+    this.groups = [new Boxes(count, length, colours, false)];
+    if (others) this.groups.push(new Boxes(count, length, others.colours, others.ghost));
+    this.scene.add(...this.groups.map((boxes) => boxes.mesh));
+    this.stale = true;
+  }
+
+  paint(chosen) {
+    for (const boxes of this.groups) boxes.paint(chosen);
+    this.stale = true;
+  }
+
+  place(results, sample, { apart, side }) {
+    const gap = side ? this.span : 0;
+    this.groups.forEach((boxes, group) => {
+      const shift = results.length > 1 ? (group - 0.5) * gap : 0;
+      boxes.place(results[group], sample, { apart, shift });
+    });
+    this.stale = true;
+  }
+
+  /** Every place that ends of boxes take at some samples. */
+  measure(results, samples, apart) {
+    const [boxes] = this.groups;
+    const matrix = new Matrix4();
+    const step = Math.max(1, Math.floor(samples / 60));
+    this.points = [];
+    for (const result of results) {
+      for (let sample = 0; sample < samples; sample += step) {
+        boxes.place(result, sample, { apart, shift: 0 });
+        for (let box = 0; box < boxes.mesh.count; box++) {
+          boxes.mesh.getMatrixAt(box, matrix);
+          for (const end of [0, -boxes.length]) {
+            this.points.push(new Vector3(0, end, 0).applyMatrix4(matrix));
+          }
+        }
+      }
+    }
+    this.room = new Box3().setFromPoints(this.points).expandByScalar(boxes.length * 0.2);
+    this.span = this.room.max.x - this.room.min.x + boxes.length * 0.5;
+  }
+
+  /** The floor under the boxes, and the camera where it sees all of them. */
+  frame(side) {
+    const { min, max } = this.room;
+    const centre = this.room.getCenter(new Vector3());
+    const radius = this.room.getSize(new Vector3()).length() / 2;
+    this.floorSize = 10 ** Math.ceil(Math.log10(radius * 4));
+    this.floorPlace = new Vector3(centre.x, min.y - (max.y - min.y) * 0.02, centre.z);
+    this.layFloor();
+    const view = new Quaternion().setFromEuler(new Euler(-0.3, 0.4, 0, "YXZ"));
+    const back = view.clone().invert();
+    const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2)) * 0.92;
+    const point = new Vector3();
+    let distance = 0;
+    for (const place of this.points) {
+      for (const shift of side ? [-this.span / 2, this.span / 2] : [0]) {
+        point.copy(place).sub(centre).setX(place.x - centre.x + shift).applyQuaternion(back);
+        const across = Math.abs(point.x) / (upright * this.camera.aspect);
+        distance = Math.max(distance, point.z + Math.max(across, Math.abs(point.y) / upright));
+      }
+    }
+    this.camera.near = distance / 100;
+    this.camera.far = (distance + radius) * 20;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.camera.position.set(0, 0, distance).applyQuaternion(view).add(centre);
+    this.controls.update();
+    this.stale = true;
+  }
+
+  /** The grid, in the colours of the theme. */
+  layFloor() {
+    if (this.floor) {
+      this.scene.remove(this.floor);
+      this.floor.dispose();
+    }
+    this.floor = new GridHelper(this.floorSize, 40, ...this.lines);
+    this.floor.position.copy(this.floorPlace);
+    this.scene.add(this.floor);
+    this.stale = true;
+  }
+
+  theme({ ground, line, pale }) {
+    this.renderer.setClearColor(ground);
+    this.lines = [pale, line];
+    if (this.floor) this.layFloor();
+    this.stale = true;
+  }
+
+  /** Turns the view by angles about the upright and the level axis, radians. */
+  turn(around, over) {
+    const { target } = this.controls;
+    const offset = this.camera.position.clone().sub(target);
+    const length = offset.length();
+    const azimuth = Math.atan2(offset.x, offset.z) + around;
+    const height = MathUtils.clamp(Math.asin(offset.y / length) + over, -1.5, 1.5);
+    offset.set(Math.sin(azimuth) * Math.cos(height), Math.sin(height), Math.cos(azimuth) * Math.cos(height));
+    this.camera.position.copy(target).addScaledVector(offset, length);
+    this.controls.update();
+    this.stale = true;
+  }
+
+  zoom(factor) {
+    const { target } = this.controls;
+    this.camera.position.sub(target).multiplyScalar(factor).add(target);
+    this.controls.update();
+    this.stale = true;
+  }
+
+  /** The box at a point of the page, or -1. */
+  pick(x, y) {
+    const area = this.renderer.domElement.getBoundingClientRect();
+    const point = new Vector2(((x - area.left) / area.width) * 2 - 1, 1 - ((y - area.top) / area.height) * 2);
+    const ray = new Raycaster();
+    ray.setFromCamera(point, this.camera);
+    for (const boxes of this.groups) boxes.mesh.boundingSphere = null;
+    const [hit] = ray.intersectObjects(this.groups.map((boxes) => boxes.mesh));
+    return hit ? hit.instanceId : -1;
+  }
+
+  /** Draws if anything has changed; where that takes long, with fewer pixels from then on. */
+  draw(between) {
+    this.controls.update();
+    if (!this.stale) return;
+    this.stale = false;
+    this.renderer.render(this.scene, this.camera);
+    this.drawn += 1;
+    this.slow = between > SLOW ? this.slow + 1 : 0;
+    if (this.slow > 12 && this.ratio > COARSEST) {
+      this.ratio = Math.max(this.ratio * 0.75, COARSEST);
+      this.slow = 0;
+      this.resize();
+    }
+  }
+}
