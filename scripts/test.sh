@@ -1,29 +1,30 @@
 #!/usr/bin/env bash
 # Every test, on this machine as on CI. Installs what the tests need where it is
-# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val, and
-# valgrind, which counts instructions.
+# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val, valgrind,
+# which counts instructions, and chromium, which opens the pages of `tumble view`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 has_driver() { compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null; }
 has_layer() { compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null; }
+has_browser() { command -v chromium || command -v chromium-browser || command -v google-chrome; }
 has_loader() { ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'; }
 
 if ! has_driver || ! has_layer || ! has_loader || ! command -v spirv-val >/dev/null ||
-    ! command -v valgrind >/dev/null; then
+    ! command -v valgrind >/dev/null || ! has_browser >/dev/null; then
     if command -v apt-get >/dev/null; then
         sudo=""
         [ "$(id -u)" -eq 0 ] || sudo="sudo"
-        echo "installing lavapipe, the validation layer, spirv-tools and valgrind" >&2
+        echo "installing lavapipe, the validation layer, spirv-tools, valgrind and chromium" >&2
         $sudo apt-get update -qq
         DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
             libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools valgrind \
-            >/dev/null
+            chromium >/dev/null
     else
-        echo "the tests want a Vulkan loader, lavapipe, VK_LAYER_KHRONOS_validation, spirv-val and" >&2
-        echo "valgrind; install your system's packages for them (Debian: libvulkan1" >&2
-        echo "mesa-vulkan-drivers vulkan-validationlayers spirv-tools valgrind). Tests without" >&2
-        echo "them say so and compare nothing." >&2
+        echo "the tests want a Vulkan loader, lavapipe, VK_LAYER_KHRONOS_validation, spirv-val," >&2
+        echo "valgrind and chromium; install your system's packages for them (Debian: libvulkan1" >&2
+        echo "mesa-vulkan-drivers vulkan-validationlayers spirv-tools valgrind chromium). Tests" >&2
+        echo "without them say so and compare nothing." >&2
     fi
 fi
 

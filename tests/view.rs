@@ -648,7 +648,7 @@ fn open_shows_the_page_to_the_browser() {
     .unwrap();
     fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).unwrap();
     let path = format!("{}:/usr/bin:/bin", place.path().display());
-    let mut view = |line: &[&str]| {
+    let view = |line: &[&str]| {
         let mut command = program::command(place.path(), line);
         let run = program::finish(command.env("PATH", &path).output().unwrap());
         assert_eq!(run.code, 0, "{}", run.words);

@@ -21,6 +21,7 @@ mod picture;
 mod place;
 mod plot;
 mod progress;
+mod render;
 mod room;
 mod signals;
 mod stream;
@@ -47,6 +48,8 @@ Examples:
   tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
   tumble verify chain.dat                      device = CPU, and both against f64
+  tumble view chain.dat --open                 see the boxes turn
+  tumble plot chain.dat -o chain.svg           see every component
   tumble devices                               what Vulkan offers here
   tumble bench                                 how fast this machine is
 
@@ -76,6 +79,7 @@ pub(crate) enum Command {
     Methods(methods::Arguments),
     Plot(Box<plot::Arguments>),
     View(Box<view::Arguments>),
+    Render(Box<render::Arguments>),
     Bench(bench::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -92,6 +96,7 @@ impl Command {
             Self::Methods(arguments) => methods::run(&arguments),
             Self::Plot(arguments) => plot::run(&arguments),
             Self::View(arguments) => view::run(&arguments),
+            Self::Render(arguments) => render::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use resvg::usvg;
+
 /// Writes a PNG file.
 pub(crate) fn png(out: impl Write, width: u32, height: u32, pixels: &[u8]) -> io::Result<()> {
     let mut encoder = png::Encoder::new(out, width, height);
@@ -10,6 +12,16 @@ pub(crate) fn png(out: impl Write, width: u32, height: u32, pixels: &[u8]) -> io
     let mut writer = encoder.write_header().map_err(io::Error::other)?;
     writer.write_image_data(pixels).map_err(io::Error::other)?;
     writer.finish().map_err(io::Error::other)
+}
+
+/// How SVG becomes pixels: its letters are DejaVu Sans.
+pub(crate) fn svg_options() -> usvg::Options<'static> {
+    let mut options = usvg::Options::default();
+    let fonts = options.fontdb_mut();
+    fonts.load_font_data(dejavu::sans::regular().to_vec());
+    fonts.load_font_data(dejavu::sans::bold().to_vec());
+    fonts.set_sans_serif_family("DejaVu Sans");
+    options
 }
 
 /// A picture of half the width and height: each pixel is the mean of four. The width and

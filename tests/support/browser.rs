@@ -127,7 +127,7 @@ impl Page {
                 self.requests.push(url.to_owned());
             }
             Some("Runtime.exceptionThrown") => {
-                self.errors.push(what["exceptionDetails"].to_string())
+                self.errors.push(what["exceptionDetails"].to_string());
             }
             Some("Log.entryAdded") if what["entry"]["level"] == "error" => {
                 self.errors.push(what["entry"].to_string());

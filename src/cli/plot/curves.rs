@@ -3,24 +3,20 @@
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{Curve as Reference, angle_between};
 use tumble::verify::error_bound;
-use tumble::{Axes as OwnAxes, Frames, Interpolation, Layout, Quantity, Timeline, TrackSet};
+use tumble::{Axes as OwnAxes, Interpolation, Quantity};
 
 use super::figure::{Axes, Axis, Curve, Dots, Entry, Figure, Mark, Panel, range_of, thinned};
+use super::source::Source;
 use super::sphere::{graticule, seen, side};
 use crate::cli::colours::{self, COMPONENTS, INK};
 use crate::cli::device::Opened;
 use crate::cli::exit::Failure;
-use crate::cli::time::Samples;
-use crate::cli::words;
 
 /// Components of a quaternion in the order of dimensions.
 pub(crate) const NAMES: [&str; 4] = ["w", "x", "y", "z"];
 
 /// Errors below this are none: the sample is exact.
 const EXACT: f64 = 1e-12;
-
-/// More keys than this stand too close for upright lines.
-const UPRIGHTS: usize = 200;
 
 /// What a figure shows. Boxes and dimensions count from 0 here.
 #[derive(Debug, Clone)]
@@ -37,119 +33,46 @@ pub(crate) enum Subject {
     Sphere(Vec<usize>, Vec3),
 }
 
-/// One input, and how to evaluate it.
-pub(crate) struct Source<'a> {
-    pub(crate) name: String,
-    pub(crate) set: &'a TrackSet,
-    pub(crate) interpolations: &'a [Interpolation],
-    frames: Frames,
-    timeline: Timeline,
-    x: Axis,
-    /// Where a time lies on that axis.
-    x_of: Box<dyn Fn(f64) -> f64>,
-    about: String,
-}
-
-impl<'a> Source<'a> {
-    pub(crate) fn new(
-        name: String,
-        set: &'a TrackSet,
-        interpolations: &'a [Interpolation],
-        samples: &Samples,
-    ) -> Result<Self, Failure> {
-        let mut frames = samples.of(set, &name);
-        if let (Samples::Rate { start, end, .. }, Some((first, last))) = (samples, set.time_span())
-        {
-            // A box alone has the frames of the whole set.
-            frames = frames.between(start.unwrap_or(first), end.unwrap_or(last));
-        }
-        let timeline = frames
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
-        if timeline.is_empty() {
-            return Err(Failure::usage(format!(
-                "{name}: there are no samples to plot"
-            )));
-        }
-        let start = timeline.time(0, 0);
-        let count = words::count(timeline.len(), "frame");
-        let (label, x_of, about): (_, Box<dyn Fn(f64) -> f64>, _) = match samples {
-            Samples::Rate { rate, .. } => {
-                let per_second = rate.per_second();
-                (
-                    format!("frame ({rate} per second)"),
-                    Box::new(move |time| (time - start) * per_second),
-                    format!("{count}, {rate} per second"),
-                )
-            }
-            Samples::Times(_) => (
-                "time, s".to_owned(),
-                Box::new(|time| time),
-                words::count(timeline.len(), "time"),
-            ),
-        };
-        let range = range_of((0..timeline.len()).map(|sample| x_of(timeline.time(0, sample))));
-        let x = Axis {
-            label,
-            range,
-            powers: false,
-        };
-        Ok(Self {
-            name,
-            set,
-            interpolations,
-            frames,
-            timeline,
-            x,
-            x_of,
-            about,
-        })
-    }
-
+impl Source<'_> {
     pub(crate) fn figure(&self, device: &mut Opened, subject: &Subject) -> Result<Figure, Failure> {
-        let mut panels = Vec::new();
-        let (what, columns) = match subject {
+        let (what, panels): (_, Result<Vec<Panel>, Failure>) = match subject {
             Subject::Components(boxes) if self.interpolations.len() == 1 => {
-                for &index in boxes {
-                    panels.push(self.components(device, index, &[0, 1, 2, 3])?);
-                }
-                ("components", if boxes.len() < 3 { 1 } else { 2 })
+                let panel = |&index: &usize| self.components(device, index, &[0, 1, 2, 3]);
+                ("components", boxes.iter().map(panel).collect())
             }
             Subject::Components(boxes) => {
-                for place in boxes.iter().flat_map(|index| index * 4..index * 4 + 4) {
-                    panels.push(self.components(device, place / 4, &[place % 4])?);
-                }
-                ("components", 4)
+                let places = boxes.iter().flat_map(|index| index * 4..index * 4 + 4);
+                let panel = |place| self.components(device, place / 4, &[place % 4]);
+                ("components", places.map(panel).collect())
             }
             Subject::Dimensions(places) => {
-                for place in places {
-                    panels.push(self.components(device, place / 4, &[place % 4])?);
-                }
-                ("components", if places.len() < 6 { 1 } else { 2 })
+                let panel = |place| self.components(device, place / 4, &[place % 4]);
+                ("components", places.iter().copied().map(panel).collect())
             }
             Subject::Speed(boxes) => {
-                for &index in boxes {
-                    panels.push(self.speed(device, index)?);
-                }
-                ("angular speed", if boxes.len() < 3 { 1 } else { 2 })
+                let panel = |&index| self.speed(device, index);
+                ("angular speed", boxes.iter().map(panel).collect())
             }
             Subject::Error(boxes) => {
-                for &index in boxes {
-                    panels.push(self.error(device, index)?);
-                }
-                let columns = if boxes.len() < 3 { 1 } else { 2 };
-                ("error against the f64 reference", columns)
+                let panel = |&index| self.error(device, index);
+                let panels = boxes.iter().map(panel).collect();
+                ("error against the f64 reference", panels)
             }
             Subject::Sphere(boxes, axis) => {
-                for &index in boxes {
-                    panels.push(self.sphere(device, index, *axis)?);
-                }
-                let columns = [1, 2, 2, 2][boxes.len().clamp(1, 4) - 1];
+                let panel = |&index| self.sphere(device, index, *axis);
+                let panels = boxes.iter().map(panel).collect();
                 (
                     "where an axis of each box points, seen from its parent",
-                    columns,
+                    panels,
                 )
             }
+        };
+        let panels = panels?;
+        let columns = match (subject, panels.len()) {
+            (Subject::Components(_), _) if self.interpolations.len() > 1 => 4,
+            (Subject::Sphere(..), 2) => 2,
+            (_, 0..3) => 1,
+            _ => 2,
         };
         let by_component = match (subject, self.interpolations) {
             (Subject::Components(_), [one]) => Some(one.method),
@@ -191,41 +114,6 @@ impl<'a> Source<'a> {
             mark,
         });
         legend
-    }
-
-    /// The samples of one box, each with the sign that continues the one before it: a
-    /// quaternion and its negative are the same rotation, and a curve does not jump.
-    fn rotations(
-        &self,
-        device: &mut Opened,
-        index: usize,
-        interpolation: Interpolation,
-    ) -> Result<Vec<Quat>, Failure> {
-        let mut rotations = self.evaluate(device, index, interpolation)?;
-        for place in 1..rotations.len() {
-            if rotations[place].dot(rotations[place - 1]) < 0.0 {
-                rotations[place] = -rotations[place];
-            }
-        }
-        Ok(rotations)
-    }
-
-    fn evaluate(
-        &self,
-        device: &mut Opened,
-        index: usize,
-        interpolation: Interpolation,
-    ) -> Result<Vec<Quat>, Failure> {
-        let one = self.set.select(index..index + 1);
-        device
-            .collect(&one, interpolation, &self.frames, Layout::TrackMajor)
-            .map_err(|error| Failure::evaluating(&self.name, &error))
-    }
-
-    /// Points over the samples.
-    fn points(&self, values: impl IntoIterator<Item = f64>) -> Vec<(f64, f64)> {
-        let x = (0..self.timeline.len()).map(|place| (self.x_of)(self.timeline.time(0, place)));
-        x.zip(values).collect()
     }
 
     /// Components of one box: one colour each where they share a panel, else the methods'.
@@ -286,28 +174,6 @@ impl<'a> Source<'a> {
         Ok(self.panel(title, label, range, curves, dots))
     }
 
-    /// Keys among the samples: where they lie, with the sign of the curve there.
-    fn keys(&self, index: usize, rotations: &[Quat]) -> Vec<(f64, Quat)> {
-        let track = self.set.track(index);
-        let times: Vec<f64> = (0..self.timeline.len())
-            .map(|place| self.timeline.time(0, place))
-            .collect();
-        let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
-            return Vec::new();
-        };
-        // Half a frame is none too many.
-        let room = (last - first) / (2 * times.len()) as f64;
-        let keys = track.times.iter().zip(track.keys);
-        let inside = keys.filter(|&(&time, _)| time >= first - room && time <= last + room);
-        let placed = inside.map(|(&time, &key)| {
-            let after = times.partition_point(|&sample| sample < time);
-            let near = rotations[after.min(rotations.len() - 1)];
-            let key = if key.dot(near) < 0.0 { -key } else { key };
-            ((self.x_of)(time), key)
-        });
-        placed.collect()
-    }
-
     /// Where curves may lie on each other, those drawn first are broader.
     fn width(&self, order: usize) -> f64 {
         let above = self.interpolations.len() - 1 - order;
@@ -337,15 +203,6 @@ impl<'a> Source<'a> {
             uprights: Vec::new(),
             level: None,
         }
-    }
-
-    fn key_places(&self, index: usize) -> Vec<f64> {
-        let times = self.set.track(index).times;
-        if times.len() > UPRIGHTS {
-            return Vec::new();
-        }
-        let places = times.iter().map(|&time| (self.x_of)(time));
-        places.filter(|x| self.x.range.contains(x)).collect()
     }
 
     /// Angular speed in rad/s; keys as upright lines.

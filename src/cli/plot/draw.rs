@@ -56,12 +56,8 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
 
 /// A figure as the bytes of a PNG file.
 pub(crate) fn png(figure: &Figure) -> io::Result<Vec<u8>> {
-    let mut options = usvg::Options::default();
-    let fonts = options.fontdb_mut();
-    fonts.load_font_data(dejavu::sans::regular().to_vec());
-    fonts.load_font_data(dejavu::sans::bold().to_vec());
-    fonts.set_sans_serif_family("DejaVu Sans");
-    let tree = usvg::Tree::from_str(&svg(figure)?, &options).map_err(io::Error::other)?;
+    let tree =
+        usvg::Tree::from_str(&svg(figure)?, &picture::svg_options()).map_err(io::Error::other)?;
     let (width, height) = size(figure);
     let (width, height) = (width * PIXELS, height * PIXELS);
     let mut canvas = tiny_skia::Pixmap::new(width, height)

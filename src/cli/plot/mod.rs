@@ -4,6 +4,7 @@ mod curves;
 mod draw;
 mod figure;
 mod report;
+mod source;
 mod sphere;
 
 use std::io::Write;
@@ -22,8 +23,9 @@ use super::place::{self, Place};
 use super::progress::Progress;
 use super::time::Sampling;
 use super::words;
-use curves::{Source, Subject};
+use curves::Subject;
 use figure::Figure;
+use source::Source;
 
 /// A picture with more panels than this cannot be read.
 const PANELS: usize = 64;

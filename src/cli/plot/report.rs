@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
 
-use super::curves::{NAMES, Source, Subject};
+use super::curves::{NAMES, Subject};
+use super::source::Source;
 use super::{Arguments, PANELS, Studio};
 use crate::cli::exit::Failure;
 use crate::cli::input;

@@ -83,7 +83,7 @@ impl StoredResult {
 
 /// Components in 16 bits, as the engine stores them.
 fn short(rotations: &[Quat]) -> Vec<u16> {
-    let rotations: Vec<[f32; 4]> = rotations.iter().map(|q| q.to_array()).collect();
+    let rotations: Vec<[f32; 4]> = rotations.iter().map(Quat::to_array).collect();
     let mut bytes = vec![0; rotations.len() * Encoding::Snorm16.bytes()];
     Encoding::Snorm16.encode(&rotations, &mut bytes);
     let pairs = bytes.chunks_exact(2);

@@ -1,0 +1,288 @@
+//! Pictures and films of boxes, decoded again.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+
+use program::{run, sample_folder, succeed};
+
+/// Red, green and blue, row by row.
+#[derive(Clone, PartialEq)]
+struct Image {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+const BLUE: [u8; 3] = [0x00, 0x72, 0xb2];
+const ORANGE: [u8; 3] = [0xe6, 0x9f, 0x00];
+
+impl Image {
+    /// Where pixels of a box's hue are: left, top, right, bottom.
+    fn extent(&self, hue: [u8; 3]) -> Option<[usize; 4]> {
+        // Light makes a hue brighter or darker; its channels keep their proportions.
+        let like = |pixel: &[u8; 3]| {
+            let sum = |colour: &[u8; 3]| colour.iter().map(|&c| f64::from(c)).sum::<f64>().max(1.0);
+            let share = |colour: &[u8; 3], c: usize| f64::from(colour[c]) / sum(colour);
+            (0..3).all(|c| (share(pixel, c) - share(&hue, c)).abs() < 0.04)
+        };
+        let places = (0..self.pixels.len()).filter(|&place| like(&self.pixels[place]));
+        places.fold(None, |extent, place| {
+            let (x, y) = (place % self.width, place / self.width);
+            let [l, t, r, b] = extent.unwrap_or([x, y, x, y]);
+            Some([l.min(x), t.min(y), r.max(x), b.max(y)])
+        })
+    }
+}
+
+fn png(path: &Path) -> Image {
+    let [image] = &films(path).0[..] else {
+        panic!("{}: one frame", path.display());
+    };
+    image.clone()
+}
+
+/// The frames of a PNG, animated or not, and the time that all are shown for.
+fn films(path: &Path) -> (Vec<Image>, f64) {
+    let file = BufReader::new(fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+    let count = reader
+        .info()
+        .animation_control()
+        .map_or(1, |control| control.num_frames);
+    let mut canvas = vec![[0; 3]; width * height];
+    let (mut images, mut seconds) = (Vec::new(), 0.0);
+    for _ in 0..count {
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        let (x, y) = match reader.info().frame_control() {
+            Some(control) => {
+                seconds += f64::from(control.delay_num) / f64::from(control.delay_den);
+                (control.x_offset as usize, control.y_offset as usize)
+            }
+            None => (0, 0),
+        };
+        let pixels: Vec<[u8; 3]> = bytes[..info.buffer_size()]
+            .chunks_exact(3)
+            .map(|pixel| [pixel[0], pixel[1], pixel[2]])
+            .collect();
+        for (row, line) in pixels.chunks(info.width as usize).enumerate() {
+            let start = (y + row) * width + x;
+            canvas[start..start + line.len()].copy_from_slice(line);
+        }
+        images.push(Image {
+            width,
+            pixels: canvas.clone(),
+        });
+    }
+    (images, seconds)
+}
+
+fn gif_film(path: &Path) -> (Vec<Image>, f64) {
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut reader = options.read_info(fs::File::open(path).unwrap()).unwrap();
+    let (width, height) = (reader.width() as usize, reader.height() as usize);
+    let mut canvas = vec![[0; 3]; width * height];
+    let (mut images, mut seconds) = (Vec::new(), 0.0);
+    while let Some(frame) = reader.read_next_frame().unwrap() {
+        seconds += f64::from(frame.delay) / 100.0;
+        for (place, pixel) in frame.buffer.chunks_exact(4).enumerate() {
+            let (x, y) = (place % frame.width as usize, place / frame.width as usize);
+            if pixel[3] > 0 {
+                let at = (frame.top as usize + y) * width + frame.left as usize + x;
+                canvas[at] = [pixel[0], pixel[1], pixel[2]];
+            }
+        }
+        images.push(Image {
+            width,
+            pixels: canvas.clone(),
+        });
+    }
+    (images, seconds)
+}
+
+/// The three ways to write a film show the same: PNG files and APNG exactly, GIF as near
+/// as its palette comes.
+#[test]
+fn frames_apng_and_gif_show_the_same_film() {
+    let place = sample_folder();
+    for out in ["frames", "film.apng", "film.gif"] {
+        let line = [
+            "render", "a.dat", "--fps", "12", "--size", "200x150", "-o", out,
+        ];
+        let run = succeed(place.path(), &line);
+        assert!(
+            run.words.contains("a.dat: 25 frames, 2 boxes, on "),
+            "{}",
+            run.words
+        );
+    }
+    let frames: Vec<Image> = (0..25)
+        .map(|frame| png(&place.path().join(format!("frames/{frame:05}.png"))))
+        .collect();
+    assert_eq!(
+        fs::read_dir(place.path().join("frames")).unwrap().count(),
+        25
+    );
+    let (apng, seconds) = films(&place.path().join("film.apng"));
+    assert!(apng == frames, "APNG differs");
+    assert!((seconds - 25.0 / 12.0).abs() < 2e-3, "{seconds} s");
+    let (gif, seconds) = gif_film(&place.path().join("film.gif"));
+    assert_eq!(gif.len(), 25);
+    assert!((seconds - 25.0 / 12.0).abs() < 2e-2, "{seconds} s");
+    for (number, (found, expected)) in gif.iter().zip(&frames).enumerate() {
+        let far = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 24);
+        let count = found
+            .pixels
+            .iter()
+            .zip(&expected.pixels)
+            .filter(far)
+            .count();
+        assert!(
+            count < 90,
+            "frame {number}: {count} pixels are another colour"
+        );
+    }
+    for pair in frames.windows(2) {
+        assert!(pair[0] != pair[1], "frames that follow each other differ");
+    }
+}
+
+/// Would catch a wrong parent, a wrong axis, a box that hangs upwards, a mirrored picture.
+#[test]
+fn boxes_hang_where_their_rotations_say() {
+    let place = sample_folder();
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    // Both straight down; then the first turned a quarter about z, which carries the second.
+    let text = format!(
+        "# 2 3\n0 1 0 0 0 1 0 0 0\n1 {half} 0 0 {half} 1 0 0 0\n2 {half} 0 0 {half} {half} 0 0 {half}\n"
+    );
+    fs::write(place.path().join("hang.dat"), text).unwrap();
+    let still = |start: &str| {
+        let line =
+            format!("render hang.dat -m slerp --view 0,0 --start {start} -o s.png --overwrite");
+        succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
+        let image = png(&place.path().join("s.png"));
+        (image.extent(BLUE).unwrap(), image.extent(ORANGE).unwrap())
+    };
+    let tall = |[l, t, r, b]: [usize; 4]| b - t > r - l;
+    let (first, second) = still("0");
+    assert!(tall(first) && tall(second));
+    assert!(
+        first[3] < second[1] + 12,
+        "the second hangs below the first"
+    );
+    // A quarter turn to the left seen against z: what pointed down points to the right.
+    let (first, second) = still("1");
+    assert!(!tall(first) && !tall(second));
+    assert!(
+        first[2] < second[0] + 12,
+        "the second is right of the first"
+    );
+    let (first, second) = still("2");
+    assert!(!tall(first) && tall(second));
+    assert!(
+        second[1] < first[1],
+        "the second points up from the first's end"
+    );
+}
+
+#[test]
+fn methods_stand_side_by_side_under_their_names() {
+    let place = sample_folder();
+    let line = "render a.dat -m slerp,step --size 400x200 --start 0.25 -o s.png";
+    succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
+    let image = png(&place.path().join("s.png"));
+    let half = |right: bool| {
+        let columns = if right { 200..400 } else { 0..200 };
+        let rows = image
+            .pixels
+            .chunks(400)
+            .flat_map(|row| row[columns.clone()].to_vec());
+        Image {
+            width: 200,
+            pixels: rows.collect(),
+        }
+    };
+    let (left, right) = (half(false), half(true));
+    assert!(left.extent(BLUE).is_some() && right.extent(BLUE).is_some());
+    assert!(left != right);
+    // Names in ink, at the bottom of each half.
+    for half in [&left, &right] {
+        let foot = &half.pixels[200 * 180..];
+        let ink = foot
+            .iter()
+            .filter(|pixel| pixel.iter().all(|&channel| channel < 128))
+            .count();
+        assert!(ink > 10, "{ink} pixels of letters");
+    }
+    let dark = "render a.dat --theme dark --size 64x64 --start 1 -o d.png";
+    succeed(place.path(), &dark.split(' ').collect::<Vec<_>>());
+    assert_eq!(
+        png(&place.path().join("d.png")).pixels[0],
+        [0x1d, 0x21, 0x27]
+    );
+}
+
+#[test]
+fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
+    let place = sample_folder();
+    fs::write(place.path().join("old.gif"), "old").unwrap();
+    fs::create_dir(place.path().join("used")).unwrap();
+    fs::write(place.path().join("used/00003.png"), "old").unwrap();
+    for (line, code, message) in [
+        (
+            "render a.dat -o x.mp4",
+            2,
+            "x.mp4: end the film in .gif or .apng, a picture in .png, or give a directory",
+        ),
+        (
+            "render a.dat b.dat -o x.gif",
+            2,
+            "one input at a time is rendered",
+        ),
+        (
+            "render a.dat -o x.gif --size 0x100",
+            2,
+            "`0x100` is no size; give 640x480",
+        ),
+        ("render a.dat -o x.gif --size big", 2, "`big` is no size"),
+        (
+            "render a.dat -o x.gif --view 10,95",
+            2,
+            "`10,95` is no view; give two angles in degrees",
+        ),
+        (
+            "render a.dat -o x.gif -m all",
+            2,
+            "15 methods side by side cannot be seen, at most 4",
+        ),
+        (
+            "render a.dat -o old.gif",
+            2,
+            "old.gif: exists; give --overwrite to replace it",
+        ),
+        (
+            "render a.dat -o used",
+            2,
+            "00003.png: exists; give --overwrite to replace it",
+        ),
+        ("render bad.dat -o x.gif", 4, "bad.dat:2"),
+        (
+            "render a.dat -o nowhere/x.gif",
+            7,
+            "its directory nowhere does not exist",
+        ),
+    ] {
+        let run = run(place.path(), &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(run.code, code, "{line}: {}", run.words);
+        assert!(run.words.contains(message), "{line}: {}", run.words);
+        assert!(!place.path().join("x.gif").exists(), "{line}");
+    }
+    assert_eq!(fs::read(place.path().join("old.gif")).unwrap(), b"old");
+    assert_eq!(fs::read_dir(place.path().join("used")).unwrap().count(), 1);
+}
