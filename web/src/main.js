@@ -7,6 +7,8 @@ import { Stage } from "./scene.js";
 const element = (id) => document.getElementById(id);
 const stored = JSON.parse(element("data").textContent);
 const inputs = stored.sets.map((set) => new Input(set));
+// A longer chain is a tangle: its boxes are shown apart until somebody asks for the chain.
+const CHAIN = 64;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
 const state = {
@@ -14,7 +16,7 @@ const state = {
   method: stored.first,
   other: "",
   pairing: "ghost",
-  apart: false,
+  apart: inputs[0].boxes > CHAIN,
   box: 0,
   picked: false,
   time: 0,
@@ -307,7 +309,8 @@ function listen() {
   });
   on("loop", "change", (event) => loop(event.target.checked));
   on("set", "change", (event) => {
-    Object.assign(state, { input: inputs[Number(event.target.value)], sample: 0, time: 0 });
+    const input = inputs[Number(event.target.value)];
+    Object.assign(state, { input, sample: 0, time: 0, apart: input.boxes > CHAIN });
     load(true);
   });
   on("method", "change", (event) => setMethod(event.target.value));
