@@ -554,7 +554,11 @@ fn a_thousand_boxes_are_shown() {
         place.path(),
         &["many.dat", "-m", "slerp", "--times", "times.txt"],
     );
-    assert_eq!(page.value("tumble.state.apart"), true, "so long a chain is a tangle");
+    assert_eq!(
+        page.value("tumble.state.apart"),
+        true,
+        "so long a chain is a tangle"
+    );
     for arrangement in ["chain", "apart"] {
         page.choose("#arrangement", arrangement);
         page.value("tumble.loaded().then(() => true)");
