@@ -36,7 +36,7 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
 }
 
 /// Key times as frames: exact ratios in f64.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct FrameClock {
     rate: FrameRate,
     start: f64,

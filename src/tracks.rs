@@ -51,6 +51,8 @@ pub struct TrackSet {
     scales: VectorTracks,
     /// First and last key time over all tracks.
     span: Option<(f64, f64)>,
+    /// Keys of the longest track.
+    longest: usize,
 }
 
 /// Where a track's keys and times lie in the pools of its set; tracks whose
@@ -79,20 +81,6 @@ pub struct Track<'a> {
     pub tangents: &'a [[Quat; 2]],
     /// Tension, continuity and bias of the keys; empty where none were given.
     pub tcb: &'a [Tcb],
-}
-
-impl Track<'_> {
-    /// Its keys from one to another, both included.
-    pub(crate) fn keys_between(self, first: usize, last: usize) -> Self {
-        Self {
-            times: &self.times[first..=last],
-            keys: &self.keys[first..=last],
-            velocities: self.velocities.get(first..=last).unwrap_or_default(),
-            tangents: self.tangents.get(first..=last).unwrap_or_default(),
-            tcb: self.tcb.get(first..=last).unwrap_or_default(),
-            ..self
-        }
-    }
 }
 
 impl TrackSet {
@@ -131,6 +119,7 @@ impl TrackSet {
             first_time,
             len: keys.len(),
         });
+        self.longest = self.longest.max(keys.len());
         let name = name.into();
         if !name.is_empty() {
             self.names.resize(track, String::new());
@@ -181,6 +170,11 @@ impl TrackSet {
         self.keys.len()
     }
 
+    /// Keys of the track that has most.
+    pub(crate) fn longest(&self) -> usize {
+        self.longest
+    }
+
     /// Whether the set has no tracks.
     pub fn is_empty(&self) -> bool {
         self.tracks.is_empty()
@@ -208,6 +202,19 @@ impl TrackSet {
             tangents: self.tangents.of(index, len),
             tcb: self.tcb.of(index, len),
         }
+    }
+
+    /// The times and keys of a track, and no more: where tracks are short, the rest costs
+    /// more than the work.
+    #[inline]
+    pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
+        let TrackRange {
+            first_key,
+            first_time,
+            len,
+        } = self.tracks[index];
+        let times = &self.times[first_time..first_time + len];
+        (times, &self.keys[first_key..first_key + len])
     }
 
     /// Every track in order.
@@ -257,6 +264,7 @@ impl TrackSet {
                 first_time,
                 len: track.keys.len(),
             });
+            set.longest = set.longest.max(track.keys.len());
         }
         set
     }

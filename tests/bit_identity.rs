@@ -3,8 +3,9 @@
 
 mod support;
 
-use glam::{DVec3, Quat};
+use glam::{DQuat, DVec3, Quat};
 use support::{Random, first_difference, hostile_set, vulkan_devices};
+use tumble::reference::{Curve, angle_between};
 use tumble::{
     Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, TrackSet,
     Transfer, VectorWidth, method,
@@ -442,5 +443,79 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
         let found = cpu().evaluate(&set, slerp, &frames).unwrap();
         let what = format!("{frames:?}").chars().take(60).collect::<String>();
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+    }
+}
+
+/// Tracks of two keys alone take a way of their own on the CPU, and have polynomials that
+/// nobody fitted: the same bits as by segments, at every width, and near the reference.
+#[test]
+fn crowds_of_two_keys_have_the_same_bits() {
+    let mut random = Random(79);
+    let mut set = TrackSet::new();
+    for track in 0..200 {
+        let first = random.rotation();
+        let step = [0.0, 1e-7, 1e-3, 0.4, 1.5, 3.0, 3.1, std::f64::consts::PI][track % 8];
+        let turn = DQuat::from_axis_angle(random.direction(), step);
+        // Opposite keys would have no way between them as authored.
+        let sign = if track % 3 == 0 && step > 0.1 {
+            -1.0
+        } else {
+            1.0
+        };
+        let keys = [first.as_quat(), (first * turn).as_quat() * sign];
+        let start = random.between(-1.0, 1.0);
+        let times = [start, start + random.pick(&[1e-5, 0.04, 1.0, 500.0])];
+        let count = if track % 11 == 0 { 1 } else { 2 };
+        set.push("", &times[..count], &keys[..count]).unwrap();
+    }
+    let own_times = (0..set.track_count()).map(|track| {
+        let track = set.track(track);
+        let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
+        first + random.between(-0.1, 1.1) * (last - first)
+    });
+    let requests = [
+        Frames::at_each(own_times.collect()),
+        Frames::at(vec![0.3]),
+        Frames::rate("1/1000".parse().unwrap()),
+        Frames::fps(1).between(0.0, 0.0),
+    ];
+    for (method, path) in METHODS
+        .into_iter()
+        .flat_map(|method| [Path::Shortest, Path::AsAuthored].map(|path| (method, path)))
+    {
+        let interpolation = Interpolation {
+            path,
+            ..method.into()
+        };
+        for frames in &requests {
+            let timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
+            let clip = cpu().upload(&set, interpolation).unwrap();
+            let expected = clip.evaluate(frames).unwrap();
+            assert!(expected.as_quats().len() < set.key_count(), "few samples");
+            for width in VectorWidth::available() {
+                let mut options = EngineOptions::default();
+                options.vector_width = Some(width);
+                let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+                let found = engine.evaluate(&set, interpolation, frames).unwrap();
+                let what = format!("{method}, {path:?}, {frames:?}, {width:?}");
+                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+            }
+            for device in vulkan_devices() {
+                let engine = Engine::new(device).unwrap();
+                let found = engine.evaluate(&set, interpolation, frames).unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), "Vulkan");
+            }
+            // At half a turn exactly either way round is as short.
+            for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
+                let curve = Curve::of(&interpolation, set.track(track));
+                let reference = curve.rotation(timeline.time(track, 0));
+                let found = expected.get(track, 0).unwrap().as_dquat();
+                let error = angle_between(found, reference);
+                assert!(
+                    error < 1e-6,
+                    "{method}, {path:?}, track {track}: {error:.1e} rad"
+                );
+            }
+        }
     }
 }

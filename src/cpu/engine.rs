@@ -283,15 +283,19 @@ impl CpuEngine {
         let (Ticks::Frames { rate, start }, 1..) = (&timeline.ticks, track.keys.len() - 1) else {
             return self.sampled_arcs(set, index..index + 1, interpolation, timeline, output);
         };
-        interpolation.ends.check(track, index)?;
+        interpolation.ends.check(track.keys, index)?;
         let last = track.keys.len() - 1;
         let clock = FrameClock::new(*rate, *start, track.times[last]);
         let stretches: Vec<Stretch<'_>> = (0..last)
             .step_by(STRETCH)
-            .map(|first_key| Stretch {
-                track: track.keys_between(first_key, (first_key + STRETCH).min(last)),
-                index,
-                first_key,
+            .map(|first_key| {
+                let last_key = (first_key + STRETCH).min(last);
+                Stretch {
+                    times: &track.times[first_key..=last_key],
+                    keys: &track.keys[first_key..=last_key],
+                    index,
+                    first_key,
+                }
             })
             .collect();
         let new = || SampledArcs::new(interpolation, timeline);
@@ -305,7 +309,7 @@ impl CpuEngine {
         let mut work = Vec::new();
         for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
             let to = match stretches.get(i + 1) {
-                Some(next) => clock.first_frame(next.track.times[0]).min(timeline.len()),
+                Some(next) => clock.first_frame(next.times[0]).min(timeline.len()),
                 None => timeline.len(),
             };
             let (own, others) = output.split_at_mut(to.max(from) - from);
@@ -321,14 +325,19 @@ impl CpuEngine {
     }
 }
 
-/// Whether every sample is worked out from its keys, on the CPU.
+/// Whether every sample is worked out from its keys, on the CPU: where there are fewer
+/// samples than keys, and nothing but arcs between these.
 pub(crate) fn is_sampled(
     set: &TrackSet,
     interpolation: &Interpolation,
     timeline: &Timeline,
 ) -> bool {
-    let arcs = interpolation.form() == Form::Arc && interpolation.sides() == Sides::default();
-    arcs && timeline.len() * set.track_count() < set.key_count()
+    let arcs = match interpolation.form() {
+        Form::Arc => true,
+        Form::Polynomial => set.longest() <= 2 && interpolation.is_steady_alone(),
+    };
+    let few = timeline.len() * set.track_count() < set.key_count();
+    arcs && interpolation.sides() == Sides::default() && few
 }
 
 /// A window cut into tasks, each with its own part of the output, which has `each`

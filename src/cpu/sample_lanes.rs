@@ -4,10 +4,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::dispatch::InLanes;
+use super::evaluate::canonical;
 use super::evaluate::{Affine, one};
+use super::evaluate_polynomial::evaluate_component;
 use crate::frame_clock::{FrameClock, InFrames, finite_scale, in_frames};
 use crate::numeric::{round_f32, whole_number};
-use crate::prepare::{arc, signed};
+use crate::prepare::{arc, component, signed};
 use crate::segment::ArcSegment;
 
 /// Samples, or intervals, worked out together.
@@ -26,6 +28,9 @@ pub(super) struct SampleBlock {
     pub(super) frames: bool,
     /// Dot products below this turn the second key's sign.
     pub(super) noise: f64,
+    /// Whether arcs are evaluated as polynomials, as two keys that are alone are by
+    /// smooth methods. Their signs are as stored.
+    pub(super) as_polynomials: bool,
     /// Where each rotation goes.
     pub(super) outputs: [usize; LANES],
     pub(super) count: usize,
@@ -35,40 +40,71 @@ pub(super) struct SampleBlock {
 impl InLanes for SampleBlock {
     #[inline(always)]
     fn run(&mut self) {
-        let count = self.count.next_multiple_of(16).min(LANES);
+        if self.as_polynomials {
+            self.polynomials();
+        } else {
+            self.arcs();
+        }
+    }
+}
+
+/// How a sample's parameter follows from its place.
+struct Parameter {
+    distance: f32,
+    affine: Affine,
+}
+
+impl SampleBlock {
+    /// Lanes to work out: whole vectors of them.
+    #[inline(always)]
+    fn whole(&self) -> usize {
+        self.count.next_multiple_of(16).min(LANES)
+    }
+
+    /// As the schedule has it, of a parameter that runs through `extent`.
+    #[inline(always)]
+    fn parameter(&self, lane: usize, extent: f64) -> Parameter {
+        let (start, end, place) = (self.starts[lane], self.ends[lane], self.places[lane]);
+        let InFrames {
+            whole,
+            scale,
+            offset,
+        } = in_frames(start, end, extent);
+        let seconds = end - start;
+        let middle = start + seconds * 0.5;
+        if self.frames {
+            Parameter {
+                distance: (place - whole) as f32,
+                affine: Affine { scale, offset },
+            }
+        } else {
+            Parameter {
+                distance: round_f32(place - middle),
+                affine: Affine {
+                    scale: finite_scale(extent / seconds),
+                    offset: 0.0,
+                },
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn arcs(&mut self) {
         let mut parameters = [[0.0; LANES]; 3];
         let mut middles = [[0.0; LANES]; 4];
         let mut partners = [[0.0; LANES]; 4];
         let [distances, scales, offsets] = &mut parameters;
-        let frames = self.frames;
-        for j in 0..count {
+        for j in 0..self.whole() {
             let arc = arc(self.from[j], self.to[j], self.noise);
-            let (start, end, place) = (self.starts[j], self.ends[j], self.places[j]);
-            let InFrames {
-                whole,
-                scale,
-                offset,
-            } = in_frames(start, end, arc.angle);
-            let seconds = end - start;
-            let middle = start + seconds * 0.5;
-            distances[j] = if frames {
-                (place - whole) as f32
-            } else {
-                round_f32(place - middle)
-            };
-            scales[j] = if frames {
-                scale
-            } else {
-                finite_scale(arc.angle / seconds)
-            };
-            offsets[j] = if frames { offset } else { 0.0 };
+            let Parameter { distance, affine } = self.parameter(j, arc.angle);
+            (distances[j], scales[j], offsets[j]) = (distance, affine.scale, affine.offset);
             for c in 0..4 {
                 middles[c][j] = arc.middle[c];
                 partners[c][j] = arc.partner[c];
             }
         }
         let mut found = [[0.0; LANES]; 4];
-        for j in 0..count {
+        for j in 0..self.whole() {
             let sign = self.signs[j];
             let [x, y, z, w] = &middles;
             let middle = signed(sign, [x[j], y[j], z[j], w[j]]);
@@ -83,9 +119,41 @@ impl InLanes for SampleBlock {
                 found[c][j] = q[c];
             }
         }
+        self.keep(&found);
+    }
+
+    #[inline(always)]
+    fn polynomials(&mut self) {
+        let mut parameters = [0.0; LANES];
+        let mut middles = [[0.0; LANES]; 4];
+        let mut partners = [[0.0; LANES]; 4];
+        let mut angles = [0.0; LANES];
+        for j in 0..self.whole() {
+            let arc = arc(self.from[j], self.to[j], self.noise);
+            let Parameter { distance, affine } = self.parameter(j, 1.0);
+            parameters[j] = distance * affine.scale + affine.offset;
+            angles[j] = arc.angle;
+            for c in 0..4 {
+                middles[c][j] = arc.middle[c];
+                partners[c][j] = arc.partner[c];
+            }
+        }
+        let mut found = [[0.0; LANES]; 4];
+        for c in 0..4 {
+            let (middle, partner, lanes) = (&middles[c], &partners[c], &mut found[c]);
+            for j in 0..self.whole() {
+                let own = component(middle[j], partner[j], angles[j]);
+                lanes[j] = canonical(evaluate_component(&own, parameters[j]));
+            }
+        }
+        self.keep(&found);
+    }
+
+    /// Components side by side to rotations.
+    #[inline(always)]
+    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
         let mut rotations = [[0.0; 4]; LANES];
-        let [x, y, z, w] = &found;
-        for j in 0..count {
+        for j in 0..self.whole() {
             rotations[j] = [x[j], y[j], z[j], w[j]];
         }
         self.rotations = rotations;
@@ -95,6 +163,7 @@ impl InLanes for SampleBlock {
 /// Where intervals start, in frames.
 pub(super) struct Boundaries {
     pub(super) times: [f64; LANES],
+    pub(super) count: usize,
     pub(super) clock: Option<FrameClock>,
     pub(super) frames: [f64; LANES],
     /// The first whole frame not before each.
@@ -109,7 +178,9 @@ impl InLanes for Boundaries {
         let Some(clock) = self.clock else { return };
         let mut frames = [0.0; LANES];
         let (mut firsts, mut whole) = ([0; LANES], [0; LANES]);
-        for j in 0..LANES {
+        // Whole vectors, or those left over would be done one by one.
+        let count = self.count.next_multiple_of(8).min(LANES);
+        for j in 0..count {
             let boundary = clock.boundary(self.times[j]);
             frames[j] = boundary.frame;
             firsts[j] = whole_number(within(boundary.first));

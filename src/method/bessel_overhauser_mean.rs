@@ -29,7 +29,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
         rotation: 2.7,
     },
     reference: reference::Kind::BesselOverhauserMean,
-    curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>)),
+    curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone()),
 };
 
 struct Rule;

@@ -27,7 +27,7 @@ pub const CATMULL_ROM: Method = Method {
         rotation: 2.3,
     },
     reference: reference::Kind::CatmullRom,
-    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)),
+    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).steady_alone()),
 };
 
 struct Rule;

@@ -1,9 +1,11 @@
 //! What can be asked of a method: the path, the ends, what lies outside, which quantity.
 
-use super::{Form, Method};
+use glam::Quat;
+
+use super::{Curves, Form, Method};
 use crate::branchless::{self, length, log, unit};
 use crate::cycle::{Outside, Sides};
-use crate::tracks::{Tcb, Track};
+use crate::tracks::Tcb;
 
 /// A method with its options: what [`Engine::upload`](crate::Engine::upload)
 /// takes. A bare [`Method`] has the default options.
@@ -35,6 +37,17 @@ impl Interpolation {
         } else {
             self.method.form
         }
+    }
+
+    /// Whether tracks of two keys turn about one axis at constant speed.
+    pub(crate) fn is_steady_alone(&self) -> bool {
+        let Curves::Smooth(smooth) = self.method.curves else {
+            return false;
+        };
+        smooth.steady_alone
+            && self.path == Path::Shortest
+            && self.quantity == Quantity::Rotation
+            && self.speed == Speed::AsKeyed
     }
 
     /// Whether arcs too are curves with a formula: for what follows from derivatives.
@@ -169,7 +182,7 @@ const FASTEST: f64 = 1e12;
 
 impl Ends {
     /// Refuses a track, the `index`th of its set, that does not end as it must.
-    pub(crate) fn check(self, track: Track, index: usize) -> Result<(), InterpolationError> {
+    pub(crate) fn check(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
         if let Self::Clamped { start, end } = self {
             for velocity in [start, end] {
                 let speed = length(velocity.to_array());
@@ -178,7 +191,7 @@ impl Ends {
                 }
             }
         }
-        let (Self::Loop, [first, .., last]) = (self, track.keys) else {
+        let (Self::Loop, [first, .., last]) = (self, keys) else {
             return Ok(());
         };
         let seam = branchless::step(unit(first.to_array()), unit(last.to_array()));

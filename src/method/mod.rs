@@ -132,6 +132,8 @@ pub(crate) struct Smooth {
     /// track ends.
     pub(crate) curves: fn(&mut Intervals, &[Stretch], Ends),
     pub(crate) given: Given,
+    /// Two keys that are alone are joined at constant velocity, whatever the ends.
+    pub(crate) steady_alone: bool,
 }
 
 /// What a method knows of an interval beside its two keys.
@@ -151,6 +153,14 @@ impl Smooth {
             shape,
             curves,
             given: Given::Nothing,
+            steady_alone: false,
+        }
+    }
+
+    const fn steady_alone(self) -> Self {
+        Self {
+            steady_alone: true,
+            ..self
         }
     }
 

@@ -194,7 +194,7 @@ impl Prepare for ArcPreparation {
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
-        self.ends.check(track, index)?;
+        self.ends.check(track.keys, index)?;
         let (start, end) = (intervals.start, intervals.end);
         let first_key = prepared.constants.len() as u32;
         let first_span = prepared.spans.len();

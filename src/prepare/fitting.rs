@@ -8,7 +8,9 @@ use super::cut::{Cutter, Part as CurvePart};
 use super::fit::{FitBlock, Tier, tier};
 use super::intervals::Intervals;
 use super::shape::Shape;
+use super::steady::SteadyBlock;
 use super::{NONE, Prepared, Source};
+use crate::cpu::in_lanes;
 use crate::method::Quantity;
 use crate::segment::{PolynomialSegment, Segments};
 
@@ -18,6 +20,8 @@ pub(super) struct Fitting {
     quantity: Quantity,
     gentle: Queue,
     full: Queue,
+    /// Made when there is an interval for it.
+    steady: Option<Box<SteadyBlock>>,
     cutter: Cutter,
     intervals: Vec<Fitted>,
 }
@@ -61,6 +65,7 @@ impl Fitting {
             quantity,
             gentle: Queue::default(),
             full: Queue::default(),
+            steady: None,
             cutter: Cutter::new(shape, quantity),
             intervals: Vec::new(),
         }
@@ -105,6 +110,29 @@ impl Fitting {
         }
     }
 
+    /// Adds two keys that are alone; dot products below `noise` turn the second one's
+    /// sign.
+    pub(super) fn push_steady(
+        &mut self,
+        prepared: &mut Prepared,
+        place: Place,
+        keys: [[f32; 4]; 2],
+        noise: f64,
+    ) {
+        let segments = polynomials(prepared);
+        let segment = segments.len() as u32;
+        segments.push(PolynomialSegment::zeroed());
+        let source = CurveSource::Segment(segment);
+        self.intervals.push(Fitted { place, source });
+        let new = || Box::new(SteadyBlock::new(noise));
+        let block = self.steady.get_or_insert_with(new);
+        block.push(keys, segment);
+        if block.is_full() {
+            in_lanes(&mut **block);
+            block.write(segments);
+        }
+    }
+
     /// Adds an interval with any curve.
     pub(super) fn push_curve(&mut self, place: Place, curve: Curve) {
         self.cutter.push_whole(self.intervals.len(), curve);
@@ -143,6 +171,10 @@ impl Fitting {
     pub(super) fn finish(&mut self, prepared: &mut Prepared) {
         self.run(Tier::Gentle, prepared);
         self.run(Tier::Full, prepared);
+        if let Some(block) = &mut self.steady {
+            in_lanes(&mut **block);
+            block.write(polynomials(prepared));
+        }
         let mut parts = self.cutter.cut();
         for (interval, Fitted { place, source }) in self.intervals.drain(..).enumerate() {
             let first_span = prepared.spans.len();

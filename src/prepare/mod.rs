@@ -18,6 +18,7 @@ mod sample;
 mod set;
 mod shape;
 mod smooth;
+mod steady;
 mod steps;
 mod vectors;
 
@@ -31,6 +32,7 @@ pub(crate) use passes::{
 };
 pub(crate) use set::Preparation;
 pub(crate) use shape::Shape;
+pub(crate) use steady::component;
 
 use std::ops::Range;
 

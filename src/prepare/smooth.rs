@@ -76,7 +76,7 @@ impl Prepare for SmoothPreparation {
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
-        self.interpolation.ends.check(track, index)?;
+        self.interpolation.ends.check(track.keys, index)?;
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
@@ -242,6 +242,10 @@ impl SmoothPreparation {
                     self.waiting.push(place, curve);
                 } else if clock.is_some_and(is_empty) {
                     self.fitting.push_constant(place, NONE);
+                } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
+                    let keys = self.intervals.keys(lane);
+                    let noise = self.intervals.noise;
+                    self.fitting.push_steady(prepared, place, keys, noise);
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);
                 } else if key == NONE {

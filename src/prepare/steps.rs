@@ -30,7 +30,7 @@ impl Prepare for StepPreparation {
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
-        self.interpolation.ends.check(track, index)?;
+        self.interpolation.ends.check(track.keys, index)?;
         let first = prepared.constants.len() as u32;
         let last = first + intervals.len() as u32;
         let stands_still = self.interpolation.quantity != Quantity::Rotation;
