@@ -1,21 +1,19 @@
 //! The engine: sets go in, clips stay on its device, rotations come out.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::clock::{Frames, FramesError, Timeline};
+use crate::clock::{Frames, FramesError};
 use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
 use crate::cycle::Sides;
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::encoding::Encoding;
-use crate::gpu::{CanaryReport, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
+use crate::gpu::{CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
-use crate::prepare::ClipData;
+use crate::prepare::{ClipData, Wanted};
 use crate::rotations::{Layout, Rotations};
-use crate::segment::segment_size;
 use crate::tracks::TrackSet;
 
 /// Why an evaluation failed.
@@ -237,13 +235,23 @@ impl Engine {
         set: &TrackSet,
         interpolation: impl Into<Interpolation>,
     ) -> Result<Clip, Error> {
-        let interpolation = interpolation.into();
+        self.upload_wanted(set, interpolation.into(), Wanted::all(set, None), None)
+    }
+
+    /// As [`Engine::upload`], what is wanted, into buffers that are no longer needed.
+    pub(crate) fn upload_wanted(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        mut wanted: Wanted<'_>,
+        spare: Option<ClipBuffers>,
+    ) -> Result<Clip, Error> {
         let (data, buffers) = match &*self.backend {
-            Backend::Cpu(_) => (ClipData::new(set, interpolation, None)?, None),
+            Backend::Cpu(_) => (ClipData::new(set, interpolation, wanted)?, None),
             Backend::Vulkan(opened) => {
-                let group_bytes = opened.engine.group_bytes();
-                let data = ClipData::new(set, interpolation, Some(group_bytes))?;
-                let buffers = opened.engine.upload(&data)?;
+                wanted.group_bytes = Some(opened.engine.group_bytes());
+                let data = ClipData::new(set, interpolation, wanted)?;
+                let buffers = opened.engine.upload(&data, spare)?;
                 (data, Some(buffers))
             }
         };
@@ -287,11 +295,16 @@ impl Engine {
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
         let by_segments = !(self.is_fused(set, &interpolation, layout)
             || on_cpu && is_sampled(set, &interpolation, &timeline));
-        if by_segments && self.pieces(set, &interpolation).len() == 1 {
-            return self.upload(set, interpolation)?.evaluate_as(frames, layout);
+        if by_segments && self.pieces(set, 0..tracks, &interpolation, &timeline).len() == 1 {
+            let wanted = Wanted {
+                only_for: Some(&timeline),
+                ..Wanted::all(set, None)
+            };
+            let clip = self.upload_wanted(set, interpolation, wanted, None)?;
+            return clip.evaluate_as(frames, layout);
         }
         let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
-        self.evaluate_timeline_into(set, interpolation, &timeline, layout, &mut quats)?;
+        self.evaluate_tracks_into(set, 0..tracks, interpolation, &timeline, layout, &mut quats)?;
         Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
     }
 
@@ -309,62 +322,20 @@ impl Engine {
         output: &mut [Quat],
     ) -> Result<(), Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let needed = set.track_count() * timeline.len();
+        let tracks = set.track_count();
+        let needed = tracks * timeline.len();
         if output.len() != needed {
             let given = output.len();
             return Err(Error::OutputLength { given, needed });
         }
-        self.evaluate_timeline_into(set, interpolation.into(), &timeline, layout, output)
-    }
-
-    /// The samples of a timeline of the set's own; `output` fits them.
-    pub(crate) fn evaluate_timeline_into(
-        &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        timeline: &Timeline,
-        layout: Layout,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let (tracks, samples) = (set.track_count(), timeline.len());
-        if let (Backend::Cpu(engine), true) =
-            (&*self.backend, self.is_fused(set, &interpolation, layout))
-        {
-            return engine.evaluate_set(set, 0..tracks, &interpolation, timeline, output);
-        }
-        if let (Backend::Cpu(engine), Layout::TrackMajor) = (&*self.backend, layout)
-            && is_sampled(set, &interpolation, timeline)
-            && samples > 0
-        {
-            let mut rows = output.chunks_mut(samples).enumerate();
-            return rows.try_for_each(|(track, row)| {
-                engine.sampled_track(set, track, &interpolation, timeline, row)
-            });
-        }
-        let pieces = self.pieces(set, &interpolation);
-        if let [_] = &*pieces {
-            let clip = self.upload(set, interpolation)?;
-            return clip.evaluate_timeline_into(timeline, layout, output);
-        }
-        for piece in pieces {
-            let clip = self.upload(&set.select(piece.clone()), interpolation)?;
-            let timeline = timeline.of_tracks(piece.clone());
-            match layout {
-                Layout::TrackMajor => {
-                    let rows = &mut output[piece.start * samples..piece.end * samples];
-                    clip.evaluate_timeline_into(&timeline, layout, rows)?;
-                }
-                Layout::FrameMajor => {
-                    let mut columns: Vec<Quat> = bytemuck::zeroed_vec(piece.len() * samples);
-                    clip.evaluate_timeline_into(&timeline, layout, &mut columns)?;
-                    let frames = output.chunks_mut(tracks).zip(columns.chunks(piece.len()));
-                    for (frame, part) in frames {
-                        frame[piece.clone()].copy_from_slice(part);
-                    }
-                }
-            }
-        }
-        Ok(())
+        self.evaluate_tracks_into(
+            set,
+            0..tracks,
+            interpolation.into(),
+            &timeline,
+            layout,
+            output,
+        )
     }
 
     /// Whether preparing and evaluating go hand in hand, track by track: on the CPU,
@@ -379,32 +350,6 @@ impl Engine {
         let held = interpolation.sides() == Sides::default();
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
         on_cpu && layout == Layout::TrackMajor && short && held
-    }
-
-    /// Ranges of tracks whose segments fit the device's budget.
-    pub(crate) fn pieces(
-        &self,
-        set: &TrackSet,
-        interpolation: &Interpolation,
-    ) -> Vec<Range<usize>> {
-        let budget = match &*self.backend {
-            Backend::Vulkan(opened) => opened.engine.clip_bytes(),
-            Backend::Cpu(_) => None,
-        };
-        let limit = budget.unwrap_or(usize::MAX);
-        let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
-        let mut pieces = Vec::new();
-        let (mut start, mut bytes) = (0, 0usize);
-        for (index, track) in set.tracks().enumerate() {
-            let own = track.keys.len() * key_bytes;
-            if bytes.saturating_add(own) > limit && index > start {
-                pieces.push(start..index);
-                (start, bytes) = (index, 0);
-            }
-            bytes += own;
-        }
-        pieces.push(start..set.track_count());
-        pieces
     }
 }
 

@@ -63,6 +63,7 @@ pub mod generate;
 mod gpu;
 pub mod method;
 mod numeric;
+mod pieces;
 mod poses;
 mod prepare;
 pub mod reference;

@@ -186,6 +186,13 @@ impl Segments {
         }
     }
 
+    pub(crate) fn reserve(&mut self, count: usize) {
+        match self {
+            Self::Arc(segments) => segments.reserve(count),
+            Self::Polynomial(segments) => segments.reserve(count),
+        }
+    }
+
     pub(crate) fn clear(&mut self) {
         match self {
             Self::Arc(segments) => segments.clear(),

@@ -8,9 +8,10 @@ use std::thread;
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::clock::{Frames, Timeline};
-use crate::engine::{Backend, Engine, Error};
+use crate::clock::Frames;
+use crate::engine::{Engine, Error};
 use crate::method::Interpolation;
+use crate::prepare::Wanted;
 use crate::rotations::Layout;
 use crate::tracks::TrackSet;
 use crate::window::Window;
@@ -97,34 +98,19 @@ impl Engine {
             .map_err(Error::from)?;
         if layout == Layout::FrameMajor || timeline.len() > chunk {
             // A chunk has some samples of many tracks, or some of one track.
-            let clip = self.upload(set, interpolation)?;
+            let wanted = Wanted {
+                only_for: Some(&timeline),
+                ..Wanted::all(set, None)
+            };
+            let clip = self.upload_wanted(set, interpolation, wanted, None)?;
             return clip.stream(frames, layout, chunk, sink);
         }
         let whole = Window::whole(set.track_count(), timeline.len(), layout);
         let fill = |window: &Window, output: &mut [Quat]| {
-            self.evaluate_tracks(set, window.tracks.clone(), interpolation, &timeline, output)
+            let tracks = window.tracks.clone();
+            self.evaluate_tracks_into(set, tracks, interpolation, &timeline, layout, output)
         };
         run(whole.cut(chunk), fill, sink)
-    }
-
-    /// Every sample of some tracks, `[track][frame]`.
-    fn evaluate_tracks(
-        &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: Interpolation,
-        timeline: &Timeline,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let layout = Layout::TrackMajor;
-        if let (Backend::Cpu(engine), true) =
-            (&*self.backend, self.is_fused(set, &interpolation, layout))
-        {
-            return engine.evaluate_set(set, tracks, &interpolation, timeline, output);
-        }
-        let own = set.select(tracks.clone());
-        let timeline = timeline.of_tracks(tracks);
-        self.evaluate_timeline_into(&own, interpolation, &timeline, layout, output)
     }
 }
 

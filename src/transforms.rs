@@ -95,7 +95,7 @@ impl Engine {
         let data = ClipData::of_vectors(set, channel, method, interpolation, group_bytes);
         let buffers = match &*self.backend {
             Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(opened.engine.upload(&data)?),
+            Backend::Vulkan(opened) => Some(opened.engine.upload(&data, None)?),
         };
         Ok(Clip {
             engine: self.clone(),

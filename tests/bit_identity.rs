@@ -519,3 +519,50 @@ fn crowds_of_two_keys_have_the_same_bits() {
         }
     }
 }
+
+/// Far more keys than samples go to a device piece by piece, and only those intervals that
+/// hold a sample: the same bits, and errors that name the set's own tracks.
+#[test]
+fn dense_sets_go_piece_by_piece() {
+    let mut random = Random(80);
+    let (tracks, count) = (1000, 2000);
+    let times: Vec<f64> = (0..count).map(|key| f64::from(key) / 120.0).collect();
+    let few: Vec<DQuat> = (0..97).map(|_| random.rotation()).collect();
+    let mut keys = Vec::new();
+    for track in 0..tracks {
+        let base = random.rotation();
+        let turn = |key: i32| few[(key / 64) as usize % 97].slerp(few[track % 97], 0.5);
+        keys.extend((0..count).map(|key| (base * turn(key)).as_quat()));
+    }
+    let set = TrackSet::with_shared_times(&times, &keys).unwrap();
+    let frames = Frames::fps(7).between(1.0 / 240.0, 16.0);
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let expected = cpu().upload(&set, method).unwrap();
+        let expected = expected.evaluate(&frames).unwrap();
+        let on_cpu = cpu().evaluate(&set, method, &frames).unwrap();
+        assert_same_bits(expected.as_quats(), on_cpu.as_quats(), method.name);
+        for device in vulkan_devices() {
+            let engine = Engine::new(device).unwrap();
+            let found = engine.evaluate(&set, method, &frames).unwrap();
+            assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+            let layout = Layout::FrameMajor;
+            let columns = engine.evaluate_as(&set, method, &frames, layout).unwrap();
+            assert_transposed(&expected, &columns);
+        }
+    }
+    keys[990 * count as usize + 5] = -keys[990 * count as usize + 4];
+    let set = TrackSet::with_shared_times(&times, &keys).unwrap();
+    let as_authored = Interpolation {
+        path: Path::AsAuthored,
+        ..method::BESSEL_OVERHAUSER.into()
+    };
+    for engine in vulkan_devices()
+        .into_iter()
+        .map(Engine::new)
+        .chain([Ok(cpu())])
+    {
+        let refused = engine.unwrap().evaluate(&set, as_authored, &frames);
+        let words = refused.unwrap_err().to_string();
+        assert!(words.contains("track 990: keys 4 and 5"), "{words}");
+    }
+}

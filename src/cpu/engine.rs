@@ -13,7 +13,7 @@ use crate::encoding::Encoding;
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::method::{Form, Interpolation};
-use crate::prepare::{ClipData, PartRef, Preparation, Prepared};
+use crate::prepare::{ClipData, PartRef, Preparation, Prepared, Wanted};
 use crate::rotations::Layout;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
@@ -198,7 +198,11 @@ impl CpuEngine {
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         if output.is_empty() {
             // Also with nothing to evaluate a track may be refused.
-            return Ok(ClipData::new(set, *interpolation, None).map(drop)?);
+            let wanted = Wanted {
+                tracks,
+                ..Wanted::all(set, None)
+            };
+            return Ok(ClipData::new(set, *interpolation, wanted).map(drop)?);
         }
         let samples = timeline.len();
         if is_sampled(set, interpolation, timeline) {

@@ -19,7 +19,7 @@ use crate::cpu::{CpuEngine, VectorWidth};
 use crate::encoding::Encoding;
 use crate::method::{BESSEL_OVERHAUSER, SLERP};
 use crate::numeric::round_quat;
-use crate::prepare::ClipData;
+use crate::prepare::{ClipData, Wanted};
 use crate::rotations::Layout;
 use crate::segment::shader::WORKGROUP;
 use crate::segment::{Launch, Probe, Reply};
@@ -44,10 +44,11 @@ pub(super) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
         ("arc kernel", SLERP),
         ("polynomial kernel", BESSEL_OVERHAUSER),
     ] {
-        let clip = ClipData::new(&hostile_set(), method.into(), Some(engine.group_bytes()))
-            .expect("the set suits every method");
+        let set = hostile_set();
+        let wanted = Wanted::all(&set, Some(engine.group_bytes()));
+        let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
         let cpu = CpuEngine::new(VectorWidth::Baseline, None).expect("no threads of its own");
-        let buffers = engine.upload(&clip)?;
+        let buffers = engine.upload(&clip, None)?;
         let mut report = CanaryReport {
             name,
             total: 0,

@@ -165,8 +165,18 @@ impl VulkanEngine {
             .map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
     }
 
-    /// Brings a clip's segments to the device.
-    pub(crate) fn upload(&self, clip: &ClipData) -> Result<ClipBuffers, VulkanError> {
+    /// Brings a clip's segments to the device, into buffers that are no longer needed where
+    /// they serve.
+    pub(crate) fn upload(
+        &self,
+        clip: &ClipData,
+        spare: Option<ClipBuffers>,
+    ) -> Result<ClipBuffers, VulkanError> {
+        // Where memory is counted, old buffers go before new ones come.
+        let spare = spare.filter(|_| self.clip_bytes.is_none());
+        let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
+        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
+            spare.map(|group| (group.segments, group.constants)).unzip();
         let limit = self.device.physical.info.max_storage_buffer_range;
         let groups = clip
             .groups
@@ -181,8 +191,8 @@ impl VulkanEngine {
                     }
                 }
                 Ok(GroupBuffers {
-                    segments: self.resident("tumble segments", segments)?,
-                    constants: self.resident("tumble constants", constants)?,
+                    segments: self.resident("tumble segments", segments, &mut segments_of)?,
+                    constants: self.resident("tumble constants", constants, &mut constants_of)?,
                 })
             })
             .collect::<Result<_, _>>()?;
@@ -190,9 +200,18 @@ impl VulkanEngine {
     }
 
     /// A buffer with these bytes, in the memory that kernels read fastest.
-    fn resident(&self, name: &str, bytes: &[u8]) -> Result<Buffer, VulkanError> {
+    fn resident(
+        &self,
+        name: &str,
+        bytes: &[u8],
+        spare: &mut Vec<Buffer>,
+    ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
-        let mut upload = Buffer::new(&self.device, name, size, Residence::Upload)?;
+        let fits = |buffer: &Buffer| self.in_place && buffer.size() >= size;
+        let mut upload = match spare.iter().position(fits) {
+            Some(place) => spare.swap_remove(place),
+            None => Buffer::new(&self.device, name, size, Residence::Upload)?,
+        };
         upload.bytes_mut(0..bytes.len()).copy_from_slice(bytes);
         if self.in_place {
             return Ok(upload);

@@ -17,6 +17,9 @@ use crate::vector_method::VectorMethod;
 /// Tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
+/// So few groups are not worth copying together.
+const FEW: usize = 64;
+
 /// The prepared tracks, on the host: what every device's schedule is made from.
 pub(crate) struct ClipData {
     pub(crate) interpolation: Interpolation,
@@ -35,20 +38,44 @@ pub(crate) struct PartRef<'a> {
     pub(crate) part: &'a Part,
 }
 
+/// Which tracks of a set to prepare, and for what.
+pub(crate) struct Wanted<'a> {
+    pub(crate) tracks: Range<usize>,
+    /// Groups are few, and their segments within so many bytes: each becomes a buffer of
+    /// a device. Without a limit they stay as they were prepared.
+    pub(crate) group_bytes: Option<usize>,
+    /// The samples of one timeline: what is prepared serves no other then.
+    pub(crate) only_for: Option<&'a Timeline>,
+    /// Memory to use again.
+    pub(crate) spare: Vec<Prepared>,
+}
+
+impl Wanted<'_> {
+    /// All of a set, for any samples.
+    pub(crate) fn all(set: &TrackSet, group_bytes: Option<usize>) -> Self {
+        Self {
+            tracks: 0..set.track_count(),
+            group_bytes,
+            only_for: None,
+            spare: Vec::new(),
+        }
+    }
+}
+
 impl ClipData {
-    /// Prepares a set. Groups are merged while their segments stay within
-    /// `group_bytes`; without a limit they stay as they were prepared.
+    /// Prepares tracks of a set.
     pub(crate) fn new(
         set: &TrackSet,
         interpolation: Interpolation,
-        group_bytes: Option<usize>,
+        wanted: Wanted<'_>,
     ) -> Result<Self, InterpolationError> {
         if matches!(interpolation.quantity, Quantity::Velocity(_))
             && [interpolation.before, interpolation.after].contains(&Outside::Mirror)
         {
             return Err(InterpolationError::MirroredVelocity);
         }
-        let groups = prepare(set, &interpolation)?;
+        let group_bytes = wanted.group_bytes;
+        let groups = prepare(set, &interpolation, wanted)?;
         Ok(Self::of_groups(groups, set, interpolation, group_bytes))
     }
 
@@ -212,6 +239,9 @@ impl PartRef<'_> {
 }
 
 fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
+    if groups.len() <= FEW {
+        return groups;
+    }
     let bytes = |group: &Prepared| {
         group
             .segments

@@ -23,7 +23,7 @@ mod steps;
 mod vectors;
 
 pub(crate) use arcs::{arc, signed};
-pub(crate) use clip_data::{ClipData, PartRef};
+pub(crate) use clip_data::{ClipData, PartRef, Wanted};
 pub(crate) use curve::Curve;
 pub(crate) use intervals::{Intervals, Stretch};
 pub(crate) use passes::{
@@ -135,6 +135,13 @@ impl Spans {
         self.starts.len()
     }
 
+    fn reserve(&mut self, count: usize) {
+        self.starts.reserve(count);
+        self.extents.reserve(count);
+        self.sources.reserve(count);
+        self.keys.reserve(count);
+    }
+
     fn clear(&mut self) {
         self.starts.clear();
         self.extents.clear();
@@ -153,6 +160,13 @@ impl Prepared {
             parts: Vec::new(),
             sides: interpolation.sides(),
         }
+    }
+
+    /// Makes room for so many keys: to grow into it would copy it all over again.
+    fn reserve(&mut self, keys: usize) {
+        self.segments.reserve(keys);
+        self.constants.reserve(keys);
+        self.spans.reserve(keys);
     }
 
     /// Forgets everything and keeps the memory.

@@ -1,51 +1,94 @@
 //! Whole sets: tracks in batches, shared among the threads.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
+use glam::Quat;
 use rayon::prelude::*;
 
 use super::arcs::ArcPreparation;
+use super::clip_data::Wanted;
 use super::smooth::SmoothPreparation;
 use super::steps::StepPreparation;
 use super::{NONE, Prepared};
 use crate::clock::{Ticks, Timeline};
+use crate::cycle::Sides;
 use crate::frame_rate::FrameRate;
-use crate::method::{Curves, Ends, Interpolation, InterpolationError, Quantity, Speed};
+use crate::method::{Curves, Ends, Form, Interpolation, InterpolationError, Quantity, Speed};
 use crate::numeric::canonical;
+use crate::segment::segment_size;
 use crate::tracks::{Track, TrackSet};
 
 /// Key intervals prepared as one piece of work.
 const BATCH: usize = 4096;
 
-/// Prepares every track of a set, in parallel: one [`Prepared`] for each batch of
-/// tracks, or of intervals where a track is long, in order.
+/// Prepares tracks of a set, in parallel: one [`Prepared`] for each batch of tracks, or of
+/// intervals where a track is long, in order.
 pub(super) fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
+    wanted: Wanted<'_>,
 ) -> Result<Vec<Prepared>, InterpolationError> {
-    let batches: Vec<Vec<Prepared>> = batches(set)
+    let tracks = wanted.tracks.clone();
+    let batch = wanted.batch(set, interpolation.form());
+    let held = interpolation.sides() == Sides::default();
+    let only_for = wanted.only_for.filter(|_| held);
+    let spare = Mutex::new(wanted.spare);
+    let preparation = || {
+        let mut preparation = Preparation::new(interpolation);
+        if let Some(timeline) = only_for {
+            preparation.only_for(timeline, set);
+        }
+        preparation
+    };
+    let batches: Vec<Vec<Prepared>> = batches(set, tracks.clone(), batch)
         .into_par_iter()
         .map(|tracks| {
-            let mut prepared = Prepared::new(interpolation);
             let alone = tracks.clone().next().filter(|_| tracks.len() == 1);
             let in_pieces = interpolation.speed == Speed::AsKeyed;
             if let (Some(long), true) = (alone, in_pieces) {
-                return prepare_long(set, long, interpolation);
+                return prepare_long(set, long, interpolation, &preparation);
             }
-            Preparation::new(interpolation).push(&mut prepared, set, tracks)?;
+            let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
+            prepared.clear();
+            prepared.reserve(keys_of(set, tracks.clone()));
+            preparation().push(&mut prepared, set, tracks)?;
             Ok(vec![prepared])
         })
         .collect::<Result<_, _>>()?;
-    Ok(batches.into_iter().flatten().collect())
+    let mut groups: Vec<Prepared> = batches.into_iter().flatten().collect();
+    // Their places are those among the tracks asked for.
+    for part in groups.iter_mut().flat_map(|group| &mut group.parts) {
+        part.track -= tracks.start;
+    }
+    Ok(groups)
 }
 
-/// Ranges of tracks with about [`BATCH`] intervals each.
-fn batches(set: &TrackSet) -> Vec<Range<usize>> {
+impl Wanted<'_> {
+    /// Intervals of a batch: for a device, so many that the groups are few, but enough
+    /// for all threads.
+    fn batch(&self, set: &TrackSet, form: Form) -> usize {
+        let Some(limit) = self.group_bytes else {
+            return BATCH;
+        };
+        let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
+        let each = keys_of(set, self.tracks.clone()) / (4 * rayon::current_num_threads());
+        each.min(most).max(BATCH)
+    }
+}
+
+fn keys_of(set: &TrackSet, tracks: Range<usize>) -> usize {
+    tracks.map(|index| set.times_and_keys(index).1.len()).sum()
+}
+
+/// Ranges of tracks with about so many intervals each.
+fn batches(set: &TrackSet, tracks: Range<usize>, batch: usize) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
-    let (mut start, mut intervals) = (0, 0);
-    for (index, track) in set.tracks().enumerate() {
-        intervals += track.keys.len();
-        if intervals >= BATCH || index + 1 == set.track_count() {
+    let (mut start, mut intervals) = (tracks.start, 0);
+    for index in tracks.clone() {
+        intervals += set.times_and_keys(index).1.len();
+        if intervals >= batch || index + 1 == tracks.end {
             batches.push(start..index + 1);
             (start, intervals) = (index + 1, 0);
         }
@@ -59,6 +102,7 @@ fn prepare_long(
     set: &TrackSet,
     index: usize,
     interpolation: &Interpolation,
+    preparation: &(impl Fn() -> Preparation + Sync),
 ) -> Result<Vec<Prepared>, InterpolationError> {
     let track = set.track(index);
     let intervals = track.keys.len() - 1;
@@ -66,8 +110,7 @@ fn prepare_long(
     let piece = |i: usize| {
         let own = i * BATCH..((i + 1) * BATCH).min(intervals);
         let mut prepared = Prepared::new(interpolation);
-        let preparation = Preparation::new(interpolation);
-        let sign = preparation.push_piece(&mut prepared, track, index, own)?;
+        let sign = preparation().push_piece(&mut prepared, track, index, own)?;
         Ok((prepared, sign))
     };
     let pieces: Vec<(Prepared, f32)> = (0..pieces)
@@ -220,7 +263,7 @@ mod tests {
             Preparation::new(&interpolation)
                 .push(&mut whole, &set, 0..1)
                 .unwrap();
-            let pieces = prepare(&set, &interpolation).unwrap();
+            let pieces = prepare(&set, &interpolation, Wanted::all(&set, None)).unwrap();
             assert!(pieces.len() > 3, "{method}");
             let mut together = Prepared::new(&interpolation);
             pieces.into_iter().for_each(|piece| together.append(piece));

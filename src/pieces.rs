@@ -1,0 +1,142 @@
+//! Sets piece by piece: where a device has not the memory for all segments at once, or
+//! where that would cost more than making them.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use crate::clip::Clip;
+use crate::clock::{FramesError, Timeline};
+use crate::cpu::is_sampled;
+use crate::engine::{Backend, Engine, Error};
+use crate::method::Interpolation;
+use crate::prepare::Wanted;
+use crate::rotations::Layout;
+use crate::segment::segment_size;
+use crate::tracks::TrackSet;
+
+/// Bytes of segments that a Vulkan device gets at once where keys are many.
+const DENSE_PIECE: usize = 64 << 20;
+
+impl Engine {
+    /// Some tracks at the samples of a timeline, which is the whole set's; `output` fits
+    /// them.
+    pub(crate) fn evaluate_tracks_into(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let samples = timeline.len();
+        if let (Backend::Cpu(engine), true) =
+            (&*self.backend, self.is_fused(set, &interpolation, layout))
+        {
+            return engine.evaluate_set(set, tracks, &interpolation, timeline, output);
+        }
+        if let (Backend::Cpu(engine), Layout::TrackMajor) = (&*self.backend, layout)
+            && is_sampled(set, &interpolation, timeline)
+            && samples > 0
+        {
+            let mut rows = tracks.zip(output.chunks_mut(samples));
+            return rows.try_for_each(|(track, row)| {
+                engine.sampled_track(set, track, &interpolation, timeline, row)
+            });
+        }
+        let pieces = self.pieces(set, tracks.clone(), &interpolation, timeline);
+        // What one piece needed, the next one uses again: fresh memory costs more than
+        // what is done with it.
+        let mut used: Option<Clip> = None;
+        let mut evaluate = |piece: Range<usize>, output: &mut [Quat]| {
+            let timeline = timeline.of_tracks(piece.clone());
+            let (spare, buffers) = match used.take() {
+                Some(clip) => (clip.data.groups, clip.buffers),
+                None => (Vec::new(), None),
+            };
+            let first = piece.start;
+            let wanted = Wanted {
+                tracks: piece,
+                only_for: Some(&timeline),
+                spare,
+                ..Wanted::all(set, None)
+            };
+            let clip = self.upload_wanted(set, interpolation, wanted, buffers)?;
+            clip.evaluate_timeline_into(&timeline, layout, output)
+                .map_err(|error| error.of_tracks_from(first))?;
+            used = Some(clip);
+            Ok::<(), Error>(())
+        };
+        if let [all] = &*pieces {
+            return evaluate(all.clone(), output);
+        }
+        for piece in pieces {
+            let own = piece.start - tracks.start..piece.end - tracks.start;
+            match layout {
+                Layout::TrackMajor => {
+                    evaluate(piece, &mut output[own.start * samples..own.end * samples])?;
+                }
+                Layout::FrameMajor => {
+                    let mut columns: Vec<Quat> = bytemuck::zeroed_vec(own.len() * samples);
+                    evaluate(piece, &mut columns)?;
+                    let frames = output
+                        .chunks_mut(tracks.len())
+                        .zip(columns.chunks(own.len()));
+                    for (frame, part) in frames {
+                        frame[own.clone()].copy_from_slice(part);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Ranges of tracks whose segments fit the device's budget; and where keys are far more
+    /// than samples, pieces that are quickly done with: fresh memory for all of their
+    /// segments would cost more than making them.
+    pub(crate) fn pieces(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+    ) -> Vec<Range<usize>> {
+        let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
+        let result = set.track_count() * timeline.len() * size_of::<Quat>();
+        let is_dense = (set.key_count() * key_bytes) / 4 > result;
+        let limit = match &*self.backend {
+            Backend::Vulkan(opened) => {
+                let budget = opened.engine.clip_bytes().unwrap_or(usize::MAX);
+                if is_dense {
+                    budget.min(DENSE_PIECE)
+                } else {
+                    budget
+                }
+            }
+            Backend::Cpu(_) => usize::MAX,
+        };
+        let mut pieces = Vec::new();
+        let (mut start, mut bytes) = (tracks.start, 0usize);
+        for index in tracks.clone() {
+            let own = set.times_and_keys(index).1.len() * key_bytes;
+            if bytes.saturating_add(own) > limit && index > start {
+                pieces.push(start..index);
+                (start, bytes) = (index, 0);
+            }
+            bytes += own;
+        }
+        pieces.push(start..tracks.end);
+        pieces
+    }
+}
+
+impl Error {
+    /// What a piece of a set says of its tracks, said of the set's.
+    fn of_tracks_from(mut self, first: usize) -> Self {
+        if let Self::Frames(FramesError::GapTooLong { track, .. }) = &mut self {
+            *track += first;
+        }
+        self
+    }
+}
