@@ -46,6 +46,7 @@ impl Engine {
             });
         }
         let pieces = self.pieces(set, tracks.clone(), &interpolation, timeline);
+        let several = pieces.len() > 1;
         // What one piece needed, the next one uses again: fresh memory costs more than
         // what is done with it.
         let mut used: Option<Clip> = None;
@@ -58,6 +59,7 @@ impl Engine {
             let first = piece.start;
             let wanted = Wanted {
                 tracks: piece,
+                few_groups: several,
                 only_for: Some(&timeline),
                 spare,
                 ..Wanted::all(set, None)

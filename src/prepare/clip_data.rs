@@ -17,9 +17,6 @@ use crate::vector_method::VectorMethod;
 /// Tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
-/// So few groups are not worth copying together.
-const FEW: usize = 64;
-
 /// The prepared tracks, on the host: what every device's schedule is made from.
 pub(crate) struct ClipData {
     pub(crate) interpolation: Interpolation,
@@ -41,9 +38,12 @@ pub(crate) struct PartRef<'a> {
 /// Which tracks of a set to prepare, and for what.
 pub(crate) struct Wanted<'a> {
     pub(crate) tracks: Range<usize>,
-    /// Groups are few, and their segments within so many bytes: each becomes a buffer of
-    /// a device. Without a limit they stay as they were prepared.
+    /// Groups are merged while their segments stay within so many bytes: each becomes a
+    /// buffer of a device. Without a limit they stay as they were prepared.
     pub(crate) group_bytes: Option<usize>,
+    /// Groups are few from the start, and not merged: to copy them together would cost
+    /// more than a dispatch each.
+    pub(crate) few_groups: bool,
     /// The samples of one timeline: what is prepared serves no other then.
     pub(crate) only_for: Option<&'a Timeline>,
     /// Memory to use again.
@@ -56,6 +56,7 @@ impl Wanted<'_> {
         Self {
             tracks: 0..set.track_count(),
             group_bytes,
+            few_groups: false,
             only_for: None,
             spare: Vec::new(),
         }
@@ -74,9 +75,9 @@ impl ClipData {
         {
             return Err(InterpolationError::MirroredVelocity);
         }
-        let group_bytes = wanted.group_bytes;
+        let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
         let groups = prepare(set, &interpolation, wanted)?;
-        Ok(Self::of_groups(groups, set, interpolation, group_bytes))
+        Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
     }
 
     /// Prepares a set's translations or scales.
@@ -239,9 +240,6 @@ impl PartRef<'_> {
 }
 
 fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
-    if groups.len() <= FEW {
-        return groups;
-    }
     let bytes = |group: &Prepared| {
         group
             .segments

@@ -66,10 +66,10 @@ pub(super) fn prepare(
 }
 
 impl Wanted<'_> {
-    /// Intervals of a batch: for a device, so many that the groups are few, but enough
-    /// for all threads.
+    /// Intervals of a batch: so many that the groups are few, where that is wanted, but
+    /// enough for all threads.
     fn batch(&self, set: &TrackSet, form: Form) -> usize {
-        let Some(limit) = self.group_bytes else {
+        let (Some(limit), true) = (self.group_bytes, self.few_groups) else {
             return BATCH;
         };
         let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
