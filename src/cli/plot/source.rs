@@ -7,7 +7,7 @@ use super::figure::{Axis, range_of};
 use crate::cli::device::Opened;
 use crate::cli::exit::Failure;
 use crate::cli::time::Samples;
-use crate::cli::words;
+use crate::cli::{room, words};
 
 /// More keys than this stand too close for upright lines.
 const UPRIGHTS: usize = 200;
@@ -105,6 +105,8 @@ impl<'a> Source<'a> {
         interpolation: Interpolation,
     ) -> Result<Vec<Quat>, Failure> {
         let one = self.set.select(index..index + 1);
+        // The rotations, the points of a curve and what is drawn of them.
+        room::in_memory(&self.name, &one, &self.frames, 4)?;
         device
             .collect(&one, interpolation, &self.frames, Layout::TrackMajor)
             .map_err(|error| Failure::evaluating(&self.name, &error))
