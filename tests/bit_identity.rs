@@ -7,8 +7,8 @@ use glam::{DQuat, DVec3, Quat};
 use support::{Random, first_difference, hostile_set, vulkan_devices};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, TrackSet,
-    Transfer, VectorWidth, method,
+    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, Rotations,
+    TrackSet, Transfer, VectorWidth, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -134,7 +134,7 @@ fn layouts_are_transposes_of_each_other() {
     }
 }
 
-fn assert_transposed(rows: &tumble::Rotations, columns: &tumble::Rotations) {
+fn assert_transposed(rows: &Rotations, columns: &Rotations) {
     for track in 0..rows.tracks() {
         for sample in 0..rows.samples() {
             let bits = |q: Option<Quat>| q.unwrap().to_array().map(f32::to_bits);
@@ -343,6 +343,26 @@ fn engines_clips_and_results_are_send_and_sync() {
     check::<tumble::Error>();
 }
 
+/// The CPU at every width and every Vulkan device give these bits from keys.
+fn assert_everywhere(
+    expected: &Rotations,
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+) {
+    let widths = VectorWidth::available().into_iter().map(|width| {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        Engine::with_options(Device::Cpu, &options)
+    });
+    for engine in widths.chain(vulkan_devices().into_iter().map(Engine::new)) {
+        let engine = engine.unwrap();
+        let found = engine.evaluate(set, interpolation, frames).unwrap();
+        let what = format!("{interpolation:?}, {frames:?}, {}", engine.device_name());
+        assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+    }
+}
+
 /// Fewer samples than keys take another way on the CPU, arcs by no segments, cubics by
 /// fewer: the same bits, at every width, for frames and for times, wherever they begin
 /// and end.
@@ -399,21 +419,7 @@ fn few_samples_of_many_keys_have_the_same_bits() {
             let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
-            for width in VectorWidth::available() {
-                let mut options = EngineOptions::default();
-                options.vector_width = Some(width);
-                let engine = Engine::with_options(Device::Cpu, &options).unwrap();
-                let found = engine.evaluate(&set, interpolation, frames).unwrap();
-                let what = format!("{method}, {path:?}, {frames:?}, {width:?}");
-                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
-            }
-            for device in vulkan_devices() {
-                let found = Engine::new(device)
-                    .unwrap()
-                    .evaluate(&set, interpolation, frames)
-                    .unwrap();
-                assert_same_bits(expected.as_quats(), found.as_quats(), "Vulkan");
-            }
+            assert_everywhere(&expected, &set, interpolation, frames);
         }
     }
 }
@@ -492,19 +498,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
             let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
-            for width in VectorWidth::available() {
-                let mut options = EngineOptions::default();
-                options.vector_width = Some(width);
-                let engine = Engine::with_options(Device::Cpu, &options).unwrap();
-                let found = engine.evaluate(&set, interpolation, frames).unwrap();
-                let what = format!("{method}, {path:?}, {frames:?}, {width:?}");
-                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
-            }
-            for device in vulkan_devices() {
-                let engine = Engine::new(device).unwrap();
-                let found = engine.evaluate(&set, interpolation, frames).unwrap();
-                assert_same_bits(expected.as_quats(), found.as_quats(), "Vulkan");
-            }
+            assert_everywhere(&expected, &set, interpolation, frames);
             // At half a turn exactly either way round is as short.
             for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
                 let curve = Curve::of(&interpolation, set.track(track));

@@ -312,6 +312,10 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
             "a report has many pictures; give a directory",
         ),
         (
+            "plot a.dat folder/a.dat -o x --show speed",
+            "would share the pictures' names",
+        ),
+        (
             "plot a.dat folder/a.dat -o x --report",
             "would share the pictures' names",
         ),

@@ -162,6 +162,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .distinct(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
+    refuse_shared_names(&inputs)?;
     let out = arguments.place(&inputs)?;
     let methods = arguments.methods();
     let interpolations: Vec<Interpolation> = methods
@@ -351,6 +352,21 @@ impl Arguments {
             axis: self.axis.into(),
         })
     }
+}
+
+/// Pictures are named after their inputs, so no two of those may have the same name.
+fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
+    for (place, path) in inputs.iter().enumerate() {
+        let same = |other: &&PathBuf| input::stem(other) == input::stem(path);
+        if let Some(other) = inputs[..place].iter().find(same) {
+            return Err(Failure::usage(format!(
+                "{} and {} would share the pictures' names; draw them into different directories",
+                input::name(other),
+                input::name(path)
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Everything in one picture, if that can be read.

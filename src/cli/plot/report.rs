@@ -42,18 +42,6 @@ pub(super) fn write(
     folder: &Path,
 ) -> Result<(), Failure> {
     let inputs = studio.inputs.clone();
-    for (place, path) in inputs.iter().enumerate() {
-        if let Some(other) = inputs[..place]
-            .iter()
-            .find(|other| input::stem(other) == input::stem(path))
-        {
-            return Err(Failure::usage(format!(
-                "{} and {} would share the pictures' names; put them into reports of their own",
-                input::name(other),
-                input::name(path)
-            )));
-        }
-    }
     let page = Place::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
     page.try_out()?;
     let each = figures_of_one(interpolations.len());
