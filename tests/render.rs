@@ -229,6 +229,27 @@ fn methods_stand_side_by_side_under_their_names() {
 }
 
 #[test]
+fn a_gif_of_more_frames_than_it_can_show_is_warned_of() {
+    let place = sample_folder();
+    for (fps, out, warned) in [
+        ("50", "a.gif", false),
+        ("60", "b.gif", true),
+        ("60", "b.apng", false),
+    ] {
+        let line = [
+            "render", "a.dat", "--fps", fps, "--size", "32x32", "--end", "0.2", "-o", out,
+        ];
+        let run = succeed(place.path(), &line);
+        assert_eq!(
+            run.words.contains("warning: GIF shows no frame"),
+            warned,
+            "{}",
+            run.words
+        );
+    }
+}
+
+#[test]
 fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
     let place = sample_folder();
     fs::write(place.path().join("old.gif"), "old").unwrap();

@@ -23,6 +23,9 @@ use scene::{Actor, Scene, Theme, View};
 /// Chains side by side in one picture.
 const MOST: usize = 4;
 
+/// What browsers show a frame of a GIF for at least, seconds; less some rounding.
+const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
+
 /// Draw the boxes of a chain as pictures or a film, without a display
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -234,6 +237,15 @@ impl Arguments {
             .collect();
         let (width, height) = self.size;
         let mut progress = Progress::new("rendering", times.len() as u64);
+        let too_fast = times
+            .windows(2)
+            .any(|pair| pair[1] - pair[0] < SHORTEST_IN_GIF);
+        if kind == Kind::Gif && too_fast {
+            words::warning(
+                "GIF shows no frame for less than 0.02 s, so the film is slower than its keys; \
+                 give --fps 50 or less, or write .apng",
+            );
+        }
         if kind == Kind::Folder {
             place::folder(&self.out)?;
             let digits = (times.len() - 1).to_string().len().max(5);
