@@ -353,3 +353,41 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
                 .contains("65 panels in one picture cannot be read")
     );
 }
+
+/// A single key has no steps, no speed and no span of time.
+#[test]
+fn a_single_key_is_drawn_in_every_way() {
+    let place = sample_folder();
+    fs::write(place.path().join("one.dat"), "# 1 3\n0.5 1 0 0 0\n").unwrap();
+    for show in ["components", "speed", "error", "sphere"] {
+        let out = format!("{show}.svg");
+        succeed(
+            place.path(),
+            &["plot", "one.dat", "--show", show, "-o", &out],
+        );
+        let marks = Marks::of(&place.path().join(out));
+        let finite =
+            |points: &[(f64, f64)]| points.iter().all(|p| p.0.is_finite() && p.1.is_finite());
+        assert!(
+            finite(&marks.dots) && marks.lines.iter().all(|line| finite(&line.1)),
+            "{show}"
+        );
+    }
+    succeed(
+        place.path(),
+        &["plot", "--report", "one.dat", "-o", "report"],
+    );
+    let page = fs::read_to_string(place.path().join("report/index.html")).unwrap();
+    assert!(
+        page.contains("<p>1 box, 1 key in all, from 0.5 to 0.5 s</p>"),
+        "{page}"
+    );
+    for out in ["one.html", "one.gif", "one.apng"] {
+        let command = if out.ends_with("html") {
+            "view"
+        } else {
+            "render"
+        };
+        succeed(place.path(), &[command, "one.dat", "-o", out]);
+    }
+}

@@ -368,6 +368,26 @@ fn every_control_does_what_it_says() {
     assert_eq!(page.errors, Vec::<String>::new());
 }
 
+#[test]
+fn a_click_on_a_box_shows_its_curves() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    let area = page.value("(() => { const r = document.querySelector('#stage').getBoundingClientRect(); return [r.x, r.y] })()");
+    let (pixels, width) = page.pixels("#stage");
+    // Orange is the second box; a pixel inside it has orange ones all round.
+    let orange = |pixel: &[u8; 3]| pixel[0] > 90 && pixel[1] > pixel[0] / 2 && pixel[2] < 30;
+    let inside = (4 * width + 4..pixels.len() - 4 * width - 4).find(|&at| {
+        let round = [at, at - 4, at + 4, at - 4 * width, at + 4 * width];
+        round.iter().all(|&place| orange(&pixels[place]))
+    });
+    let at = inside.expect("the second box is seen");
+    let (x, y) = ((at % width) as f64, (at / width) as f64);
+    page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
+    page.wait("tumble.state.box === 1 && document.querySelector('#box').value === '2'");
+}
+
 /// Without looping it stops at the end; with it, it begins again.
 #[test]
 fn it_loops_or_stops_at_the_end() {

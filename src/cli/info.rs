@@ -68,15 +68,35 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     outcome
 }
 
+/// The times between neighbouring keys, seconds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Steps {
+    pub(crate) shortest: f64,
+    pub(crate) longest: f64,
+}
+
+impl Steps {
+    /// Of all tracks; nothing where no track has two keys.
+    pub(crate) fn of(set: &TrackSet) -> Option<Self> {
+        let steps = set.tracks().flat_map(|track| track.times.windows(2));
+        let each = steps.map(|times| Self {
+            shortest: times[1] - times[0],
+            longest: times[1] - times[0],
+        });
+        each.reduce(|a, b| Self {
+            shortest: a.shortest.min(b.shortest),
+            longest: a.longest.max(b.longest),
+        })
+    }
+
+    pub(crate) fn are_even(self) -> bool {
+        self.longest - self.shortest <= EVEN * self.longest
+    }
+}
+
 impl Summary {
     fn new(input: String, set: &TrackSet, warnings: &[Diagnostic]) -> Self {
-        let steps = || {
-            set.tracks()
-                .flat_map(|track| track.times.windows(2))
-                .map(|t| t[1] - t[0])
-        };
-        let shortest_step = steps().reduce(f64::min);
-        let longest_step = steps().reduce(f64::max);
+        let steps = Steps::of(set);
         let (first_time, last_time) = set.time_span().unwrap_or_default();
         let rotation = set
             .tracks()
@@ -89,12 +109,9 @@ impl Summary {
             keys: set.key_count(),
             first_time,
             last_time,
-            shortest_step,
-            longest_step,
-            uniform: match (shortest_step, longest_step) {
-                (Some(shortest), Some(longest)) => longest - shortest <= EVEN * longest,
-                _ => true,
-            },
+            shortest_step: steps.map(|steps| steps.shortest),
+            longest_step: steps.map(|steps| steps.longest),
+            uniform: steps.is_none_or(Steps::are_even),
             largest_rotation_degrees: rotation.to_degrees(),
             box_length: set.box_length(),
             warnings: warnings.iter().map(ToString::to_string).collect(),

@@ -7,32 +7,17 @@ impl Evaluate for PolynomialSegment {
     #[inline(always)]
     fn evaluate(&self, s: f32) -> [f32; 4] {
         let segment = self;
-        let z = s * s;
-        let step = |sum: [f32; 4], power: usize| -> [f32; 4] {
-            std::array::from_fn(|i| sum[i] * z + segment.coefficients[power][i])
-        };
-        let mut even = segment.coefficients[10];
-        let mut odd = segment.coefficients[9];
-        even = step(even, 8);
-        odd = step(odd, 7);
-        even = step(even, 6);
-        odd = step(odd, 5);
-        even = step(even, 4);
-        odd = step(odd, 3);
-        even = step(even, 2);
-        odd = step(odd, 1);
-        even = step(even, 0);
-        std::array::from_fn(|i| odd[i] * s + even[i])
+        std::array::from_fn(|i| component(|power| segment.coefficients[power][i], s))
     }
 }
 
-/// One component of it.
+/// One component of a rotation, whose coefficients are asked for by their power.
 #[inline(always)]
-pub(super) fn evaluate_component(coefficients: &[f32; 11], s: f32) -> f32 {
+pub(super) fn component(coefficient: impl Fn(usize) -> f32, s: f32) -> f32 {
     let z = s * s;
-    let step = |sum: f32, power: usize| sum * z + coefficients[power];
-    let mut even = coefficients[10];
-    let mut odd = coefficients[9];
+    let step = |sum: f32, power: usize| sum * z + coefficient(power);
+    let mut even = coefficient(10);
+    let mut odd = coefficient(9);
     even = step(even, 8);
     odd = step(odd, 7);
     even = step(even, 6);

@@ -6,10 +6,10 @@
 use super::dispatch::InLanes;
 use super::evaluate::canonical;
 use super::evaluate::{Affine, one};
-use super::evaluate_polynomial::evaluate_component;
+use super::evaluate_polynomial::component;
 use crate::frame_clock::{FrameClock, InFrames, finite_scale, in_frames};
 use crate::numeric::{round_f32, whole_number};
-use crate::prepare::{arc, component, signed};
+use crate::prepare::{arc, arc_component, signed};
 use crate::segment::ArcSegment;
 
 /// Samples, or intervals, worked out together.
@@ -142,8 +142,8 @@ impl SampleBlock {
         for c in 0..4 {
             let (middle, partner, lanes) = (&middles[c], &partners[c], &mut found[c]);
             for j in 0..self.whole() {
-                let own = component(middle[j], partner[j], angles[j]);
-                lanes[j] = canonical(evaluate_component(&own, parameters[j]));
+                let own = arc_component(middle[j], partner[j], angles[j]);
+                lanes[j] = canonical(component(|power| own[power], parameters[j]));
             }
         }
         self.keep(&found);

@@ -32,7 +32,7 @@ pub(crate) use passes::{
 };
 pub(crate) use set::Preparation;
 pub(crate) use shape::Shape;
-pub(crate) use steady::component;
+pub(crate) use steady::arc_component;
 
 use std::ops::Range;
 

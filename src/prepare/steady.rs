@@ -31,7 +31,7 @@ const SERIES: [f64; COEFFICIENTS] = [
 /// angle in radians. Half of that is at most pi/4, and what the series leave out at most
 /// 2e-9.
 #[inline(always)]
-pub(crate) fn component(middle: f32, partner: f32, angle: f64) -> [f32; COEFFICIENTS] {
+pub(crate) fn arc_component(middle: f32, partner: f32, angle: f64) -> [f32; COEFFICIENTS] {
     let (middle, partner) = (f64::from(middle), f64::from(partner));
     let square = angle * angle;
     let mut coefficients = [0.0; COEFFICIENTS];
@@ -118,7 +118,7 @@ impl InLanes for SteadyBlock {
         for c in 0..4 {
             let (middle, partner) = (&middles[c], &partners[c]);
             for j in 0..count {
-                let own = component(middle[j], partner[j], angles[j]);
+                let own = arc_component(middle[j], partner[j], angles[j]);
                 for k in 0..COEFFICIENTS {
                     found[k][c][j] = own[k];
                 }

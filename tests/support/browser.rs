@@ -181,10 +181,15 @@ impl Page {
             "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center'}}); \
              const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2] }})()"
         ));
+        let (x, y) = (middle[0].as_f64().unwrap(), middle[1].as_f64().unwrap());
+        self.click_at(x, y);
+    }
+
+    /// Clicks on a place of the window.
+    pub(crate) fn click_at(&mut self, x: f64, y: f64) {
         for kind in ["mousePressed", "mouseReleased"] {
-            let parameters = json!({
-                "type": kind, "x": middle[0], "y": middle[1], "button": "left", "clickCount": 1
-            });
+            let parameters =
+                json!({"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1});
             self.call("Input.dispatchMouseEvent", parameters);
         }
     }

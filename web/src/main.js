@@ -192,9 +192,10 @@ function setMethod(name) {
 }
 
 function setOther(name, pairing = state.pairing) {
-  const refit = pairing !== state.pairing || !name !== !state.other;
+  const before = side();
   Object.assign(state, { other: name, pairing });
-  load(refit && (pairing === "side" || stage?.span !== undefined));
+  // A ghost needs no other view.
+  load(before !== (name !== "" && pairing === "side"));
 }
 
 /** Off, ghost, side by side, off. */
@@ -331,7 +332,7 @@ function listen() {
 }
 
 function menus() {
-  const methods = stored.methods.map(({ name, summary, colour }) => [name, name, summary]);
+  const methods = stored.methods.map(({ name, summary }) => [name, name, summary]);
   fill(element("set"), inputs.map((input, i) => [String(i), input.name]));
   element("set-field").style.display = inputs.length > 1 ? "" : "none";
   fill(element("method"), methods);

@@ -12,6 +12,7 @@ use super::curves::{NAMES, Subject};
 use super::source::Source;
 use super::{Arguments, PANELS, Studio};
 use crate::cli::exit::Failure;
+use crate::cli::info::Steps;
 use crate::cli::input;
 use crate::cli::place::Place;
 use crate::cli::progress::Progress;
@@ -147,22 +148,15 @@ fn figures(
 
 fn facts(set: &TrackSet) -> String {
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-    let steps = || {
-        set.tracks()
-            .flat_map(|track| track.times.windows(2))
-            .map(|pair| pair[1] - pair[0])
-    };
-    let (shortest, longest) = (
-        steps().fold(f64::INFINITY, f64::min),
-        steps().fold(0.0, f64::max),
-    );
-    let steps = if longest - shortest <= 1e-9 * longest.abs() {
-        format!("a key every {longest:.4} s")
-    } else {
-        format!("a key every {shortest:.4} to {longest:.4} s")
+    let steps = match Steps::of(set) {
+        None => String::new(),
+        Some(steps) if steps.are_even() => format!(", a key every {:.4} s", steps.longest),
+        Some(Steps { shortest, longest }) => {
+            format!(", a key every {shortest:.4} to {longest:.4} s")
+        }
     };
     format!(
-        "{}, {} in all, from {first} to {last} s, {steps}",
+        "{}, {} in all, from {first} to {last} s{steps}",
         words::boxes(set.track_count()),
         words::count(set.key_count(), "key"),
     )
