@@ -12,10 +12,12 @@ use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
 use super::input::Inputs;
 use super::interpolation::{Manner, method};
-use super::output::{Format, ResultShape, Target};
+use super::manifest::{Entry, kernels_sha256};
+use super::output::{Format, Plan, ResultShape, Target, Wish};
+use super::place::Written;
 use super::time::{Samples, Sampling};
 use super::what::{PoseKind, What};
-use super::{input, output, room, signals, words};
+use super::{digest, input, output, room, signals, words};
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -29,6 +31,8 @@ Examples:
   tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
   tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
+  tumble eval walks -o results --resume        a directory's tree; skips what is done
+  find . -name '*.dat' | tumble eval --files-from - -o results
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
 pub(crate) struct Arguments {
@@ -40,6 +44,10 @@ pub(crate) struct Arguments {
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
+    /// In a directory of results: skip those that are there, whole, and made from the same input
+    /// in the same way
+    #[arg(long)]
+    resume: bool,
     /// How to interpolate (`tumble methods`)
     #[arg(
         short,
@@ -118,14 +126,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Everything that can be refused is refused before any work.
     let inputs = arguments
         .inputs
-        .distinct(arguments.sampling.reads_standard_input())?;
+        .gather(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
-    let targets = output::plan(
-        &inputs,
-        arguments.out.as_deref(),
-        arguments.format,
-        arguments.overwrite,
-    )?;
+    let wish = Wish {
+        out: arguments.out.as_deref(),
+        format: arguments.format,
+        overwrite: arguments.overwrite,
+        resume: arguments.resume,
+    };
+    let Plan { targets, manifest } = output::plan(&inputs, wish)?;
     let is_text = |target: &Target| target.format() == Format::Csv;
     let short = arguments.encoding != EncodingArgument::F32;
     if short && targets.iter().any(is_text) {
@@ -138,16 +147,79 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage("--encoding is for quaternions"));
     }
     let mut device = arguments.device.open()?;
-    let jobs: Vec<(PathBuf, Target)> = inputs.into_iter().zip(targets).collect();
-    for_each(&jobs, |(path, target)| {
+    let jobs: Vec<(PathBuf, Target)> = inputs.paths().into_iter().zip(targets).collect();
+    let Some(mut manifest) = manifest else {
+        return for_each(&jobs, |(path, target)| {
+            let (written, told) = arguments.evaluate(&mut device, &samples, path, target)?;
+            written.commit()?;
+            words::note(&told);
+            Ok(())
+        });
+    };
+    let options = arguments.options(&samples);
+    let mut skipped = 0;
+    let outcome = for_each(&jobs, |(path, target)| {
         if let Some(stop) = signals::stopped() {
             return Err(stop);
         }
-        arguments.evaluate(&mut device, &samples, path, target)
-    })
+        // What cannot be read is told about when it is opened.
+        let hash = match input::is_standard(path) {
+            true => None,
+            false => digest::of_file(path).ok(),
+        };
+        if let (true, Some(hash)) = (arguments.resume, &hash)
+            && manifest.is_done(target.name(), hash, &options)
+        {
+            skipped += 1;
+            return Ok(());
+        }
+        let (mut written, told) = arguments.evaluate(&mut device, &samples, path, target)?;
+        let digest = written.digest.take().unwrap_or_default();
+        manifest.add(Entry {
+            output: target.name().to_owned(),
+            output_bytes: digest.bytes(),
+            output_sha256: digest.finish(),
+            input: input::name(path),
+            input_sha256: hash,
+            options: options.clone(),
+            kernels_sha256: kernels_sha256(),
+            tumble: env!("CARGO_PKG_VERSION").to_owned(),
+            device: device.label.clone(),
+        })?;
+        written.commit()?;
+        words::note(&told);
+        Ok(())
+    });
+    if skipped > 0 {
+        let results = words::count(skipped, "result");
+        words::note(&format!("{results} skipped: done before, and whole"));
+    }
+    manifest.finish()?;
+    outcome
 }
 
 impl Arguments {
+    /// All that decides over the bytes of a result besides its input.
+    fn options(&self, samples: &Samples) -> String {
+        let times = match samples {
+            Samples::Times(times) => {
+                let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
+                digest::of_bytes([&*bytes])
+            }
+            Samples::Rate { .. } => String::new(),
+        };
+        format!(
+            "{} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
+            self.method,
+            self.sampling,
+            self.manner,
+            self.layout,
+            self.order,
+            self.encoding,
+            self.what
+        )
+    }
+
     /// One input, from its file to its result.
     fn evaluate(
         &self,
@@ -155,7 +227,7 @@ impl Arguments {
         samples: &Samples,
         path: &Path,
         target: &Target,
-    ) -> Result<(), Failure> {
+    ) -> Result<(Written, String), Failure> {
         let name = input::name(path);
         let set = self.inputs.load(path)?;
         let frames = samples.of(&set, &name);
@@ -189,11 +261,10 @@ impl Arguments {
             quantity: self.what.quantity(),
             ..self.manner.with(self.method)
         };
-        target.write_rotations(&result, |sink| {
+        let written = target.write_rotations(&result, |sink| {
             device.stream(&set, interpolation, &frames, layout, sink)
         })?;
-        self.tell(device, &result, target, started);
-        Ok(())
+        Ok((written, self.told(device, &result, target, started)))
     }
 
     /// Whole poses, `[frame][track]`: of the boxes of a chain, each of which hangs at the
@@ -205,7 +276,7 @@ impl Arguments {
         frames: &Frames,
         kind: PoseKind,
         target: &Target,
-    ) -> Result<(), Failure> {
+    ) -> Result<(Written, String), Failure> {
         let ResultShape {
             name,
             set,
@@ -259,16 +330,21 @@ impl Arguments {
             components,
             numbers: &numbers,
         };
-        target.write(|out| match target.format() {
+        let written = target.prepare(|out| match target.format() {
             Format::Csv => poses.write_csv(out),
             Format::Npy => poses.write_npy(out),
         })?;
-        self.tell(device, result, target, started);
-        Ok(())
+        Ok((written, self.told(device, result, target, started)))
     }
 
-    fn tell(&self, device: &Opened, result: &ResultShape<'_>, target: &Target, started: Instant) {
-        words::note(&format!(
+    fn told(
+        &self,
+        device: &Opened,
+        result: &ResultShape<'_>,
+        target: &Target,
+        started: Instant,
+    ) -> String {
+        format!(
             "{}: {} × {}, {}, on {} in {} → {target}",
             result.name,
             words::count(result.set.track_count(), "track"),
@@ -276,6 +352,6 @@ impl Arguments {
             self.method,
             device.label,
             words::duration(started.elapsed()),
-        ));
+        )
     }
 }

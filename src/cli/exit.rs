@@ -47,6 +47,12 @@ impl Failure {
         Self::new(code, "")
     }
 
+    /// The same with more to say.
+    pub(crate) fn hinted(mut self, hint: &str) -> Self {
+        self.message.push_str(hint);
+        self
+    }
+
     /// Data could not be written. A reader that went away knows it already.
     pub(crate) fn writing(place: &str, error: &io::Error) -> Self {
         match error.kind() {

@@ -1,7 +1,6 @@
 //! Inputs: keyframe files and lists of times, opened, read, and their warnings
 //! passed on.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,15 +10,19 @@ use tumble::formats::times::open_times;
 use tumble::formats::{Code, Diagnostic};
 
 use super::exit::Failure;
+use super::gather::Gathered;
 use super::progress::busy;
 use super::words;
 
 /// The inputs of a command, and what they may be.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Inputs {
-    /// Keyframe files (`-`: standard input)
-    #[arg(required = true, value_name = "INPUT")]
+    /// Keyframe files, directories of them, or patterns such as 'walks/*.dat' (`-`: standard input)
+    #[arg(required_unless_present = "files_from", value_name = "INPUT")]
     paths: Vec<PathBuf>,
+    /// Also the inputs in a text file, one a line (`-`: standard input)
+    #[arg(long, value_name = "LIST")]
+    files_from: Option<PathBuf>,
     /// Read named pipes too
     #[arg(long)]
     pipes: bool,
@@ -61,24 +64,29 @@ pub(crate) fn stem(path: &Path) -> String {
 impl Inputs {
     /// The inputs without repetitions, each of which earns a warning. Standard
     /// input can be taken only once.
-    pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
-        let mut seen = HashSet::new();
-        let mut distinct = Vec::new();
-        for path in &self.paths {
-            if is_standard(path) && standard_input_taken {
-                let message =
-                    "standard input cannot be both the keys and the times; put one in a file";
-                return Err(Failure::usage(message));
-            }
-            // A missing file is told about when it is opened.
-            let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
-            if seen.insert(identity) {
-                distinct.push(path.clone());
-            } else {
-                words::warning(&format!("{}: given twice, done once", name(path)));
-            }
+    pub(crate) fn gather(&self, standard_input_taken: bool) -> Result<Gathered, Failure> {
+        let taken = [
+            (standard_input_taken, "the times"),
+            (
+                self.files_from.as_deref().is_some_and(is_standard),
+                "the list of inputs",
+            ),
+        ];
+        let taken: Vec<&str> = taken.iter().filter(|t| t.0).map(|t| t.1).collect();
+        let keys = self.paths.iter().any(|path| is_standard(path));
+        if taken.len() + usize::from(keys) > 1 {
+            let all = taken.iter().copied().chain(keys.then_some("the keys"));
+            let all = all.collect::<Vec<_>>().join(" and ");
+            return Err(Failure::usage(format!(
+                "standard input cannot be both {all}; put one in a file"
+            )));
         }
-        Ok(distinct)
+        Gathered::new(&self.paths, self.files_from.as_deref())
+    }
+
+    /// As [`Inputs::gather`], the paths alone.
+    pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
+        Ok(self.gather(standard_input_taken)?.paths())
     }
 
     /// Reads a keyframe file; its warnings go to standard error.

@@ -4,17 +4,21 @@
 //! the exit codes mean.
 
 mod bench;
+mod check;
 mod colours;
 mod completions;
 mod device;
 mod devices;
+mod digest;
 mod eval;
 pub(crate) mod exit;
 mod explain;
+mod gather;
 mod generate;
 mod info;
 mod input;
 mod interpolation;
+mod manifest;
 mod methods;
 mod output;
 mod picture;
@@ -47,6 +51,8 @@ Examples:
   tumble info chain.dat                        what is in it
   tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
+  tumble eval walks -o results                 a directory of files; --resume goes on
+  tumble check results                         are its bits still what they were?
   tumble verify chain.dat                      device = CPU, and both against f64
   tumble view chain.dat --open                 see the boxes turn
   tumble plot chain.dat -o chain.svg           see every component
@@ -81,6 +87,7 @@ pub(crate) enum Command {
     View(Box<view::Arguments>),
     Render(Box<render::Arguments>),
     Bench(bench::Arguments),
+    Check(check::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -98,6 +105,7 @@ impl Command {
             Self::View(arguments) => view::run(&arguments),
             Self::Render(arguments) => render::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
+            Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),
         }

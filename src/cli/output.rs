@@ -1,7 +1,7 @@
 //! Results of evaluations: where they go, planned and checked before any work, and
 //! how they are written.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -10,10 +10,13 @@ use clap::ValueEnum;
 use glam::Quat;
 use tumble::formats::csv::CsvWriter;
 use tumble::formats::npy::{ComponentOrder, NpyWriter};
+use tumble::formats::output::remove_abandoned;
 use tumble::{Chunk, Encoding, Error, Layout, Timeline, TrackSet};
 
 use super::exit::Failure;
-use super::place::{self, Place};
+use super::gather::{Found, Gathered};
+use super::manifest::Manifest;
+use super::place::{self, Place, Written};
 use super::progress::Progress;
 use super::stream::Stream;
 use super::{input, room, signals};
@@ -35,40 +38,66 @@ const PIECE: usize = 1 << 18;
 pub(crate) struct Target {
     place: Place,
     format: Format,
+    /// Below the directory of results.
+    name: String,
 }
 
-/// One target for each input. Refuses what cannot be meant, before any work:
-/// outputs that exist, that are inputs, that two inputs share.
-pub(crate) fn plan(
-    inputs: &[PathBuf],
-    output: Option<&Path>,
-    format: Option<Format>,
-    overwrite: bool,
-) -> Result<Vec<Target>, Failure> {
-    if output.is_none() && io::stdout().is_terminal() {
+/// One target for each input, and the manifest of the directory that they are in.
+pub(crate) struct Plan {
+    pub(crate) targets: Vec<Target>,
+    pub(crate) manifest: Option<Manifest>,
+}
+
+/// What the arguments say of results' places.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wish<'a> {
+    pub(crate) out: Option<&'a Path>,
+    pub(crate) format: Option<Format>,
+    pub(crate) overwrite: bool,
+    pub(crate) resume: bool,
+}
+
+/// Refuses what cannot be meant, before any work: outputs that exist, that are inputs,
+/// that two inputs share.
+pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
+    if wish.out.is_none() && io::stdout().is_terminal() {
         return Err(Failure::usage(
             "where should the result go? give -o OUT.npy, -o OUT.csv, or -o - for standard output",
         ));
     }
-    let output = output.unwrap_or(Path::new("-"));
-    let targets = match inputs {
-        [_] => {
-            let format = choose(output, format)?;
-            let place = Place::new(output, overwrite, inputs)?;
-            vec![Target { place, format }]
+    let out = wish.out.unwrap_or(Path::new("-"));
+    let paths = inputs.paths();
+    // One file goes into one file, however it was found.
+    let is_file = out.is_file() || Format::of(out).is_some() || input::is_standard(out);
+    let plan = match &*paths {
+        [_] if !inputs.many || is_file => {
+            if wish.resume {
+                let message = "--resume is for a directory of results";
+                return Err(Failure::usage(message));
+            }
+            let format = choose(out, wish.format)?;
+            let place = Place::new(out, wish.overwrite, &paths)?;
+            let name = String::new();
+            let targets = vec![Target {
+                place,
+                format,
+                name,
+            }];
+            let manifest = None;
+            Plan { targets, manifest }
         }
-        _ if input::is_standard(output) => {
+        _ if input::is_standard(out) => {
             return Err(Failure::usage(
                 "several inputs need a directory for their results: -o DIRECTORY",
             ));
         }
-        _ => in_folder(inputs, output, format, overwrite)?,
+        _ => in_folder(inputs, out, wish)?,
     };
     // The surest check is to try; they are all in one directory.
-    if let Some(target) = targets.first() {
+    if let Some(target) = plan.targets.first() {
         target.place.try_out()?;
     }
-    Ok(targets)
+    Ok(plan)
 }
 
 /// The format asked for, else the one that the name says.
@@ -86,31 +115,28 @@ fn choose(path: &Path, format: Option<Format>) -> Result<Format, Failure> {
     })
 }
 
-/// A file in `folder` for each input, named after it.
-fn in_folder(
-    inputs: &[PathBuf],
-    folder: &Path,
-    format: Option<Format>,
-    overwrite: bool,
-) -> Result<Vec<Target>, Failure> {
+/// A file in `folder` for each input, named after it; below it, where the input lay below
+/// a directory.
+fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, Failure> {
     let shown = folder.display();
     if !folder.is_dir() && (folder.exists() || Format::of(folder).is_some()) {
         return Err(Failure::usage(format!(
             "{shown}: several inputs need a directory for their results, not one file"
         )));
     }
-    let format = format.unwrap_or(Format::Npy);
-    let sources: HashSet<PathBuf> = inputs
-        .iter()
-        .filter_map(|input| input.canonicalize().ok())
+    let format = wish.format.unwrap_or(Format::Npy);
+    let sources: HashSet<PathBuf> = (inputs.files.iter())
+        .filter_map(|found| found.path.canonicalize().ok())
         .collect();
     let mut owners: HashMap<PathBuf, &Path> = HashMap::new();
-    let mut paths = Vec::new();
-    for path in inputs {
-        let target = folder.join(format.name_for(path));
+    let mut names = Vec::new();
+    for Found { path, below } in &inputs.files {
+        let name = format.name_for(path, below);
+        let target = folder.join(&name);
         if let Some(other) = owners.insert(target.clone(), path) {
             return Err(Failure::usage(format!(
-                "{} and {} would both write {}; evaluate them into different directories",
+                "{} and {} would both write {}; give their directory, whose tree is kept, or \
+                 evaluate them into different directories",
                 input::name(other),
                 input::name(path),
                 target.display()
@@ -125,14 +151,44 @@ fn in_folder(
                 "{target}: is an input; give another directory"
             )));
         }
-        paths.push(target);
+        let Some(name) = name.to_str() else {
+            let message = "its name is not UTF-8, and a manifest could not name it; rename it";
+            let input = input::name(path);
+            return Err(Failure::usage(format!("{input}: {message}")));
+        };
+        names.push(name.to_owned());
     }
     place::folder(folder)?;
-    let target = |path: &PathBuf| {
-        let place = Place::new(path, overwrite, &[])?;
-        Ok(Target { place, format })
+    let parents: BTreeSet<PathBuf> = (names.iter())
+        .filter_map(|name| folder.join(name).parent().map(Path::to_owned))
+        .collect();
+    for parent in &parents {
+        std::fs::create_dir_all(parent)
+            .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
+        if wish.resume {
+            remove_abandoned(parent);
+        }
+    }
+    let manifest = Manifest::open(folder)?;
+    let target = |name: String| {
+        let overwrite = wish.overwrite || wish.resume && manifest.knows(&name);
+        let place = Place::new(&folder.join(&name), overwrite, &[]).map_err(|failure| {
+            if manifest.knows(&name) {
+                failure.hinted(" (--resume skips what is done)")
+            } else {
+                failure
+            }
+        })?;
+        let place = place.hashed();
+        Ok(Target {
+            place,
+            format,
+            name,
+        })
     };
-    paths.iter().map(target).collect()
+    let targets = names.into_iter().map(target).collect::<Result<_, _>>()?;
+    let manifest = Some(manifest);
+    Ok(Plan { targets, manifest })
 }
 
 impl Format {
@@ -144,20 +200,17 @@ impl Format {
         }
     }
 
-    /// `folder/walk.dat` becomes `walk.npy`.
-    fn name_for(self, input: &Path) -> PathBuf {
-        let standard = input::is_standard(input);
-        let stem = if standard {
-            Some("stdin".as_ref())
+    /// `walk.dat` becomes `walk.npy`, where it lies.
+    fn name_for(self, input: &Path, below: &Path) -> PathBuf {
+        let below = if input::is_standard(input) {
+            Path::new("stdin")
         } else {
-            input.file_stem()
+            below
         };
-        let mut name = stem.unwrap_or_default().to_owned();
-        name.push(match self {
-            Self::Npy => ".npy",
-            Self::Csv => ".csv",
-        });
-        name.into()
+        below.with_extension(match self {
+            Self::Npy => "npy",
+            Self::Csv => "csv",
+        })
     }
 
     /// The least that a rotation takes.
@@ -193,12 +246,17 @@ impl Target {
         room::on_disk(name, (tracks, samples), bytes, folder)
     }
 
-    /// Writes what `write` has to say; see [`Place::write`].
-    pub(crate) fn write(
+    /// How the manifest calls it.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Writes what `write` has to say; see [`Place::prepare`].
+    pub(crate) fn prepare(
         &self,
         write: impl FnOnce(&mut Stream) -> io::Result<()>,
-    ) -> Result<(), Failure> {
-        self.place.write(None, write)
+    ) -> Result<Written, Failure> {
+        self.place.prepare(None, write)
     }
 
     /// Writes one result, chunk by chunk, while `evaluate` makes the next.
@@ -206,7 +264,7 @@ impl Target {
         &self,
         result: &ResultShape<'_>,
         evaluate: impl FnOnce(&mut Sink<'_>) -> Result<(), Ended>,
-    ) -> Result<(), Failure> {
+    ) -> Result<Written, Failure> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
         let (progress, measure): (_, fn(&[u8]) -> u64) = match self.format {
             Format::Csv => (Progress::new("writing", samples as u64 + 1), lines),
@@ -216,7 +274,7 @@ impl Target {
             }
         };
         let mut unevaluated = None;
-        let written = self.place.write(Some((progress, measure)), |out| {
+        let written = self.place.prepare(Some((progress, measure)), |out| {
             let mut writer = ResultWriter::Waiting(out);
             let evaluated = evaluate(&mut |chunk| {
                 let taken = writer.write(self.format, result, chunk.rotations);

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use tumble::formats::output::{Output, check_target};
 
+use super::digest::Digest;
 use super::exit::{BROKEN_PIPE, Failure, OUTPUT};
 use super::input;
 use super::signals::{self, Writing};
-use super::stream::{Measured, Stream};
+use super::stream::{Ended, Measured, Stream};
 
 /// Where one file goes.
 #[derive(Debug)]
@@ -18,6 +19,24 @@ pub(crate) struct Place {
     overwrite: bool,
     /// Files that it must not be.
     inputs: Vec<PathBuf>,
+    /// Its bytes are hashed as they are written.
+    hashed: bool,
+}
+
+/// A file that is whole, and has not got its name yet. Dropped before
+/// [`Written::commit`], it leaves nothing behind.
+pub(crate) struct Written {
+    output: Output,
+    pub(crate) digest: Option<Digest>,
+    _writing: Option<Writing>,
+}
+
+impl Written {
+    pub(crate) fn commit(self) -> Result<(), Failure> {
+        self.output
+            .commit()
+            .map_err(|error| Failure::output(&error))
+    }
 }
 
 impl Place {
@@ -30,7 +49,16 @@ impl Place {
             path: path.to_owned(),
             overwrite,
             inputs: inputs.to_vec(),
+            hashed: false,
         })
+    }
+
+    /// The same place, its bytes hashed on their way.
+    pub(crate) fn hashed(self) -> Self {
+        Self {
+            hashed: true,
+            ..self
+        }
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -58,17 +86,35 @@ impl Place {
         progress: Option<Measured>,
         write: impl FnOnce(&mut Stream) -> io::Result<()>,
     ) -> Result<(), Failure> {
+        self.prepare(progress, write)?.commit()
+    }
+
+    /// As [`Place::write`], up to where the file gets its name.
+    pub(crate) fn prepare(
+        &self,
+        progress: Option<Measured>,
+        write: impl FnOnce(&mut Stream) -> io::Result<()>,
+    ) -> Result<Written, Failure> {
         // Standard output has nothing to clean up: a signal may end it at once.
-        let _writing = (!self.is_standard()).then(Writing::begin);
-        let mut stream = Stream::new(self.open()?, progress);
+        let writing = (!self.is_standard()).then(Writing::begin);
+        let digest = self.hashed.then(Digest::default);
+        let mut stream = Stream::new(self.open()?, progress, digest);
         // What a buffer still holds can fail too.
         let result = write(&mut stream).and_then(|()| stream.flush());
-        let (output, broken_pipe) = stream.into_output();
+        let Ended {
+            output,
+            digest,
+            broken_pipe,
+        } = stream.end();
         if let Some(stopped) = signals::stopped() {
             return Err(stopped);
         }
         match result {
-            Ok(()) => output.commit().map_err(|error| Failure::output(&error)),
+            Ok(()) => Ok(Written {
+                output,
+                digest,
+                _writing: writing,
+            }),
             Err(_) if broken_pipe => Err(Failure::quiet(BROKEN_PIPE)),
             Err(error) => Err(Failure::writing(&self.to_string(), &error)),
         }

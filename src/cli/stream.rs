@@ -1,10 +1,11 @@
-//! The stream into an output: it stops after a signal, moves the progress bar, and
-//! remembers whether the reader went away.
+//! The stream into an output: it stops after a signal, moves the progress bar, hashes
+//! what passes where that is asked for, and remembers whether the reader went away.
 
 use std::io::{self, Write};
 
 use tumble::formats::output::Output;
 
+use super::digest::Digest;
 use super::progress::Progress;
 use super::signals;
 
@@ -14,22 +15,35 @@ pub(crate) type Measured = (Progress, fn(&[u8]) -> u64);
 pub(crate) struct Stream {
     output: Output,
     progress: Option<Measured>,
+    digest: Option<Digest>,
     /// Kept here because writers wrap the error in one of their own kind.
     broken_pipe: bool,
 }
 
+/// What a stream leaves behind.
+pub(crate) struct Ended {
+    pub(crate) output: Output,
+    pub(crate) digest: Option<Digest>,
+    /// Its reader went away.
+    pub(crate) broken_pipe: bool,
+}
+
 impl Stream {
-    pub(crate) fn new(output: Output, progress: Option<Measured>) -> Self {
+    pub(crate) fn new(output: Output, progress: Option<Measured>, digest: Option<Digest>) -> Self {
         Self {
             output,
             progress,
+            digest,
             broken_pipe: false,
         }
     }
 
-    /// The output, and whether its reader went away.
-    pub(crate) fn into_output(self) -> (Output, bool) {
-        (self.output, self.broken_pipe)
+    pub(crate) fn end(self) -> Ended {
+        Ended {
+            output: self.output,
+            digest: self.digest,
+            broken_pipe: self.broken_pipe,
+        }
     }
 
     fn watch<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
@@ -48,6 +62,9 @@ impl Write for Stream {
         }
         let result = self.output.write(bytes);
         let written = self.watch(result)?;
+        if let Some(digest) = &mut self.digest {
+            digest.update(&bytes[..written]);
+        }
         if let Some((progress, measure)) = &mut self.progress {
             progress.advance(measure(&bytes[..written]));
         }

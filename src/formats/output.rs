@@ -79,6 +79,25 @@ enum Sink {
 
 const BUFFER: usize = 1 << 18;
 
+/// Names of temporary files begin and end so.
+const PREFIX: &str = ".tumble-";
+const SUFFIX: &str = ".part";
+
+/// Removes the temporary files in a directory whose writers were killed; those that are
+/// being written are locked, and stay.
+pub fn remove_abandoned(directory: &Path) {
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(PREFIX)
+            && name.ends_with(SUFFIX)
+            && fs::File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path()); // the next run tries again
+        }
+    }
+}
+
 impl Output {
     /// Opens a temporary file beside `path`, after every check that can be made
     /// before any work; `-` is standard output.
@@ -94,7 +113,7 @@ impl Output {
         check_target(&path, overwrite, inputs)?;
         let parent = parent(&path);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".tumble-").suffix(".part");
+        builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
         {
             // As `File::create` does: readable by all, less the umask.
@@ -107,6 +126,9 @@ impl Output {
                 path: path.clone(),
                 source,
             })?;
+        // Who holds the lock is still writing; see `remove_abandoned`. A file system
+        // without locks has no such files removed.
+        let _ = temporary.as_file().try_lock();
         let temporary = BufWriter::with_capacity(BUFFER, temporary);
         Ok(Self {
             path,
@@ -254,6 +276,21 @@ mod tests {
         output.commit().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"whole");
         assert_eq!(names(directory.path()), ["out"]);
+    }
+
+    #[test]
+    fn what_a_killed_writer_left_is_removed_and_no_more() {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join(".tumble-x1y2z3.part"), "half").unwrap();
+        fs::write(directory.path().join(".tumble-notes"), "mine").unwrap();
+        let output = Output::create(&directory.path().join("out"), false, &[]).unwrap();
+        remove_abandoned(directory.path());
+        let mut left = names(directory.path());
+        left.sort();
+        let own = output.temporary_path().unwrap().file_name().unwrap();
+        assert_eq!(left.len(), 2);
+        assert!(left.contains(&".tumble-notes".to_owned()));
+        assert!(left.contains(&own.to_str().unwrap().to_owned()));
     }
 
     #[test]

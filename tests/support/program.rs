@@ -30,7 +30,9 @@ pub(crate) fn sample_folder() -> tempfile::TempDir {
     }
     let place = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).unwrap();
-    std::fs::create_dir(place.path().join("folder")).unwrap();
+    for folder in ["folder", "empty"] {
+        std::fs::create_dir(place.path().join(folder)).unwrap();
+    }
     for name in ["a.dat", "b.dat", "folder/a.dat"] {
         write(name, &text);
     }

@@ -1,0 +1,230 @@
+//! Batches: many inputs, failures among them, kills, and the manifest that proves what
+//! is there.
+
+#[path = "support/program.rs"]
+mod program;
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use program::{command, finish, run, sample_folder, succeed};
+use support::Random;
+
+/// Every file below a directory, by its way there.
+fn tree(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut pending = vec![directory.to_owned()];
+    while let Some(next) = pending.pop() {
+        for entry in fs::read_dir(next).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                pending.push(path);
+            } else {
+                let name = path.strip_prefix(directory).unwrap();
+                found.insert(name.to_str().unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    tree(directory).into_keys().collect()
+}
+
+#[test]
+fn directories_patterns_and_lists_name_inputs() {
+    let place = sample_folder();
+    let at = place.path();
+    fs::create_dir_all(at.join("walks/deep")).unwrap();
+    for name in ["walks/a.dat", "walks/deep/a.dat", "walks/deep/b.DAT"] {
+        fs::copy(at.join("a.dat"), at.join(name)).unwrap();
+    }
+    fs::write(at.join("walks/notes.txt"), "no keyframes").unwrap();
+    succeed(at, &["eval", "walks", "-o", "tree"]);
+    let expected = ["a.npy", "deep/a.npy", "deep/b.npy", "manifest.jsonl"];
+    assert_eq!(names(&at.join("tree")), expected);
+
+    succeed(at, &["eval", "walks/*/*.[dD]*", "-o", "matched"]);
+    assert_eq!(
+        names(&at.join("matched")),
+        ["a.npy", "b.npy", "manifest.jsonl"]
+    );
+
+    fs::write(at.join("list"), "# two of them\n\nb.dat\nwalks/a.dat\n").unwrap();
+    succeed(at, &["eval", "--files-from", "list", "-o", "listed"]);
+    assert_eq!(
+        names(&at.join("listed")),
+        ["a.npy", "b.npy", "manifest.jsonl"]
+    );
+    let mut child = command(at, &["info", "--files-from", "-", "a.dat"])
+        .stdin(fs::File::open(at.join("list")).unwrap())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    assert!(child.wait().unwrap().success());
+    let told = child.wait_with_output().unwrap().stdout;
+    let told = String::from_utf8(told).unwrap();
+    assert_eq!(told.matches("walks/a.dat").count(), 1, "{told}");
+
+    // One file of a list goes into one file.
+    fs::write(at.join("one"), "b.dat\n").unwrap();
+    succeed(at, &["eval", "--files-from", "one", "-o", "one.npy"]);
+}
+
+#[test]
+fn a_batch_goes_on_after_a_failure_and_can_be_checked() {
+    let place = sample_folder();
+    let at = place.path();
+    let batch = ["eval", "a.dat", "bad.dat", "b.dat", "-o", "out"];
+    let first = run(at, &batch);
+    assert_eq!(first.code, 3, "{}", first.words);
+    assert!(first.words.contains("1 of 3 inputs failed"));
+    let whole = tree(&at.join("out"));
+    assert_eq!(
+        whole.keys().collect::<Vec<_>>(),
+        ["a.npy", "b.npy", "manifest.jsonl"]
+    );
+    succeed(at, &["check", "out"]);
+
+    // Again: refused, or skipped, or done again.
+    let again = run(at, &batch);
+    assert_eq!(again.code, 2);
+    assert!(
+        again.words.contains("--resume skips what is done"),
+        "{}",
+        again.words
+    );
+    let resumed = run(at, &[&batch[..], &["--resume"]].concat());
+    assert_eq!(resumed.code, 3, "{}", resumed.words);
+    assert!(
+        resumed.words.contains("2 results skipped"),
+        "{}",
+        resumed.words
+    );
+    assert_eq!(tree(&at.join("out")), whole);
+    let slerp = run(at, &[&batch[..], &["--resume", "-m", "slerp"]].concat());
+    assert!(!slerp.words.contains("skipped"), "{}", slerp.words);
+    assert_ne!(tree(&at.join("out"))["a.npy"], whole["a.npy"]);
+    run(at, &[&batch[..], &["--overwrite"]].concat());
+    assert_eq!(tree(&at.join("out")), whole);
+}
+
+#[test]
+fn one_flipped_bit_is_found_and_made_good() {
+    let place = sample_folder();
+    let at = place.path();
+    let batch = ["eval", "a.dat", "b.dat", "-o", "out", "--device", "cpu"];
+    succeed(at, &batch);
+    let whole = tree(&at.join("out"));
+    let mut random = Random(1);
+    for _ in 0..20 {
+        let mut bytes = whole["b.npy"].clone();
+        let bit = random.next() as usize % (bytes.len() * 8);
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        fs::write(at.join("out/b.npy"), bytes).unwrap();
+        let check = run(at, &["check", "out/manifest.jsonl"]);
+        assert_eq!(check.code, 8, "bit {bit}: {}", check.words);
+        assert!(check.words.contains("b.npy: other bits"), "{}", check.words);
+        assert!(!check.words.contains("a.npy"), "{}", check.words);
+    }
+    fs::remove_file(at.join("out/a.npy")).unwrap();
+    let check = run(at, &["check", "out"]);
+    assert!(
+        check.words.contains("a.npy: cannot be read"),
+        "{}",
+        check.words
+    );
+    let resumed = succeed(at, &[&batch[..], &["--resume"]].concat());
+    assert!(!resumed.words.contains("skipped"), "{}", resumed.words);
+    assert_eq!(tree(&at.join("out")), whole);
+    succeed(at, &["check", "out"]);
+
+    let check = run(at, &["check", "a.dat"]);
+    assert_eq!(check.code, 4);
+    assert!(check.words.contains("is no manifest"), "{}", check.words);
+}
+
+/// A stranger's file is no result of ours, whatever `--resume` says.
+#[test]
+fn resuming_does_not_replace_what_no_manifest_names() {
+    let place = sample_folder();
+    let at = place.path();
+    fs::create_dir(at.join("out")).unwrap();
+    fs::write(at.join("out/b.npy"), "mine").unwrap();
+    let resumed = run(at, &["eval", "a.dat", "b.dat", "-o", "out", "--resume"]);
+    assert_eq!(resumed.code, 2, "{}", resumed.words);
+    assert_eq!(fs::read(at.join("out/b.npy")).unwrap(), b"mine");
+    let single = run(at, &["eval", "a.dat", "-o", "o.npy", "--resume"]);
+    assert_eq!(single.code, 2, "{}", single.words);
+}
+
+/// Kills at random moments, each resumed: whatever lies under its name is whole at any
+/// time, and what it all comes to is what an undisturbed run gives, byte for byte.
+#[cfg(unix)]
+#[test]
+fn five_hundred_kills_lose_nothing() {
+    let place = sample_folder();
+    let at = place.path();
+    fs::create_dir(at.join("walks")).unwrap();
+    for i in 0..12 {
+        fs::copy(at.join("a.dat"), at.join(format!("walks/{i:02}.dat"))).unwrap();
+    }
+    let batch = |out, more: &[&'static str]| {
+        let line = ["eval", "walks", "--device", "cpu", "--fps", "3000", "-o"];
+        [&line[..], &[out], more].concat()
+    };
+    succeed(at, &batch("undisturbed", &[]));
+    let whole = tree(&at.join("undisturbed"));
+    let other = [&batch("other", &[])[..], &["-m", "slerp"]].concat();
+    succeed(at, &other);
+    let other = tree(&at.join("other"));
+
+    let out = at.join("out");
+    let mut random = Random(7);
+    let (mut kills, mut finished, mut interrupted) = (0, 0, 0);
+    while kills < 500 {
+        // Now into an empty directory, now over other results.
+        let replacing = finished % 2 == 1;
+        let mode: &[&str] = if replacing && interrupted == 0 {
+            &["--overwrite"]
+        } else {
+            &["--resume"]
+        };
+        let mut child = command(at, &batch("out", mode))
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_micros(random.next() % 60_000));
+        let ended = child.try_wait().unwrap();
+        child.kill().unwrap();
+        let status = child.wait().unwrap();
+        kills += 1;
+        for (name, bytes) in tree(&out) {
+            let is_result = name.ends_with(".npy");
+            let known = whole.get(&name) == Some(&bytes) || other.get(&name) == Some(&bytes);
+            assert!(!is_result || known, "{name} is not whole");
+        }
+        if ended.is_none() {
+            interrupted += 1;
+            continue;
+        }
+        assert!(status.success());
+        assert_eq!(tree(&out), whole, "after {interrupted} kills");
+        succeed(at, &["check", "out"]);
+        (finished, interrupted) = (finished + 1, 0);
+        fs::remove_dir_all(&out).unwrap();
+        if finished % 2 == 1 {
+            let line = [&batch("out", &[])[..], &["-m", "slerp"]].concat();
+            succeed(at, &line);
+        }
+    }
+    let last = finish(command(at, &batch("out", &["--resume"])).output().unwrap());
+    assert_eq!(last.code, 0, "{}", last.words);
+    assert_eq!(tree(&out), whole);
+    assert!(finished > 10, "only {finished} runs came to their end");
+}
