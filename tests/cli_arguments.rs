@@ -47,7 +47,8 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o folder                         | is a directory
 7 | eval a.dat -o none/o.npy                     | none does not exist
 4 | eval none.dat -o o.npy                       | none.dat: error[E001]
-4 | eval folder -o o.npy                         | is a directory
+4 | eval empty -o o.npy                         | is a directory
+0 | eval folder -o out                           | a.npy
 4 | eval bad.dat -o o.npy                        | bad.dat:2:8: error[E020]
 4 | eval a.dat -o o.npy --max-size 20B           | --max-size
 2 | eval a.dat b.dat -o -                        | -o DIRECTORY
