@@ -1,13 +1,15 @@
 //! A clip: a set prepared for one method, on a device, ready for any frames.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use glam::Quat;
 
 use crate::clock::{Frames, FramesError, Timeline};
 use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
-use crate::gpu::{ClipBuffers, Job};
+use crate::gpu::{ClipBuffers, Job, VulkanEngine, VulkanError};
 use crate::method::Quantity;
-use crate::prepare::ClipData;
+use crate::prepare::{ClipData, Prepared};
 use crate::rotations::{Layout, Rotations, Storage};
 use crate::window::Window;
 
@@ -16,11 +18,18 @@ use crate::window::Window;
 pub struct Clip {
     pub(crate) engine: Engine,
     pub(crate) data: ClipData,
-    /// On a Vulkan device.
-    pub(crate) buffers: Option<ClipBuffers>,
+    /// On a Vulkan device; brought there again when it was lost.
+    pub(crate) buffers: Mutex<Option<Arc<ClipBuffers>>>,
 }
 
 impl Clip {
+    /// What the next clip can use again: its segments, and their buffers on a device.
+    pub(crate) fn into_spare(self) -> (Vec<Prepared>, Option<ClipBuffers>) {
+        let buffers = self.buffers.into_inner();
+        let buffers = buffers.unwrap_or_else(PoisonError::into_inner);
+        (self.data.groups, buffers.and_then(Arc::into_inner))
+    }
+
     /// The engine that it was uploaded to.
     pub fn engine(&self) -> &Engine {
         &self.engine
@@ -54,14 +63,15 @@ impl Clip {
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
         let timeline = self.timeline(frames)?;
         let (tracks, samples) = (self.data.track_count(), timeline.len());
-        let storage: Box<dyn Storage> = match (&*self.engine.backend, &self.buffers) {
-            (Backend::Vulkan(opened), Some(buffers)) => {
+        let storage: Box<dyn Storage> = match &*self.engine.backend {
+            Backend::Vulkan(opened) => {
                 let timeline = self.data.folded(&timeline);
-                opened
-                    .engine
-                    .evaluate(&self.data, buffers, &timeline, layout)?
+                opened.attempt_smaller(|engine| {
+                    let buffers = self.buffers_on(engine)?;
+                    engine.evaluate(&self.data, &buffers, &timeline, layout)
+                })?
             }
-            _ => {
+            Backend::Cpu(_) => {
                 let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
                 self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
                 Box::new(quats)
@@ -110,9 +120,9 @@ impl Clip {
         window: &Window,
         output: &mut [Quat],
     ) -> Result<(), Error> {
-        match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
-            (Backend::Vulkan(_), _) => {
+        match &*self.engine.backend {
+            Backend::Cpu(engine) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
+            Backend::Vulkan(_) => {
                 let bytes = bytemuck::cast_slice_mut(output);
                 self.evaluate_bytes_into(timeline, window, Encoding::F32, bytes)
             }
@@ -127,21 +137,39 @@ impl Clip {
         output: &mut [u8],
     ) -> Result<(), Error> {
         self.check_encoding(encoding)?;
-        match (&*self.engine.backend, &self.buffers) {
-            (Backend::Cpu(engine), _) => {
+        match &*self.engine.backend {
+            Backend::Cpu(engine) => {
                 Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
             }
-            (Backend::Vulkan(opened), Some(buffers)) => {
-                let job = Job {
-                    clip: &self.data,
-                    buffers,
-                    timeline,
-                    encoding,
-                };
-                Ok(opened.engine.evaluate_into(job, window, output)?)
+            Backend::Vulkan(opened) => {
+                let done = opened.attempt_smaller(|engine| {
+                    let buffers = self.buffers_on(engine)?;
+                    let job = Job {
+                        clip: &self.data,
+                        buffers: &buffers,
+                        timeline,
+                        encoding,
+                    };
+                    engine.evaluate_into(job, window, output)
+                });
+                Ok(done?)
             }
-            (Backend::Vulkan(_), None) => unreachable!("uploaded to this engine"),
         }
+    }
+
+    /// The segments on a device; brought there where it is not the one that had them.
+    pub(crate) fn buffers_on(
+        &self,
+        engine: &VulkanEngine,
+    ) -> Result<Arc<ClipBuffers>, VulkanError> {
+        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
+            return Ok(Arc::clone(there));
+        }
+        *buffers = None;
+        let there = Arc::new(engine.upload(&self.data, None)?);
+        *buffers = Some(Arc::clone(&there));
+        Ok(there)
     }
 
     pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {

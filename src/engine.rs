@@ -1,6 +1,6 @@
 //! The engine: sets go in, clips stay on its device, rotations come out.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use glam::Quat;
 
@@ -10,7 +10,7 @@ use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
 use crate::cycle::Sides;
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::encoding::Encoding;
-use crate::gpu::{CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, VulkanEngine, VulkanError};
+use crate::gpu::{CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, Opened, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
 use crate::prepare::{ClipData, Wanted};
 use crate::rotations::{Layout, Rotations};
@@ -102,13 +102,6 @@ pub struct Engine {
     pub(crate) backend: Arc<Backend>,
 }
 
-/// An open Vulkan device, and what is known of it.
-pub(crate) struct Opened {
-    pub(crate) engine: VulkanEngine,
-    canaries: Vec<CanaryReport>,
-    info: DeviceInfo,
-}
-
 pub(crate) enum Backend {
     Cpu(CpuEngine),
     Vulkan(Box<Opened>),
@@ -154,36 +147,15 @@ impl Engine {
                 })
             }
             Device::Vulkan(VulkanDevice { physical }) => {
-                let info = physical.info.clone();
-                Self::trusted(VulkanEngine::new(*physical, options)?, info, options)
+                Ok(Self::with_opened(Opened::new(&physical, options)?))
             }
         }
     }
 
-    /// Runs the canaries; refuses a device that fails one, unless told otherwise.
-    pub(crate) fn trusted(
-        engine: VulkanEngine,
-        info: DeviceInfo,
-        options: &EngineOptions,
-    ) -> Result<Self, Error> {
-        let canaries = engine.canaries()?;
-        let failed = canaries.iter().find(|canary| canary.differing > 0);
-        if let (Some(canary), false) = (failed, options.allow_inexact) {
-            return Err(Error::Vulkan(VulkanError::Inexact {
-                device: info.name,
-                canary: canary.name,
-                differing: canary.differing,
-                total: canary.total,
-            }));
+    pub(crate) fn with_opened(opened: Opened) -> Self {
+        Self {
+            backend: Arc::new(Backend::Vulkan(Box::new(opened))),
         }
-        let backend = Backend::Vulkan(Box::new(Opened {
-            engine,
-            canaries,
-            info,
-        }));
-        Ok(Self {
-            backend: Arc::new(backend),
-        })
     }
 
     /// The name of its device: the driver's, or `CPU`.
@@ -212,7 +184,7 @@ impl Engine {
     pub fn validation_messages(&self) -> Vec<String> {
         match &*self.backend {
             Backend::Cpu(_) => Vec::new(),
-            Backend::Vulkan(opened) => opened.engine.validation_messages(),
+            Backend::Vulkan(opened) => opened.engine().validation_messages(),
         }
     }
 
@@ -221,7 +193,7 @@ impl Engine {
     pub fn take_timings(&self) -> Timings {
         match &*self.backend {
             Backend::Cpu(_) => Timings::default(),
-            Backend::Vulkan(opened) => opened.engine.take_timings(),
+            Backend::Vulkan(opened) => opened.engine().take_timings(),
         }
     }
 
@@ -249,16 +221,17 @@ impl Engine {
         let (data, buffers) = match &*self.backend {
             Backend::Cpu(_) => (ClipData::new(set, interpolation, wanted)?, None),
             Backend::Vulkan(opened) => {
-                wanted.group_bytes = Some(opened.engine.group_bytes());
+                wanted.group_bytes = Some(opened.engine().group_bytes());
                 let data = ClipData::new(set, interpolation, wanted)?;
-                let buffers = opened.engine.upload(&data, spare)?;
-                (data, Some(buffers))
+                let mut spare = spare;
+                let buffers = opened.attempt(|engine| engine.upload(&data, spare.take()))?;
+                (data, Some(Arc::new(buffers)))
             }
         };
         Ok(Clip {
             engine: self.clone(),
             data,
-            buffers,
+            buffers: Mutex::new(buffers),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Sets piece by piece: where a device has not the memory for all segments at once, or
 //! where that would cost more than making them.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 use glam::Quat;
@@ -45,51 +46,49 @@ impl Engine {
                 engine.sampled_track(set, track, &interpolation, timeline, row)
             });
         }
-        let pieces = self.pieces(set, tracks.clone(), &interpolation, timeline);
-        let several = pieces.len() > 1;
+        let mut pieces = VecDeque::from(self.pieces(set, tracks.clone(), &interpolation, timeline));
         // What one piece needed, the next one uses again: fresh memory costs more than
         // what is done with it.
         let mut used: Option<Clip> = None;
-        let mut evaluate = |piece: Range<usize>, output: &mut [Quat]| {
-            let timeline = timeline.of_tracks(piece.clone());
-            let (spare, buffers) = match used.take() {
-                Some(clip) => (clip.data.groups, clip.buffers),
-                None => (Vec::new(), None),
-            };
-            let first = piece.start;
+        let mut columns: Vec<Quat> = Vec::new();
+        while let Some(piece) = pieces.pop_front() {
+            let of_piece = timeline.of_tracks(piece.clone());
+            let (spare, buffers) = used.take().map_or_else(Default::default, Clip::into_spare);
             let wanted = Wanted {
-                tracks: piece,
-                few_groups: several,
-                only_for: Some(&timeline),
+                tracks: piece.clone(),
+                few_groups: piece != tracks,
+                only_for: Some(&of_piece),
                 spare,
                 ..Wanted::all(set, None)
             };
-            let clip = self.upload_wanted(set, interpolation, wanted, buffers)?;
-            clip.evaluate_timeline_into(&timeline, layout, output)
-                .map_err(|error| error.of_tracks_from(first))?;
-            used = Some(clip);
-            Ok::<(), Error>(())
-        };
-        if let [all] = &*pieces {
-            return evaluate(all.clone(), output);
-        }
-        for piece in pieces {
-            let own = piece.start - tracks.start..piece.end - tracks.start;
-            match layout {
-                Layout::TrackMajor => {
-                    evaluate(piece, &mut output[own.start * samples..own.end * samples])?;
+            let clip = match self.upload_wanted(set, interpolation, wanted, buffers) {
+                Err(Error::Vulkan(error)) if error.is_out_of_memory() && piece.len() > 1 => {
+                    let middle = piece.start + piece.len() / 2;
+                    pieces.push_front(middle..piece.end);
+                    pieces.push_front(piece.start..middle);
+                    continue;
                 }
-                Layout::FrameMajor => {
-                    let mut columns: Vec<Quat> = bytemuck::zeroed_vec(own.len() * samples);
-                    evaluate(piece, &mut columns)?;
-                    let frames = output
-                        .chunks_mut(tracks.len())
-                        .zip(columns.chunks(own.len()));
-                    for (frame, part) in frames {
-                        frame[own.clone()].copy_from_slice(part);
-                    }
+                clip => clip?,
+            };
+            let own = piece.start - tracks.start..piece.end - tracks.start;
+            let is_contiguous = layout == Layout::TrackMajor || piece == tracks;
+            let place = if is_contiguous {
+                &mut output[own.start * samples..own.end * samples]
+            } else {
+                columns.resize(own.len() * samples, Quat::IDENTITY);
+                &mut columns
+            };
+            clip.evaluate_timeline_into(&of_piece, layout, place)
+                .map_err(|error| error.of_tracks_from(piece.start))?;
+            if !is_contiguous {
+                let frames = output
+                    .chunks_mut(tracks.len())
+                    .zip(columns.chunks(own.len()));
+                for (frame, part) in frames {
+                    frame[own.clone()].copy_from_slice(part);
                 }
             }
+            used = Some(clip);
         }
         Ok(())
     }
@@ -109,7 +108,7 @@ impl Engine {
         let is_dense = (set.key_count() * key_bytes) / 4 > result;
         let limit = match &*self.backend {
             Backend::Vulkan(opened) => {
-                let budget = opened.engine.clip_bytes().unwrap_or(usize::MAX);
+                let budget = opened.engine().clip_bytes().unwrap_or(usize::MAX);
                 if is_dense {
                     budget.min(DENSE_PIECE)
                 } else {

@@ -5,7 +5,7 @@ use glam::{Quat, Vec3};
 
 use crate::cpu;
 use crate::engine::{Backend, Engine, Error};
-use crate::gpu::PoseKernel;
+use crate::gpu::{PoseKernel, VulkanEngine};
 use crate::rotations::{Layout, Rotations};
 use crate::segment::Pass;
 use crate::skeleton::Skeleton;
@@ -26,26 +26,27 @@ impl Engine {
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
         finite(&weights)?;
-        let limit = self.pass_limit() / layers.len();
-        let mut blended = empty(first);
-        let mut gathered: Vec<Quat> = Vec::new();
-        for (start, output) in chunks(&mut blended, limit) {
-            gathered.clear();
-            for &(layer, _) in layers {
-                gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
+        self.on_device(|device| {
+            let mut blended = empty(first);
+            let mut gathered: Vec<Quat> = Vec::new();
+            for (start, output) in chunks(&mut blended, limit(device) / layers.len()) {
+                gathered.clear();
+                for &(layer, _) in layers {
+                    gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
+                }
+                let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
+                match device {
+                    None => cpu::blend(values, &weights, output),
+                    Some(device) => device.pass(
+                        PoseKernel::Blend,
+                        [bytes(values), bytes(&weights), &[]],
+                        pass(output.len(), layers.len()),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
             }
-            let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
-            match &*self.backend {
-                Backend::Cpu(_) => cpu::blend(values, &weights, output),
-                Backend::Vulkan(opened) => opened.engine.pass(
-                    PoseKernel::Blend,
-                    [bytes(values), bytes(&weights), &[]],
-                    pass(output.len(), layers.len()),
-                    bytemuck::cast_slice_mut(output),
-                )?,
-            }
-        }
-        Ok(like(first, blended))
+            Ok(like(first, blended))
+        })
     }
 
     /// Every rotation of one result towards that of another, by slerp, the shorter way:
@@ -56,20 +57,22 @@ impl Engine {
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to)?;
         part(weight)?;
-        let mut mixed = empty(from);
-        for (start, output) in chunks(&mut mixed, self.pass_limit()) {
-            let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
-            match &*self.backend {
-                Backend::Cpu(_) => cpu::mix(a, b, weight, output),
-                Backend::Vulkan(opened) => opened.engine.pass(
-                    PoseKernel::Mix,
-                    [bytes(a), bytes(b), bytes(&[weight])],
-                    pass(output.len(), 0),
-                    bytemuck::cast_slice_mut(output),
-                )?,
+        self.on_device(|device| {
+            let mut mixed = empty(from);
+            for (start, output) in chunks(&mut mixed, limit(device)) {
+                let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
+                match device {
+                    None => cpu::mix(a, b, weight, output),
+                    Some(device) => device.pass(
+                        PoseKernel::Mix,
+                        [bytes(a), bytes(b), bytes(&[weight])],
+                        pass(output.len(), 0),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
             }
-        }
-        Ok(like(from, mixed))
+            Ok(like(from, mixed))
+        })
     }
 
     /// An additive layer: what each of its rotations turns from its track's reference, or
@@ -92,32 +95,34 @@ impl Engine {
                 "give one reference rotation for each track of the layer",
             ));
         }
-        let mut added = empty(base);
-        let mut own: Vec<[f32; 4]> = Vec::new();
-        for (start, output) in chunks(&mut added, self.pass_limit()) {
-            let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
-            own.clear();
-            own.extend((start..start + output.len()).map(|place| {
-                let track = match base.layout() {
-                    Layout::TrackMajor => place / base.samples(),
-                    Layout::FrameMajor => place % base.tracks(),
-                };
-                reference[track].to_array()
-            }));
-            match &*self.backend {
-                Backend::Cpu(_) => cpu::add(a, b, &own, weight, output),
-                Backend::Vulkan(opened) => {
-                    own.push([weight, 0.0, 0.0, 0.0]);
-                    opened.engine.pass(
-                        PoseKernel::Add,
-                        [bytes(a), bytes(b), bytes(&own)],
-                        pass(output.len(), 0),
-                        bytemuck::cast_slice_mut(output),
-                    )?;
+        self.on_device(|device| {
+            let mut added = empty(base);
+            let mut own: Vec<[f32; 4]> = Vec::new();
+            for (start, output) in chunks(&mut added, limit(device)) {
+                let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
+                own.clear();
+                own.extend((start..start + output.len()).map(|place| {
+                    let track = match base.layout() {
+                        Layout::TrackMajor => place / base.samples(),
+                        Layout::FrameMajor => place % base.tracks(),
+                    };
+                    reference[track].to_array()
+                }));
+                match device {
+                    None => cpu::add(a, b, &own, weight, output),
+                    Some(device) => {
+                        own.push([weight, 0.0, 0.0, 0.0]);
+                        device.pass(
+                            PoseKernel::Add,
+                            [bytes(a), bytes(b), bytes(&own)],
+                            pass(output.len(), 0),
+                            bytemuck::cast_slice_mut(output),
+                        )?;
+                    }
                 }
             }
-        }
-        Ok(like(base, added))
+            Ok(like(base, added))
+        })
     }
 
     /// Rotations in their parents' frames to rotations and positions in the world's.
@@ -147,41 +152,52 @@ impl Engine {
             ));
         }
         let links = skeleton.links();
-        let mut values = vec![[0.0; 4]; 2 * tracks * samples];
-        let frames = (self.pass_limit() / (2 * tracks).max(1)).max(1);
-        let mut frame_major: Vec<[f32; 4]> = Vec::new();
-        let windows = values.chunks_mut((2 * tracks * frames).max(1));
-        for (first, output) in (0..).step_by(frames).zip(windows) {
-            let count = output.len() / (2 * tracks);
-            frame_major.clear();
-            for frame in first..first + count {
-                let own =
-                    (0..tracks).map(|track| local.layout().index(track, frame, tracks, samples));
-                frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
+        self.on_device(|device| {
+            let mut values = vec![[0.0; 4]; 2 * tracks * samples];
+            let frames = (limit(device) / (2 * tracks).max(1)).max(1);
+            let mut frame_major: Vec<[f32; 4]> = Vec::new();
+            let windows = values.chunks_mut((2 * tracks * frames).max(1));
+            for (first, output) in (0..).step_by(frames).zip(windows) {
+                let count = output.len() / (2 * tracks);
+                frame_major.clear();
+                for frame in first..first + count {
+                    let own = (0..tracks)
+                        .map(|track| local.layout().index(track, frame, tracks, samples));
+                    frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
+                }
+                match device {
+                    None => cpu::world(&frame_major, &links, output),
+                    Some(device) => device.pass(
+                        PoseKernel::World,
+                        [bytes(&frame_major), bytes(&links), &[]],
+                        pass(count, tracks),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
             }
-            match &*self.backend {
-                Backend::Cpu(_) => cpu::world(&frame_major, &links, output),
-                Backend::Vulkan(opened) => opened.engine.pass(
-                    PoseKernel::World,
-                    [bytes(&frame_major), bytes(&links), &[]],
-                    pass(count, tracks),
-                    bytemuck::cast_slice_mut(output),
-                )?,
-            }
-        }
-        Ok(WorldPoses {
-            values,
-            tracks,
-            samples,
+            Ok(WorldPoses {
+                values,
+                tracks,
+                samples,
+            })
         })
     }
 
-    fn pass_limit(&self) -> usize {
+    /// Does some work on the engine's device; nothing is the CPU.
+    fn on_device<T>(
+        &self,
+        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         match &*self.backend {
-            Backend::Cpu(_) => usize::MAX,
-            Backend::Vulkan(opened) => opened.engine.pass_limit(),
+            Backend::Cpu(_) => work(None),
+            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| work(Some(engine))),
         }
     }
+}
+
+/// How many values of 16 bytes one pass takes.
+fn limit(device: Option<&VulkanEngine>) -> usize {
+    device.map_or(usize::MAX, VulkanEngine::pass_limit)
 }
 
 /// Rotations and positions in the world, `[frame][track]`.

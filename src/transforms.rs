@@ -1,5 +1,7 @@
 //! Rotations with the translations and the scales beside them.
 
+use std::sync::{Arc, Mutex};
+
 use glam::{Vec3, Vec4};
 
 use crate::clip::Clip;
@@ -90,17 +92,19 @@ impl Engine {
     ) -> Result<Clip, Error> {
         let group_bytes = match &*self.backend {
             Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(opened.engine.group_bytes()),
+            Backend::Vulkan(opened) => Some(opened.engine().group_bytes()),
         };
         let data = ClipData::of_vectors(set, channel, method, interpolation, group_bytes);
         let buffers = match &*self.backend {
             Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(opened.engine.upload(&data, None)?),
+            Backend::Vulkan(opened) => Some(Arc::new(
+                opened.attempt(|engine| engine.upload(&data, None))?,
+            )),
         };
         Ok(Clip {
             engine: self.clone(),
             data,
-            buffers,
+            buffers: Mutex::new(buffers),
         })
     }
 }

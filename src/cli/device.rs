@@ -12,6 +12,7 @@ use tumble::{
 
 use super::exit::{DEVICE, Failure, NO_VULKAN};
 use super::output::{Ended, Sink};
+use super::probe;
 use super::words;
 
 /// Rotations evaluated at once: 16 MB.
@@ -73,7 +74,8 @@ impl DeviceArguments {
         match &self.device {
             Choice::Cpu => self.cpu("CPU".to_owned()),
             Choice::Auto => Ok(Opened {
-                by_cost: true,
+                // Opened in this process when a job is large enough.
+                by_cost: probe::drivers().is_ok(),
                 ..self.cpu("CPU".to_owned())?
             }),
             Choice::First => match self.first_exact() {
@@ -85,7 +87,7 @@ impl DeviceArguments {
             },
             Choice::Vulkan => self.first_exact().map(Opened::new).map_err(|e| refused(&e)),
             Choice::Named(name) => {
-                let devices = Device::list().map_err(|error| no_vulkan(&error))?;
+                let devices = probe::devices().map_err(|error| refused(&error.into()))?;
                 let device = named(name, &devices)?;
                 self.engine(device)
                     .map(Opened::new)
@@ -118,7 +120,7 @@ impl DeviceArguments {
     /// The first device that opens and is exact; else why the first one is not.
     fn first_exact(&self) -> Result<Engine, Error> {
         let mut reason = Error::Vulkan(VulkanError::NoDevice);
-        for (index, device) in Device::list()?.into_iter().enumerate() {
+        for (index, device) in probe::devices()?.into_iter().enumerate() {
             match self.engine(device) {
                 Ok(engine) => return Ok(engine),
                 Err(error) if index == 0 => reason = error,
@@ -182,10 +184,7 @@ impl Opened {
             });
         match result {
             Err(Ended::Evaluating(Error::Vulkan(error))) if self.automatic => {
-                words::warning(&format!("{}: {error}; going on with the CPU", self.label));
-                self.engine = Engine::new(Device::Cpu)?;
-                self.label = format!("CPU ({} failed)", self.label);
-                self.automatic = false;
+                self.fall_back(&error)?;
                 self.engine
                     .stream(set, interpolation, frames, layout, chunk, |chunk| {
                         if chunk.start < done {
@@ -197,6 +196,29 @@ impl Opened {
             }
             result => result,
         }
+    }
+
+    /// Does some work on the device. One that nobody named may fail: then the CPU does it.
+    pub(crate) fn work<T>(
+        &mut self,
+        mut work: impl FnMut(&Engine) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        match work(&self.engine) {
+            Err(Error::Vulkan(error)) if self.automatic => {
+                self.fall_back(&error)?;
+                work(&self.engine)
+            }
+            done => done,
+        }
+    }
+
+    /// From now on the CPU.
+    fn fall_back(&mut self, error: &VulkanError) -> Result<(), Error> {
+        words::warning(&format!("{}: {error}; going on with the CPU", self.label));
+        self.engine = Engine::new(Device::Cpu)?;
+        self.label = format!("CPU ({} failed)", self.label);
+        self.automatic = false;
+        Ok(())
     }
 
     /// As [`Opened::stream`], all of it.
@@ -296,8 +318,13 @@ pub(crate) fn refused(error: &Error) -> Failure {
 /// Whether there is no Vulkan, rather than one that fails.
 pub(crate) fn is_absence(error: &VulkanError) -> bool {
     match error {
-        VulkanError::NoLoader { .. } | VulkanError::NoDevice => true,
-        VulkanError::Call { call, .. } => *call == "vkCreateInstance",
+        VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::Driver { .. } => true,
+        // So say loaders that find no driver, or none that works.
+        VulkanError::Call { result, .. } => [
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER,
+            vk::Result::ERROR_INITIALIZATION_FAILED,
+        ]
+        .contains(result),
         _ => false,
     }
 }

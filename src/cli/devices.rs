@@ -7,7 +7,7 @@ use serde::Serialize;
 use tumble::{CanaryReport, Device, DeviceInfo, Engine, EngineOptions, VulkanError};
 
 use super::exit::Failure;
-use super::words;
+use super::{probe, words};
 
 /// List the Vulkan devices and whether they give the CPU's bits
 #[derive(Debug, Args)]
@@ -39,7 +39,7 @@ struct Entry {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let listing = Listing::new(Device::list());
+    let listing = Listing::new(probe::devices());
     if arguments.json {
         words::json(&listing)
     } else {

@@ -295,29 +295,31 @@ impl Arguments {
         let evaluated = device
             .choose(set.track_count() * timeline.len())
             .and_then(|()| {
-                let engine = &device.engine;
-                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
-                match kind {
-                    PoseKind::World => {
-                        let world = engine.world(&local, &skeleton)?;
-                        let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
-                            let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
-                            [px, py, pz, x, y, z, w]
-                        });
-                        Ok(numbers.collect::<Vec<f32>>())
+                device.work(|engine| {
+                    let local =
+                        engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+                    match kind {
+                        PoseKind::World => {
+                            let world = engine.world(&local, &skeleton)?;
+                            let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
+                                let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
+                                [px, py, pz, x, y, z, w]
+                            });
+                            Ok(numbers.collect::<Vec<f32>>())
+                        }
+                        PoseKind::Transform => {
+                            let hung = |place: usize| match place % set.track_count() {
+                                0 => 0.0,
+                                _ => -length as f32,
+                            };
+                            let quats = local.as_quats().iter().enumerate();
+                            let numbers = quats.flat_map(|(place, q)| {
+                                [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
+                            });
+                            Ok(numbers.collect())
+                        }
                     }
-                    PoseKind::Transform => {
-                        let hung = |place: usize| match place % set.track_count() {
-                            0 => 0.0,
-                            _ => -length as f32,
-                        };
-                        let quats = local.as_quats().iter().enumerate();
-                        let numbers = quats.flat_map(|(place, q)| {
-                            [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
-                        });
-                        Ok(numbers.collect())
-                    }
-                }
+                })
             });
         let numbers = evaluated.map_err(|error: Error| Failure::evaluating(name, &error))?;
         let components: &[&str] = match kind {

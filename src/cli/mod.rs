@@ -24,6 +24,7 @@ mod output;
 mod picture;
 mod place;
 mod plot;
+mod probe;
 mod progress;
 mod render;
 mod room;
@@ -90,6 +91,8 @@ pub(crate) enum Command {
     Check(check::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
+    #[command(hide = true)]
+    ProbeDrivers(probe::Arguments),
 }
 
 impl Command {
@@ -108,6 +111,7 @@ impl Command {
             Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),
+            Self::ProbeDrivers(arguments) => probe::run(&arguments),
         }
     }
 }

@@ -93,7 +93,25 @@ impl LogicalDevice {
 
     /// From now on nothing of this device is destroyed: it may still be in use.
     pub(super) fn mark_hung(&self) {
-        self.hung.store(true, Ordering::Relaxed);
+        if !self.hung.swap(true, Ordering::Relaxed) {
+            // The instance must outlive the device, which stays.
+            std::mem::forget(Arc::clone(&self.physical.instance));
+        }
+    }
+
+    /// Waits for everything; a device that cannot even do that is as good as hung.
+    pub(super) fn wait_until_idle(&self) {
+        let _queue = self.queue();
+        // SAFETY: the device is alive, and its queue is locked.
+        match unsafe { self.raw.device_wait_idle() } {
+            Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST) => {}
+            Err(_) => self.mark_hung(),
+        }
+    }
+
+    /// Whether it was opened here, and is ours to open again.
+    pub(super) fn is_owned(&self) -> bool {
+        self.owned
     }
 
     /// Whether objects may be destroyed.

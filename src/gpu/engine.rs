@@ -1,5 +1,6 @@
 //! Evaluation on a Vulkan device.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Quat;
@@ -20,9 +21,12 @@ use crate::rotations::{Layout, Storage};
 use crate::segment::Item;
 use crate::window::Window;
 
-/// Rotations of one window, unless limits or the budget say less: 32 MiB, which no
-/// device takes near 100 ms to fill.
+/// Rotations of one window, unless limits, the budget or the device's speed say less:
+/// 32 MiB.
 const WINDOW: u64 = 1 << 21;
+
+/// Windows are not made smaller than this, 1 MiB, for want of memory or speed.
+const SMALLEST_WINDOW: usize = 1 << 16;
 
 /// Windows in flight: the host fills one while the device works on another.
 pub(super) const SLOTS: usize = 2;
@@ -37,7 +41,7 @@ pub(crate) struct VulkanEngine {
     /// Results are written in place, or copied out of the device's own memory.
     pub(super) in_place: bool,
     /// Rotations of one window.
-    pub(super) window: usize,
+    window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
     group_bytes: u64,
     /// Bytes that the segments of one clip may take; no limit unless one was asked.
@@ -48,6 +52,7 @@ pub(crate) struct VulkanEngine {
 
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
+    device: Arc<LogicalDevice>,
     pub(super) groups: Vec<GroupBuffers>,
 }
 
@@ -121,7 +126,7 @@ impl VulkanEngine {
             pose_pipelines: Mutex::default(),
             slots: Mutex::default(),
             in_place,
-            window,
+            window: AtomicUsize::new(window),
             group_bytes,
             clip_bytes: options.memory.map(|budget| budget / 2),
             free: Arc::default(),
@@ -173,7 +178,7 @@ impl VulkanEngine {
         spare: Option<ClipBuffers>,
     ) -> Result<ClipBuffers, VulkanError> {
         // Where memory is counted, old buffers go before new ones come.
-        let spare = spare.filter(|_| self.clip_bytes.is_none());
+        let spare = spare.filter(|old| self.clip_bytes.is_none() && self.holds(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
         let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
             spare.map(|group| (group.segments, group.constants)).unzip();
@@ -196,7 +201,54 @@ impl VulkanEngine {
                 })
             })
             .collect::<Result<_, _>>()?;
-        Ok(ClipBuffers { groups })
+        Ok(ClipBuffers {
+            device: Arc::clone(&self.device),
+            groups,
+        })
+    }
+
+    /// Whether buffers are this device's: one that was opened anew has none of before.
+    pub(crate) fn holds(&self, buffers: &ClipBuffers) -> bool {
+        Arc::ptr_eq(&self.device, &buffers.device)
+    }
+
+    /// The same device opened again; nothing for an application's own.
+    pub(super) fn reopened(&self, options: &EngineOptions) -> Result<Option<Self>, VulkanError> {
+        if !self.device.is_owned() {
+            return Ok(None);
+        }
+        let engine = Self::new(self.device.physical.clone(), options)?;
+        engine.window.store(self.window(), Ordering::Relaxed);
+        Ok(Some(engine))
+    }
+
+    /// Rotations of one window.
+    pub(super) fn window(&self) -> usize {
+        self.window.load(Ordering::Relaxed)
+    }
+
+    /// Halves the windows to come; false when they are as small as they may be.
+    pub(super) fn halve_windows(&self) -> bool {
+        let half = self.window() / 2;
+        let smaller = half >= SMALLEST_WINDOW;
+        if smaller {
+            self.window.store(half, Ordering::Relaxed);
+        }
+        smaller
+    }
+
+    /// Gives back what is kept for the next evaluation, and halves the windows; false
+    /// when they are as small as they may be.
+    pub(super) fn shrink(&self) -> bool {
+        self.slots
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clear();
+        self.free
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clear();
+        self.halve_windows()
     }
 
     /// A buffer with these bytes, in the memory that kernels read fastest.
@@ -248,7 +300,15 @@ impl VulkanEngine {
             self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
         }
-        let mut buffer = self.output_buffer(bytes)?;
+        let mut buffer = match self.output_buffer(bytes) {
+            // Window by window it may fit.
+            Err(error) if error.is_out_of_memory() => {
+                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(whole.len());
+                self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
+                return Ok(Box::new(quats));
+            }
+            buffer => buffer?,
+        };
         self.run(job, &whole, Target::Buffer(&mut buffer))?;
         Ok(Box::new(MappedQuats::new(buffer, whole.len(), &self.free)))
     }

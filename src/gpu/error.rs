@@ -15,6 +15,14 @@ pub enum VulkanError {
     /// A loader, but no device that can compute.
     #[error("Vulkan is installed but offers no device with a compute queue")]
     NoDevice,
+    /// A driver ends the process that loads it.
+    #[error(
+        "a Vulkan driver fails as it is loaded: {how}; remove it, or name those to load in VK_DRIVER_FILES"
+    )]
+    Driver {
+        /// What became of a process that loaded it.
+        how: String,
+    },
     /// A Vulkan call failed.
     #[error("{call} failed: {result:?}{}", hint(*result))]
     Call {
@@ -80,6 +88,34 @@ pub enum VulkanError {
         /// Bytes allowed.
         limit: u64,
     },
+}
+
+impl VulkanError {
+    /// The device is lost: what it held is gone, and it must be opened again.
+    pub(crate) fn is_lost(&self) -> bool {
+        self.result() == Some(vk::Result::ERROR_DEVICE_LOST)
+    }
+
+    /// Less at once may do.
+    pub(crate) fn is_out_of_memory(&self) -> bool {
+        matches!(
+            self.result(),
+            Some(
+                vk::Result::ERROR_OUT_OF_HOST_MEMORY
+                    | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+                    | vk::Result::ERROR_OUT_OF_POOL_MEMORY
+                    | vk::Result::ERROR_FRAGMENTED_POOL
+                    | vk::Result::ERROR_TOO_MANY_OBJECTS
+            )
+        )
+    }
+
+    fn result(&self) -> Option<vk::Result> {
+        match self {
+            Self::Call { result, .. } => Some(*result),
+            _ => None,
+        }
+    }
 }
 
 fn hint(result: vk::Result) -> &'static str {

@@ -6,6 +6,7 @@ use super::device::LogicalDevice;
 use super::engine::{Job, VulkanEngine};
 use super::error::VulkanError;
 use super::instance::Instance;
+use super::opened::Opened;
 use super::physical::PhysicalDevice;
 use super::slot::External;
 use crate::clip::Clip;
@@ -51,8 +52,7 @@ impl Engine {
     ) -> Result<Self, Error> {
         // SAFETY: promised by the caller.
         let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
-        let info = engine.info().clone();
-        Self::trusted(engine, info, options)
+        Ok(Self::with_opened(Opened::trusted(engine, options)?))
     }
 }
 
@@ -93,8 +93,7 @@ impl Clip {
         let timeline = self.data.folded(&timeline);
         let rotation = encoding.bytes() as u64;
         let needed = (self.track_count() * timeline.len()) as u64 * rotation;
-        let (Backend::Vulkan(opened), Some(buffers)) = (&*self.engine.backend, &self.buffers)
-        else {
+        let Backend::Vulkan(opened) = &*self.engine.backend else {
             return Err(VulkanError::NoDevice.into());
         };
         if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {
@@ -105,17 +104,21 @@ impl Clip {
                 needed,
             }));
         }
-        let job = Job {
-            clip: &self.data,
-            buffers,
-            timeline: &timeline,
-            encoding,
-        };
         let external = External {
             raw: buffer.buffer,
             offset: buffer.offset,
         };
-        Ok(opened.engine.evaluate_to(job, layout, external)?)
+        let done = opened.attempt_smaller(|engine| {
+            let buffers = self.buffers_on(engine)?;
+            let job = Job {
+                clip: &self.data,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding,
+            };
+            engine.evaluate_to(job, layout, external)
+        });
+        Ok(done?)
     }
 }
 

@@ -13,7 +13,7 @@ use crate::segment::Pass;
 impl VulkanEngine {
     /// How many values of 16 bytes one pass takes.
     pub(crate) fn pass_limit(&self) -> usize {
-        self.window
+        self.window()
     }
 
     /// Runs a kernel with these inputs.

@@ -82,8 +82,16 @@ pub(crate) struct PhysicalDevice {
 pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError> {
     let instance = Instance::new(validation)?;
     let mut devices = Vec::new();
+    let mut failed = None;
     for raw in instance.physical_devices()? {
-        devices.extend(PhysicalDevice::new(&instance, raw)?);
+        match PhysicalDevice::new(&instance, raw) {
+            Ok(device) => devices.extend(device),
+            // The others may be sound.
+            Err(error) => failed = Some(error),
+        }
+    }
+    if let (true, Some(error)) = (devices.is_empty(), failed) {
+        return Err(error);
     }
     devices.sort_by_key(|device| device.info.kind);
     Ok(devices)

@@ -1,6 +1,7 @@
 //! The kernels as pipelines: one binding list, one entry point, one layout.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use ash::vk;
 
@@ -87,6 +88,7 @@ pub(super) struct Pipeline {
     pub(super) layout: vk::PipelineLayout,
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) bindings: u32,
+    pub(super) has_run: AtomicBool,
 }
 
 impl Pipeline {
@@ -103,6 +105,7 @@ impl Pipeline {
             layout: vk::PipelineLayout::null(),
             set_layout: vk::DescriptorSetLayout::null(),
             bindings,
+            has_run: AtomicBool::new(false),
         };
         let list: Vec<_> = (0..bindings)
             .map(|binding| {

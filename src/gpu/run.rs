@@ -1,6 +1,8 @@
 //! The walk over a result's windows: two are in flight, the host lists the work of one
 //! while the device does that of the other.
 
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
@@ -29,14 +31,20 @@ impl VulkanEngine {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
         // Windows are as large as they may be with 16 bytes a rotation.
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
-        let windows = window.cut((self.window / each).max(1));
+        let cut = |window: &Window| window.cut((self.window() / each).max(1));
+        let mut windows = VecDeque::from(cut(window));
         while slots.len() < SLOTS.min(windows.len()) {
             slots.push(Slot::new(&self.device)?);
         }
         let mut next = 0;
         let mut result = Ok(());
         let mut stopwatch = Stopwatch::default();
-        for window in windows {
+        while let Some(window) = windows.pop_front() {
+            if stopwatch.is_slow() && self.halve_windows() {
+                let rest = std::iter::once(window).chain(windows);
+                windows = rest.flat_map(|window| window.within(cut)).collect();
+                continue;
+            }
             next = (next + 1) % slots.len();
             let slot = &mut slots[next];
             result = slot
@@ -58,6 +66,12 @@ impl VulkanEngine {
             let slot = &mut slots[(next + i) % oldest_first];
             let finished = slot.finish(job.encoding, &mut target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
+        }
+        if stopwatch.is_slow() {
+            self.halve_windows(); // those of the next call
+        }
+        if result.is_err() {
+            slots.clear(); // a fence or a recording may be half way
         }
         *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
@@ -155,6 +169,7 @@ impl VulkanEngine {
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let pipeline = self.pipeline(clip.interpolation.form(), timeline, encoding)?;
+        slot.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
         for list in &lists {
             let item_count = list.item_count() as u32;

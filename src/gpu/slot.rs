@@ -1,7 +1,7 @@
 //! What one window in flight needs, and what is done when it has been computed.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ash::vk;
 
@@ -29,6 +29,8 @@ pub(super) struct Slot {
     pub(super) rotations: Option<Buffer>,
     pub(super) readback: Option<Buffer>,
     pub(super) done: Option<Finish>,
+    /// The kernel has run before: some drivers compile at the first dispatch.
+    pub(super) compiled: bool,
 }
 
 /// What is left to do when a window has been computed.
@@ -44,16 +46,34 @@ pub(super) struct Stopwatch {
     /// When the last window was seen to have ended: windows overlap, their times
     /// must not count twice.
     last: Option<Instant>,
+    /// A window took longer than [`LONG`].
+    slow: bool,
 }
 
+/// Systems take a device away from whoever keeps it busy for seconds (Windows after 2 s);
+/// other programs' pictures stand still long before that.
+const LONG: Duration = Duration::from_millis(100);
+
 impl Stopwatch {
-    fn ran(&mut self, spent: Spent) {
+    fn ran(&mut self, spent: Spent, compiled: bool) {
         let start = self
             .last
             .map_or(spent.submitted, |l| l.max(spent.submitted));
-        self.timings.submit_to_fence += spent.finished - start;
+        let waited = spent.finished - start;
+        let took = if spent.on_device.is_zero() {
+            waited
+        } else {
+            spent.on_device
+        };
+        self.slow |= compiled && took > LONG;
+        self.timings.submit_to_fence += waited;
         self.timings.on_device += spent.on_device;
         self.last = Some(spent.finished);
+    }
+
+    /// Whether a window took too long since this was last asked.
+    pub(super) fn is_slow(&mut self) -> bool {
+        std::mem::take(&mut self.slow)
     }
 }
 
@@ -86,6 +106,7 @@ impl Slot {
             rotations: None,
             readback: None,
             done: None,
+            compiled: false,
         })
     }
 
@@ -151,7 +172,7 @@ impl Slot {
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
         if let Some(spent) = self.submission.wait()? {
-            stopwatch.ran(spent);
+            stopwatch.ran(spent, self.compiled);
         }
         let copying = Instant::now();
         let Some(Finish { window, patches }) = self.done.take() else {

@@ -272,9 +272,16 @@ impl Submission {
                     seconds: TIMEOUT_SECONDS,
                 });
             }
-            waited => waited.named("vkWaitForFences")?,
+            waited => {
+                // What a lost device was doing has ended.
+                if waited != Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY)
+                    && waited != Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
+                {
+                    self.submitted = None;
+                }
+                waited.named("vkWaitForFences")?;
+            }
         }
-        self.submitted = None;
         let finished = Instant::now();
         // SAFETY: the fence is signalled and not in use.
         unsafe { raw.reset_fences(&fences) }.named("vkResetFences")?;
@@ -325,8 +332,10 @@ impl Access {
 impl Drop for Submission {
     fn drop(&mut self) {
         // An error may have left work pending; nothing may go before it ends.
-        let finished = self.wait().is_ok();
-        if finished && self.device.may_destroy() {
+        if self.wait().is_err() && self.submitted.is_some() {
+            self.device.wait_until_idle();
+        }
+        if self.device.may_destroy() {
             let raw = &self.device.raw;
             // SAFETY: created from this device, not in use; null is allowed.
             unsafe {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use tumble::{Clip, Device, Engine, EngineOptions, Layout, Method, VectorWidth, method};
 
 use super::exit::Failure;
-use super::words;
+use super::{probe, words};
 use report::{Report, Row, Section};
 use workload::{Kind, Workload};
 
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let devices = if arguments.cpu_only {
         Vec::new()
     } else {
-        Device::list().unwrap_or_default()
+        probe::devices().unwrap_or_default()
     };
     let mut sections = Vec::new();
     for &kind in &arguments.workloads {
