@@ -1,5 +1,7 @@
 //! Vulkan's side of the bargain: devices, canaries, validation, handles.
 
+#[path = "support/application.rs"]
+mod application;
 mod support;
 
 use support::{first_difference, hostile_set, vulkan_devices};
@@ -73,115 +75,6 @@ fn the_validation_layer_has_nothing_to_say() {
                 Vec::<String>::new(),
                 "{device:?}"
             );
-        }
-    }
-}
-
-/// A device as an application makes it.
-#[allow(unsafe_code)] // creating a device is the application's part
-mod application {
-    use ash::vk;
-    use tumble::{Engine, EngineOptions, VulkanHandles};
-
-    pub(super) struct Application {
-        pub(super) instance: ash::Instance,
-        pub(super) physical_device: vk::PhysicalDevice,
-        pub(super) device: ash::Device,
-        entry: ash::Entry,
-        queue: vk::Queue,
-    }
-
-    impl Application {
-        pub(super) fn new() -> Self {
-            // SAFETY: plain creation; everything is destroyed in `drop`.
-            unsafe {
-                let entry = ash::Entry::load().unwrap();
-                let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-                let info = vk::InstanceCreateInfo::default().application_info(&application);
-                let instance = entry.create_instance(&info, None).unwrap();
-                let physical_device = instance.enumerate_physical_devices().unwrap()[0];
-                let queues = [vk::DeviceQueueCreateInfo::default()
-                    .queue_family_index(0)
-                    .queue_priorities(&[1.0])];
-                let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
-                let device = instance
-                    .create_device(physical_device, &info, None)
-                    .unwrap();
-                let queue = device.get_device_queue(0, 0);
-                Self {
-                    instance,
-                    physical_device,
-                    device,
-                    entry,
-                    queue,
-                }
-            }
-        }
-
-        /// An engine on it, which must go first.
-        pub(super) fn engine(&self) -> Engine {
-            let handles = VulkanHandles {
-                entry: self.entry.clone(),
-                instance: self.instance.clone(),
-                physical_device: self.physical_device,
-                device: self.device.clone(),
-                queue: self.queue,
-                queue_family: 0,
-            };
-            // SAFETY: the handles belong together and outlive the engine.
-            unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap()
-        }
-
-        /// A buffer in memory that the host can see.
-        pub(super) fn buffer(&self, size: u64) -> (vk::Buffer, vk::DeviceMemory) {
-            // SAFETY: plain creation on a device that is alive.
-            unsafe {
-                let info = vk::BufferCreateInfo::default().size(size).usage(
-                    vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
-                );
-                let buffer = self.device.create_buffer(&info, None).unwrap();
-                let needs = self.device.get_buffer_memory_requirements(buffer);
-                let types = self
-                    .instance
-                    .get_physical_device_memory_properties(self.physical_device);
-                let wanted =
-                    vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-                let index = (0..types.memory_type_count)
-                    .find(|&i| {
-                        let flags = types.memory_types[i as usize].property_flags;
-                        needs.memory_type_bits & 1 << i != 0 && flags.contains(wanted)
-                    })
-                    .unwrap();
-                let info = vk::MemoryAllocateInfo::default()
-                    .allocation_size(needs.size)
-                    .memory_type_index(index);
-                let memory = self.device.allocate_memory(&info, None).unwrap();
-                self.device.bind_buffer_memory(buffer, memory, 0).unwrap();
-                (buffer, memory)
-            }
-        }
-
-        /// What is in that memory.
-        pub(super) fn bytes(&self, memory: vk::DeviceMemory, size: u64) -> Vec<u8> {
-            // SAFETY: nothing else uses the memory now.
-            unsafe {
-                let flags = vk::MemoryMapFlags::empty();
-                let pointer = self.device.map_memory(memory, 0, size, flags).unwrap();
-                let bytes = std::slice::from_raw_parts(pointer.cast::<u8>(), size as usize);
-                let bytes = bytes.to_vec();
-                self.device.unmap_memory(memory);
-                bytes
-            }
-        }
-    }
-
-    impl Drop for Application {
-        fn drop(&mut self) {
-            // SAFETY: the engine and its clips are gone.
-            unsafe {
-                self.device.destroy_device(None);
-                self.instance.destroy_instance(None);
-            }
         }
     }
 }

@@ -15,21 +15,26 @@ use crate::device::EngineOptions;
 use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
 use crate::rotations::Layout;
+use crate::spirv::FloatControls;
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).
 ///
-/// The device needs no features. Where it is older than Vulkan 1.2 and offers
-/// `VK_KHR_shader_float_controls`, enable that extension.
+/// The device needs no features. Below Vulkan 1.2, enable
+/// `VK_KHR_shader_float_controls` where it is offered.
 pub struct VulkanHandles {
     /// The loaded functions; they keep the loader library open.
     pub entry: ash::Entry,
     /// The instance, of Vulkan 1.1 or newer.
     pub instance: ash::Instance,
+    /// The version that it was made for (`VkApplicationInfo::apiVersion`).
+    pub api_version: u32,
     /// The device's physical device.
     pub physical_device: vk::PhysicalDevice,
     /// The device.
     pub device: ash::Device,
+    /// Whether `VK_KHR_shader_float_controls` is enabled; of no account from Vulkan 1.2 on.
+    pub shader_float_controls: bool,
     /// A queue of the device that can compute.
     pub queue: vk::Queue,
     /// That queue's family.
@@ -135,6 +140,10 @@ impl VulkanEngine {
         let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
             .ok_or(VulkanError::NoDevice)?;
         physical.queue_family = handles.queue_family;
+        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
+            // What the device could do was not asked for.
+            physical.float_controls = FloatControls::default();
+        }
         let device = LogicalDevice::borrowed(physical, handles.device, handles.queue);
         Self::with_device(device, options)
     }
