@@ -90,7 +90,9 @@ pub use encoding::{Encoding, MatrixOrder};
 pub use engine::{Engine, Error};
 pub use euler::{EulerSequence, UnknownSequence};
 pub use frame_rate::FrameRate;
-pub use gpu::{CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles};
+pub use gpu::{
+    CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles, kernels,
+};
 pub use method::{
     Axes, Continuity, Cost, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method,
     Path, Quantity, Speed,

@@ -50,11 +50,9 @@ impl Entry {
     }
 }
 
-const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
-
 /// Of every kernel's SPIR-V, one behind the other.
 pub(crate) fn kernels_sha256() -> String {
-    digest::of_bytes(SHADERS.iter().map(|shader| shader.1))
+    digest::of_bytes(tumble::kernels().map(|(_, code)| code))
 }
 
 /// A manifest's lines: the last one for each output, and how many are no entries.

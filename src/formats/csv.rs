@@ -67,9 +67,14 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     /// Flushes what was written.
     ///
     /// # Errors
-    /// When that fails.
+    /// When that fails, or (`InvalidInput`) frames are missing.
     pub fn finish(mut self) -> io::Result<()> {
-        self.csv.flush()
+        self.csv.flush()?;
+        if self.frame < self.timeline.len() {
+            let message = "there are fewer frames than the timeline has";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        }
+        Ok(())
     }
 
     fn header(&mut self, set: &TrackSet) -> ::csv::Result<()> {

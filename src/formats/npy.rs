@@ -32,7 +32,7 @@ impl<W: Write> NpyWriter<W> {
     /// one.
     ///
     /// # Errors
-    /// When writing fails.
+    /// When writing fails, or (`InvalidInput`) no file could hold so many.
     pub fn new(
         mut writer: W,
         rows: usize,
@@ -40,6 +40,12 @@ impl<W: Write> NpyWriter<W> {
         order: ComponentOrder,
         encoding: Encoding,
     ) -> io::Result<Self> {
+        let rotations = rows.checked_mul(columns);
+        let bytes = rotations.and_then(|count| count.checked_mul(encoding.bytes()));
+        let Some(missing) = rotations.filter(|_| bytes.is_some()) else {
+            let message = format!("{rows} × {columns} rotations are more than a file can hold");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        };
         let own = encoding.shape().iter().map(|&length| length as u64);
         let shape: Vec<u64> = [rows as u64, columns as u64]
             .into_iter()
@@ -58,7 +64,7 @@ impl<W: Write> NpyWriter<W> {
             writer,
             order,
             encoding,
-            missing: rows * columns,
+            missing,
         })
     }
 

@@ -27,3 +27,4 @@ pub(crate) use opened::Opened;
 pub use physical::{DeviceInfo, DeviceKind};
 pub(crate) use physical::{PhysicalDevice, list};
 pub(crate) use pipeline::PoseKernel;
+pub use pipeline::kernels;

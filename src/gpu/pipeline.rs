@@ -19,6 +19,12 @@ pub(super) type Shader = (&'static str, &'static [u8]);
 /// poses.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
+/// Every kernel that a Vulkan device may be given: its name and its SPIR-V, words with the
+/// least significant byte first, before the float controls that depend on the device.
+pub fn kernels() -> impl Iterator<Item = (&'static str, &'static [u8])> {
+    SHADERS.iter().copied()
+}
+
 pub(super) fn canary() -> Shader {
     SHADERS[0]
 }

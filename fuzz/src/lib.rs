@@ -1,0 +1,20 @@
+//! Fuzz targets, for `cargo fuzz` (`fuzz_targets/`) and for `cargo test` (`tests/fuzz.rs`).
+
+#[path = "../../src/cli/mod.rs"]
+#[allow(dead_code, unused_imports)]
+mod cli;
+mod targets;
+
+/// Each target, by the name of what it fuzzes.
+pub fn target(name: &str, data: &[u8]) {
+    let target: targets::Target = match name {
+        "dat" => targets::dat,
+        "outputs" => targets::outputs,
+        "arguments" => targets::arguments,
+        "frames" => targets::frames,
+        "tracks" => targets::tracks,
+        "spirv" => targets::spirv,
+        _ => panic!("there is no target {name}"),
+    };
+    target(data);
+}
