@@ -143,7 +143,8 @@ impl Sides {
             return time;
         }
         let (number, backwards) = self.copy((time - first) / length);
-        let into = (time - first) - number * length;
+        // Far outside, the copies are narrower than the spaces between f64.
+        let into = ((time - first) - number * length).clamp(0.0, length);
         match (number, backwards) {
             (0.0, _) => time,
             (_, true) => last - into,

@@ -24,6 +24,13 @@ use crate::numeric::{canonical, to_f64, unit_f32};
 /// is more likely a mistake than a rotation.
 pub const NORM_TOLERANCE: f64 = 0.1;
 
+/// Seconds: later times are refused, as `.dat` files have it. The square of what two
+/// intervals have to each other must not overflow.
+pub(crate) const LATEST: f64 = f32::MAX as f64;
+
+/// Seconds between neighbouring keys: less is refused.
+pub(crate) const CLOSEST: f64 = f32::MIN_POSITIVE as f64;
+
 /// A set of keyframe tracks: the input of every evaluation.
 ///
 /// Keys are f32 unit quaternions, `x y z w` in memory; times are f64 seconds.
@@ -303,12 +310,25 @@ fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackErro
             time: times[key],
         });
     }
-    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
-        Some(i) => Err(TrackError::TimeNotIncreasing {
+    if let Some(i) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        return Err(TrackError::TimeNotIncreasing {
             track,
             key: i + 1,
             time: times[i + 1],
             previous: times[i],
+        });
+    }
+    let far = times.iter().position(|time| time.abs() > LATEST);
+    let close = || {
+        times
+            .windows(2)
+            .position(|pair| pair[1] - pair[0] < CLOSEST)
+    };
+    match far.or_else(|| close().map(|first| first + 1)) {
+        Some(key) => Err(TrackError::TimeOutOfRange {
+            track,
+            key,
+            time: times[key],
         }),
         None => Ok(()),
     }

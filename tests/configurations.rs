@@ -84,7 +84,7 @@ fn swiftshader_gives_the_same_bits() {
     );
 }
 
-/// Without SSE Mesa's compiler takes the x87's registers, which round otherwise.
+/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise.
 #[test]
 fn a_driver_that_is_not_exact_is_named_and_refused() {
     if !is_there(LAVAPIPE) {

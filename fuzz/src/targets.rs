@@ -72,10 +72,6 @@ impl Numbers<'_> {
             _ => -0.0,
         }
     }
-
-    fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
 }
 
 /// The `.dat` parser: what it takes is a valid set that reads back bit for bit, what it
@@ -286,7 +282,7 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
     let choice = numbers.byte();
     let mut set = TrackSet::new();
     let mut outcomes = vec![method.name.to_owned()];
-    while !numbers.is_empty() && set.track_count() < 4 {
+    while numbers.0.len() > 20 && set.track_count() < 4 {
         let before = bits(&set);
         let count = numbers.byte() as usize % 9;
         let mut time = 0.0;
@@ -329,7 +325,10 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
     let length = (last - first).max(1e-3);
     let at = |part: f64| first + length * part;
-    let frames = Frames::at((-3..13).map(|i| at(f64::from(i) / 8.0)).collect());
+    let mut times: Vec<f64> = (-3..13).map(|i| at(f64::from(i) / 8.0)).collect();
+    times[0] = numbers.float();
+    times[15] = at(numbers.float());
+    let frames = Frames::at(times);
     match engine.evaluate(&set, interpolation, &frames) {
         Ok(rotations) => {
             for (place, q) in rotations.as_quats().iter().enumerate() {

@@ -306,6 +306,7 @@ impl<'a> Spline<'a> {
             turn.length() <= FASTEST
         };
         let bent: Vec<usize> = self.bent.clone().filter(fast).collect();
+        let plain = velocities.clone();
         for _ in 0..SWEEPS {
             let mut sides = self.given.clone();
             for &i in &bent {
@@ -316,7 +317,12 @@ impl<'a> Spline<'a> {
                 break;
             }
         }
-        velocities
+        // Where the iteration flees, the bends are left out everywhere.
+        if velocities.iter().all(|velocity| velocity.is_finite()) {
+            velocities
+        } else {
+            plain
+        }
     }
 
     /// Solves for those right sides; by how much, relatively, the velocities change.

@@ -1,6 +1,6 @@
 //! Why a set refuses keys.
 
-use super::NORM_TOLERANCE;
+use super::{CLOSEST, LATEST, NORM_TOLERANCE};
 
 /// Why keys were refused. Places count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,6 +25,18 @@ pub enum TrackError {
     /// A time is NaN or infinite.
     #[error("track {track}, key {key}: time {time} is not finite")]
     TimeNotFinite {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// The offending time, seconds.
+        time: f64,
+    },
+    /// A time is so far away, or so close to the one before, that arithmetic would overflow.
+    #[error(
+        "track {track}, key {key}: time {time} s; times lie within ±{LATEST:e} s, and at least {CLOSEST:e} s apart"
+    )]
+    TimeOutOfRange {
         /// The track's place in the set.
         track: usize,
         /// The key's place in the track.
