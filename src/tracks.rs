@@ -141,18 +141,39 @@ impl TrackSet {
     /// # Errors
     /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
     pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
-        let mut set = Self::new();
-        if times.is_empty() || !keys.len().is_multiple_of(times.len()) {
+        Self::of_shared_times(times.to_vec(), keys.to_vec())
+    }
+
+    /// As [`TrackSet::with_shared_times`], without a copy.
+    pub(crate) fn of_shared_times(
+        times: Vec<f64>,
+        mut keys: Vec<Quat>,
+    ) -> Result<Self, TrackError> {
+        let len = times.len();
+        if len == 0 || !keys.len().is_multiple_of(len) {
             return Err(TrackError::LengthMismatch {
                 track: 0,
                 keys: keys.len(),
-                times: times.len(),
+                times: len,
             });
         }
-        for track in keys.chunks(times.len()) {
-            set.push("", times, track)?;
+        check_times(0, &times, len)?;
+        for (place, key) in keys.iter_mut().enumerate() {
+            *key = unit_key(place / len, place % len, *key)?;
         }
-        Ok(set)
+        let range = |track| TrackRange {
+            first_key: track * len,
+            first_time: 0,
+            len,
+        };
+        Ok(Self {
+            tracks: (0..keys.len() / len).map(range).collect(),
+            longest: if keys.is_empty() { 0 } else { len },
+            span: (!keys.is_empty()).then(|| (times[0], times[len - 1])),
+            keys,
+            times,
+            ..Self::default()
+        })
     }
 
     /// Records the length of the boxes (a length, not a duration).

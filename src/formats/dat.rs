@@ -14,6 +14,7 @@ use std::path::Path;
 
 use glam::{DQuat, Quat};
 
+use super::blocks::Blocks;
 use super::diagnostic::{Code, Diagnostic};
 use super::lines::{Lines, tokens};
 use super::number;
@@ -75,7 +76,6 @@ pub fn read_dat(
     let header = read_header(&mut lines)?;
     let mut keys = Keys::new(header.boxes);
     while let Some(line) = lines.next()? {
-        let line = line.to_owned();
         if line.trim_start().starts_with('#') {
             check_comment(&lines, &line)?;
         } else if line.trim().is_empty() {
@@ -83,6 +83,7 @@ pub fn read_dat(
         } else {
             keys.read_row(&mut lines, &line)?;
         }
+        lines.reuse(line);
     }
     keys.finish(lines, header.box_length)
 }
@@ -97,7 +98,6 @@ fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<Header, Diagnostic> {
         let message = "the file is empty; it starts with `# <boxes> <box length>`".to_owned();
         return Err(lines.refuse(1, Code::Empty, message));
     };
-    let line = line.to_owned();
     let Some(body) = line.trim_start().strip_prefix('#') else {
         let message = "no header; the first line is `# <boxes> <box length>`".to_owned();
         return Err(lines.refuse(1, Code::NoHeader, message));
@@ -169,11 +169,10 @@ fn read_number<'a, R: BufRead>(
     Ok((place, number.value))
 }
 
-/// The keys read so far, one list for each box.
+/// What was read so far.
 struct Keys {
-    times: Vec<f64>,
-    boxes: Vec<Vec<Quat>>,
-    count: usize,
+    times: Blocks<f64>,
+    rows: Blocks<Quat>,
     /// The first blank line since the last key.
     blank: Option<u64>,
     /// Fewest digits of any number so far.
@@ -187,9 +186,8 @@ struct Keys {
 impl Keys {
     fn new(count: usize) -> Self {
         Self {
-            times: Vec::new(),
-            boxes: Vec::new(),
-            count,
+            times: Blocks::new(1),
+            rows: Blocks::new(count),
             blank: None,
             fewest_digits: usize::MAX,
             w_last: 0,
@@ -207,11 +205,7 @@ impl Keys {
         let mut numbers = tokens(line);
         let (_, time) = read_number(lines, &mut numbers)?;
         self.check_time(lines, time)?;
-        if self.boxes.is_empty() {
-            // Only now: this many numbers were there.
-            self.boxes = vec![Vec::new(); self.count];
-        }
-        for index in 0..self.count {
+        for index in 0..self.rows.width() {
             let (place, w) = read_number(lines, &mut numbers)?;
             let (_, x) = read_number(lines, &mut numbers)?;
             let (_, y) = read_number(lines, &mut numbers)?;
@@ -224,7 +218,8 @@ impl Keys {
     }
 
     fn check_columns<R: BufRead>(&self, lines: &Lines<R>, line: &str) -> Result<(), Diagnostic> {
-        let expected = 1 + 4 * self.count;
+        let boxes = self.rows.width();
+        let expected = 1 + 4 * boxes;
         let (found, extra) = tokens(line).fold((0, None), |(found, extra), (column, _)| {
             let first_extra = if found == expected {
                 Some(column)
@@ -236,7 +231,6 @@ impl Keys {
         if found == expected {
             return Ok(());
         }
-        let boxes = self.count;
         let message = format!(
             "{found} numbers where {expected} are expected: a time and 4 for each of {boxes} boxes"
         );
@@ -245,7 +239,7 @@ impl Keys {
     }
 
     fn check_time<R: BufRead>(&self, lines: &mut Lines<R>, time: f64) -> Result<(), Diagnostic> {
-        let Some(&previous) = self.times.last() else {
+        let Some(previous) = self.times.last() else {
             return Ok(());
         };
         if time <= previous {
@@ -310,7 +304,7 @@ impl Keys {
             }
             None => self.previous.push(exact),
         }
-        self.boxes[index].push(unit);
+        self.rows.push(unit);
         Ok(())
     }
 
@@ -335,14 +329,14 @@ impl Keys {
         mut lines: Lines<R>,
         box_length: f64,
     ) -> Result<Loaded, Diagnostic> {
-        if self.times.is_empty() {
+        if self.times.rows() == 0 {
             // Where the end is: on the last line, unless that has ended.
             lines.number -= u64::from(!lines.ended);
             let message = "no keys behind the header; a key line is `time w x y z …`".to_owned();
             return Err(lines.refuse(1, Code::NoKeys, message));
         }
         lines.number = lines.number.saturating_sub(1);
-        if self.times.len() == 1 {
+        if self.times.rows() == 1 {
             lines.warn(1, Code::OneKey, "only one key; nothing moves");
         }
         if self.total >= 8 && self.w_last == self.total {
@@ -350,14 +344,12 @@ impl Keys {
                            this format has w first";
             lines.warn(1, Code::Order, message);
         }
-        let mut set = TrackSet::new().with_box_length(box_length);
-        for keys in self.boxes {
-            // Checked above; a set refuses what slipped through.
-            set.push("", &self.times, &keys)
-                .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
-        }
+        let (times, keys) = (self.times.into_columns(), self.rows.into_columns());
+        // Checked above; a set refuses what slipped through.
+        let set = TrackSet::of_shared_times(times, keys)
+            .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
         Ok(Loaded {
-            set,
+            set: set.with_box_length(box_length),
             warnings: lines.warnings,
         })
     }

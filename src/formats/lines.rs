@@ -90,14 +90,14 @@ impl<R: BufRead> Lines<R> {
         Ok(lines)
     }
 
-    /// The next line without its end; `None` at the end of the input.
-    pub(super) fn next(&mut self) -> Result<Option<&str>, Diagnostic> {
+    /// The next line without its end; `None` at the end of the input. Give it back
+    /// ([`Lines::reuse`]), and the one after it needs no memory of its own.
+    pub(super) fn next(&mut self) -> Result<Option<String>, Diagnostic> {
         self.buffer.clear();
         self.number += 1;
-        let mut limited = self.reader.by_ref().take(self.limits.line + 1);
-        let count = limited
-            .read_until(b'\n', &mut self.buffer)
-            .map_err(|error| io_error(&self.file, &error))? as u64;
+        let count = self
+            .read_line()
+            .map_err(|error| io_error(&self.file, &error))?;
         if count == 0 {
             return Ok(None);
         }
@@ -114,7 +114,36 @@ impl<R: BufRead> Lines<R> {
         self.strip_line_end();
         self.check_characters()?;
         // ASCII by now, apart from what the check refused.
-        Ok(Some(std::str::from_utf8(&self.buffer).unwrap_or_default()))
+        let line = String::from_utf8(std::mem::take(&mut self.buffer));
+        Ok(Some(line.unwrap_or_default()))
+    }
+
+    /// Takes back the memory of a line.
+    pub(super) fn reuse(&mut self, line: String) {
+        self.buffer = line.into_bytes();
+    }
+
+    /// Appends bytes to the buffer, up to the end of a line or one more than a line may
+    /// have; how many. The buffer grows by quarters: a long line is not held twice.
+    fn read_line(&mut self) -> std::io::Result<u64> {
+        let most = self.limits.line + 1;
+        let mut count = 0;
+        while count < most && self.buffer.last() != Some(&b'\n') {
+            let room = self.buffer.capacity() - self.buffer.len();
+            if room == 0 {
+                self.buffer.reserve_exact((self.buffer.len() / 4).max(256));
+            }
+            let room = self.buffer.capacity() - self.buffer.len();
+            let mut limited = self
+                .reader
+                .by_ref()
+                .take(room.min((most - count) as usize) as u64);
+            match limited.read_until(b'\n', &mut self.buffer)? {
+                0 => break,
+                read => count += read as u64,
+            }
+        }
+        Ok(count)
     }
 
     /// A refusal at a column of the current line.

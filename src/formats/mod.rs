@@ -1,5 +1,6 @@
 //! Files: keyframes in (`.dat`), rotations out (NPY, CSV), one file per format.
 
+mod blocks;
 pub mod csv;
 pub mod dat;
 pub mod diagnostic;

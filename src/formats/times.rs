@@ -29,12 +29,13 @@ pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnost
     let mut lines = Lines::new(name, reader, Limits::default())?;
     let mut times = Vec::new();
     while let Some(line) = lines.next()? {
-        let line = line.split('#').next().unwrap_or_default().replace(',', " ");
-        for (column, token) in tokens(&line) {
+        let plain = line.split('#').next().unwrap_or_default().replace(',', " ");
+        for (column, token) in tokens(&plain) {
             let number = number::parse(token)
                 .map_err(|(code, message)| lines.refuse(column, code, message))?;
             times.push(number.value);
         }
+        lines.reuse(line);
     }
     if times.is_empty() {
         let message = "no times; write numbers of seconds, one a line".to_owned();

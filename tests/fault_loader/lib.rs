@@ -286,7 +286,6 @@ unsafe extern "system" fn vkAllocateMemory(
 }
 
 /// Two time stamps, as the one caller asks for them.
-#[expect(clippy::too_many_arguments)]
 unsafe extern "system" fn vkGetQueryPoolResults(
     device: Word,
     pool: Word,
