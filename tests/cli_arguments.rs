@@ -50,6 +50,20 @@ const ARGUMENTS: &str = "
 4 | eval empty -o o.npy                         | is a directory
 0 | eval folder -o out                           | a.npy
 4 | eval bad.dat -o o.npy                        | bad.dat:2:8: error[E020]
+0 | eval antipodal.dat -o o.npy                  | 1 track
+4 | eval antipodal.dat -o o.npy --path as-authored | as-authored
+4 | eval /dev/null -o o.npy                      | is a device
+4 | eval a.dat/b -o o.npy                        | Not a directory
+4 | eval --files-from none.txt -o out            | the list cannot be read
+2 | eval --files-from old.npy a.dat -o -         | need a directory
+2 | eval - --files-from - -o out                 | standard input cannot be both
+2 | eval a.dat -o o.npy --resume                 | for a directory of results
+4 | check none.jsonl                             | none.jsonl
+4 | check a.dat                                  | is no manifest
+2 | eval a.dat -o o.npy --device vulcan          | vulkan
+2 | eval a.dat -o o.npy --fps 1e9                | 64.0 GB
+7 | eval a.dat -o /proc/o.npy                    | /proc/o.npy
+7 | eval a.dat -o /proc/self/o.npy --overwrite   | cannot be written
 4 | eval a.dat -o o.npy --max-size 20B           | --max-size
 2 | eval a.dat b.dat -o -                        | -o DIRECTORY
 2 | eval a.dat b.dat -o o.npy                    | need a directory
@@ -272,4 +286,135 @@ fn signals_stop_the_program_and_leave_no_file() {
             "something was left behind"
         );
     }
+}
+
+/// A disk that is full, as a limit on the size of files shows it: the temporary file goes,
+/// the old output stays.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
+    let place = sample_folder();
+    let program = env!("CARGO_BIN_EXE_tumble");
+    let line = format!(
+        "ulimit -f 100; exec '{program}' eval a.dat --fps 100000 -o old.npy --overwrite --device cpu"
+    );
+    let mut shell = Command::new("sh");
+    shell.current_dir(place.path()).args(["-c", &line]);
+    let before = names(place.path());
+    let run = finish(shell.output().unwrap());
+    assert_eq!(run.code, 7, "{}", run.words);
+    assert!(
+        run.words
+            .contains("old.npy: cannot be written: File too large"),
+        "{}",
+        run.words
+    );
+    assert_eq!(fs::read(place.path().join("old.npy")).unwrap(), b"old");
+    assert_eq!(names(place.path()), before);
+}
+
+#[cfg(unix)]
+fn names(folder: &std::path::Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Where nobody may write, nothing is worked out first.
+#[cfg(unix)]
+#[test]
+fn a_read_only_directory_is_refused_before_any_work() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let place = sample_folder();
+    let folder = place.path().join("folder");
+    fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
+    // Whoever may do everything has to be told otherwise.
+    let is_root = fs::write(folder.join("try"), "").is_ok();
+    let line = ["eval", "a.dat", "-o", "folder/o.npy", "--device", "cpu"];
+    let mut command = command(place.path(), &line);
+    if is_root {
+        std::os::unix::fs::chown(place.path(), Some(65_534), None).unwrap();
+        fs::set_permissions(place.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        std::os::unix::process::CommandExt::uid(&mut command, 65_534);
+    }
+    let run = finish(command.output().unwrap());
+    assert_eq!(run.code, 7, "{}", run.words);
+    assert!(
+        run.words
+            .contains("folder/o.npy: cannot be written: Permission denied"),
+        "{}",
+        run.words
+    );
+    let _ = fs::remove_file(folder.join("try"));
+}
+
+/// Named pipes are read when that is asked for, standard input always; a file that grows
+/// while it is read is refused.
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_standard_input_and_files_that_change() {
+    use std::io::Write;
+
+    let place = sample_folder();
+    let text = fs::read(place.path().join("a.dat")).unwrap();
+    let pipe = place.path().join("pipe.dat");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let refused = run(place.path(), &["eval", "pipe.dat", "-o", "o.npy"]);
+    assert_eq!(refused.code, 4);
+    assert!(
+        refused.words.contains("is a named pipe"),
+        "{}",
+        refused.words
+    );
+    assert!(refused.words.contains("--pipes"), "{}", refused.words);
+    let line = [
+        "eval", "pipe.dat", "--pipes", "-o", "o.npy", "--device", "cpu",
+    ];
+    let child = command(place.path(), &line)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    fs::write(&pipe, &text).unwrap();
+    let read = finish(child.wait_with_output().unwrap());
+    assert_eq!(read.code, 0, "{}", read.words);
+    let expected = fs::read(place.path().join("o.npy")).unwrap();
+
+    let mut child = command(place.path(), &["eval", "-", "-o", "-", "--device", "cpu"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(&text).unwrap();
+    let run = finish(child.wait_with_output().unwrap());
+    assert_eq!((run.code, run.out == expected), (0, true), "{}", run.words);
+
+    // Large enough that it is still being read when it grows.
+    let grown = place.path().join("grown.dat");
+    let mut file = fs::File::create(&grown).unwrap();
+    file.write_all(b"# 1 1\n").unwrap();
+    let rows: String = (0..400_000).map(|i| format!("{i} 1 0 0 0\n")).collect();
+    file.write_all(rows.as_bytes()).unwrap();
+    let child = command(place.path(), &["info", "grown.dat"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    for i in 0..100 {
+        writeln!(file, "{} 1 0 0 0", 400_000 + i).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let run = finish(child.wait_with_output().unwrap());
+    assert_eq!(run.code, 4, "{}", run.words);
+    assert!(run.words.contains("error[E003]"), "{}", run.words);
 }

@@ -1,12 +1,16 @@
 //! Every kind of `.dat` file, good and bad, with what is said of it: the fixtures in
 //! `tests/fixtures/dat/`, each with its `.expected` beside it.
 
+#[path = "support/program.rs"]
+mod program;
+
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use glam::Quat;
 use proptest::prelude::*;
+use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use tumble::TrackSet;
 use tumble::formats::dat::{DatOptions, Limits, open_dat, read_dat, write_dat};
 use tumble::formats::{Code, Diagnostic, Severity};
@@ -199,4 +203,68 @@ proptest! {
         prop_assert_eq!(bits(&read), bits(&set));
         prop_assert_eq!(read.box_length(), Some(0.1));
     }
+}
+
+/// As a person meets them: by the program, with its exit code.
+#[test]
+fn the_program_says_of_every_fixture_what_is_expected() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/dat");
+    let wrong: Vec<String> = fixtures()
+        .par_iter()
+        .filter_map(|path| {
+            let expected = fs::read_to_string(path.with_extension("expected")).unwrap();
+            let mut lines = expected.lines();
+            let refused = lines.next() == Some("refused");
+            let name = name(path);
+            let line = [
+                "eval",
+                &name,
+                "-o",
+                "-",
+                "--device",
+                "cpu",
+                "--times",
+                "times.txt",
+            ];
+            let run = program::run(&folder, &line);
+            let code = if refused { 4 } else { 0 };
+            let said = lines.all(|line| run.words.lines().any(|word| word == line));
+            let data = run.out.starts_with(b"\x93NUMPY");
+            (run.code != code || !said || data == refused).then(|| {
+                format!(
+                    "{name}: {}, {}wanted {code}, {expected}",
+                    run.code, run.words
+                )
+            })
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// `docs/codes.md`: every code, why, and what is said of a file that has it.
+/// `UPDATE_EXPECTED=1` writes it.
+#[test]
+fn the_page_of_codes_is_up_to_date() {
+    use std::fmt::Write;
+
+    let messages: Vec<String> = fixtures().iter().map(|path| said(path)).collect();
+    let mut page = String::from(
+        "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
+         Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \
+         `tumble explain CODE` says the same.\n",
+    );
+    for &code in Code::ALL {
+        let (title, text) = (code.title(), code.explanation());
+        write!(page, "\n## {code}: {title}\n\n{text}\n").unwrap();
+        let sign = format!("[{code}]");
+        let mut lines = messages.iter().flat_map(|message| message.lines());
+        if let Some(line) = lines.find(|line| line.contains(&sign)) {
+            write!(page, "\n```text\n{line}\n```\n").unwrap();
+        }
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/codes.md");
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        fs::write(&file, &page).unwrap();
+    }
+    assert_eq!(fs::read_to_string(file).unwrap(), page);
 }

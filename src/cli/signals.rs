@@ -34,14 +34,16 @@ fn code(signal: i32) -> u8 {
 /// signals) they end the program in their default way.
 #[cfg(unix)]
 pub(crate) fn stop_on_signals() {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
+    // A file that may not grow (`ulimit -f`) is an error of its writer's, who has it to tell
+    // and a file to remove; the signal would end the program before that.
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGXFSZ]) else {
         return;
     };
     std::thread::spawn(move || {
-        for signal in signals.forever() {
+        for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
             let mut state = state();
             // A second signal means it: do not wait for the writer.
             if state.writing == 0 || state.signal.is_some() {

@@ -38,6 +38,7 @@ pub(crate) fn sample_folder() -> tempfile::TempDir {
     }
     write("bad.dat", "# 2 3\n0 1 0 0\n");
     write("old.npy", "old");
+    write("antipodal.dat", "# 1 1\n0 1 0 0 0\n1 -1 0 0 0\n");
     write("t.txt", "0\n1\n");
     place
 }
