@@ -55,10 +55,23 @@ if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
     fi
 fi
 
+# The oldest Rust that Cargo.toml promises, where it is at hand and not the one in use.
+oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+if ! rustc --version | grep -q "^rustc $oldest\b" &&
+    command -v rustup >/dev/null && rustup run "$oldest" rustc --version >/dev/null 2>&1; then
+    CARGO_TARGET_DIR=target/oldest rustup run "$oldest" cargo check --all-targets --quiet
+fi
+
+# What the dependencies may be (deny.toml), where the tool is installed.
+if cargo deny --version >/dev/null 2>&1; then
+    cargo deny --log-level error check bans licenses sources
+fi
+
 if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
 if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --all-targets --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --quiet
 cargo test --release --test cost
-cargo test
+# Twenty seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
+FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test

@@ -115,12 +115,14 @@ pub enum FramesError {
 impl Frames {
     /// Whole frames per second, from the set's first key to its last. A rate of 0 is
     /// refused when the frames are resolved against a set.
+    #[must_use]
     pub fn fps(frames_per_second: u32) -> Self {
         Self::rate(FrameRate::whole(frames_per_second))
     }
 
     /// Frames at an exact rate, from the set's first key to its last: frame `k` at
     /// `start + k / rate`, for every `k` with a time not past the end.
+    #[must_use]
     pub fn rate(rate: FrameRate) -> Self {
         Self {
             request: Request::Rate {
@@ -141,6 +143,7 @@ impl Frames {
     }
 
     /// Explicit times, seconds, the same for every track, in any order.
+    #[must_use]
     pub fn at(times: Vec<f64>) -> Self {
         Self {
             request: Request::Shared(times.into()),
@@ -148,6 +151,7 @@ impl Frames {
     }
 
     /// Explicit times of each track's own, one track after another.
+    #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self {
             request: Request::PerTrack(times.into()),
@@ -257,11 +261,13 @@ pub(crate) enum Ticks {
 
 impl Timeline {
     /// Samples of each track.
+    #[must_use]
     pub fn len(&self) -> usize {
         self.count
     }
 
     /// Whether there is nothing to evaluate.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -293,6 +299,7 @@ impl Timeline {
     ///
     /// # Panics
     /// When `sample` is not below [`Timeline::len`].
+    #[must_use]
     pub fn time(&self, track: usize, sample: usize) -> f64 {
         assert!(sample < self.count, "sample {sample} of {}", self.count);
         match &self.ticks {

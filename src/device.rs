@@ -23,6 +23,7 @@ pub struct VulkanDevice {
 
 impl VulkanDevice {
     /// Name, kind and limits.
+    #[must_use]
     pub fn info(&self) -> &DeviceInfo {
         &self.physical.info
     }
@@ -56,6 +57,7 @@ impl Device {
     }
 
     /// Whether it is a Vulkan driver that computes on the CPU (Mesa's lavapipe).
+    #[must_use]
     pub fn is_software(&self) -> bool {
         match self {
             Self::Cpu => false,
@@ -64,6 +66,7 @@ impl Device {
     }
 
     /// Its name: the driver's, or `CPU`.
+    #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Cpu => "CPU",

@@ -63,6 +63,7 @@ impl Encoding {
     pub(crate) const MOST_BYTES: usize = 48;
 
     /// Bytes of one rotation.
+    #[must_use]
     pub fn bytes(self) -> usize {
         match self {
             Self::F16 | Self::Snorm16 => 8,
@@ -74,6 +75,7 @@ impl Encoding {
     }
 
     /// The shape of one rotation in an array: `[4]`, `[3]`, `[3, 3]`, ….
+    #[must_use]
     pub fn shape(self) -> &'static [usize] {
         match self {
             Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle => &[4],
@@ -85,6 +87,7 @@ impl Encoding {
     }
 
     /// What its numbers are called, in their order.
+    #[must_use]
     pub fn components(self) -> Vec<String> {
         let names: &[&str] = match self {
             Self::F32 | Self::F16 | Self::Snorm16 => &["x", "y", "z", "w"],
@@ -145,6 +148,7 @@ impl Encoding {
     ///
     /// # Panics
     /// When `bytes` are not those of one rotation.
+    #[must_use]
     pub fn decode(self, bytes: &[u8]) -> [f32; 4] {
         assert_eq!(bytes.len(), self.bytes());
         let number = |i: usize| f32::from_ne_bytes(std::array::from_fn(|b| bytes[4 * i + b]));

@@ -159,11 +159,13 @@ impl Engine {
     }
 
     /// The name of its device: the driver's, or `CPU`.
+    #[must_use]
     pub fn device_name(&self) -> &str {
         self.device_info().map_or("CPU", |info| &info.name)
     }
 
     /// What is known of its Vulkan device; `None` on the CPU.
+    #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
         match &*self.backend {
             Backend::Cpu(_) => None,
@@ -173,6 +175,7 @@ impl Engine {
 
     /// How the device did on the canaries; empty on the CPU, which they are
     /// compared with.
+    #[must_use]
     pub fn canaries(&self) -> &[CanaryReport] {
         match &*self.backend {
             Backend::Cpu(_) => &[],
@@ -181,6 +184,7 @@ impl Engine {
     }
 
     /// What the validation layer has said so far; see [`Device::list_with`].
+    #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
         match &*self.backend {
             Backend::Cpu(_) => Vec::new(),
@@ -190,6 +194,7 @@ impl Engine {
 
     /// Where the time of this engine's evaluations went since this was last asked,
     /// or since it was opened; nothing on the CPU.
+    #[must_use]
     pub fn take_timings(&self) -> Timings {
         match &*self.backend {
             Backend::Cpu(_) => Timings::default(),

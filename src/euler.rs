@@ -29,6 +29,7 @@ impl EulerSequence {
     };
 
     /// All 24: twelve intrinsic ones, then twelve extrinsic ones.
+    #[must_use]
     pub fn all() -> Vec<Self> {
         let mut all = Vec::new();
         for intrinsic in [true, false] {
@@ -48,6 +49,7 @@ impl EulerSequence {
     }
 
     /// Whether each angle is about an axis that those before it have turned.
+    #[must_use]
     pub fn is_intrinsic(self) -> bool {
         self.intrinsic
     }

@@ -68,19 +68,7 @@ impl FrameClock {
     /// a key returns the key at hour 24 too.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
-        self.settled(self.rate.frames_in(time - self.start), self.rounding)
-    }
-
-    #[inline(always)]
-    fn settled(self, exact: f64, rounding: f64) -> Boundary {
-        let whole = nearest_whole(exact);
-        let frame = if (exact - whole).abs() <= rounding {
-            whole
-        } else {
-            exact
-        };
-        let first = if whole < frame { whole + 1.0 } else { whole };
-        Boundary { frame, first }
+        settled(self.rate.frames_in(time - self.start), self.rounding)
     }
 
     /// The first frame not before a time.
@@ -92,6 +80,19 @@ impl FrameClock {
     fn time(self, frame: usize) -> f64 {
         self.start + self.rate.time_of(frame as u64)
     }
+}
+
+/// Frame coordinates, a whole frame where they are one but for rounding.
+#[inline(always)]
+fn settled(exact: f64, rounding: f64) -> Boundary {
+    let whole = nearest_whole(exact);
+    let frame = if (exact - whole).abs() <= rounding {
+        whole
+    } else {
+        exact
+    };
+    let first = if whole < frame { whole + 1.0 } else { whole };
+    Boundary { frame, first }
 }
 
 /// What tells where a track's spans lie among the frames.
@@ -143,7 +144,7 @@ impl Clock for CopyClock {
     fn boundary(self, time: f64) -> Boundary {
         let own = self.own.rate.frames_in(time - self.own.start);
         let rounding = self.own.rounding + 4.0 * f64::EPSILON * self.offset.abs();
-        self.own.settled(own * self.sign + self.offset, rounding)
+        settled(own * self.sign + self.offset, rounding)
     }
 
     fn own_time(self, _: usize) -> Option<f64> {

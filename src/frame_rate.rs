@@ -53,6 +53,7 @@ impl FrameRate {
     }
 
     /// Frames per second, rounded to f64.
+    #[must_use]
     pub fn per_second(self) -> f64 {
         self.frames as f64 / self.seconds as f64
     }
@@ -70,6 +71,7 @@ impl FrameRate {
     }
 
     /// The time of frame `frame`, seconds after frame 0.
+    #[must_use]
     pub fn time_of(self, frame: u64) -> f64 {
         // The product is exact for every count of frames that can be asked for at
         // the usual rates.

@@ -143,6 +143,9 @@ impl Generate {
     ///
     /// # Errors
     /// When the request does not pass [`Generate::check`].
+    ///
+    /// # Panics
+    /// Never: memory takes what is written, and a test reads what is generated back.
     pub fn track_set(&self) -> Result<TrackSet, GenerateError> {
         self.check()?;
         let mut file = Vec::new();
@@ -243,7 +246,7 @@ impl Pendulum {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// `SplitMix64` (Steele, Lea, Flood 2014).
 struct Random(u64);
 
 impl Random {

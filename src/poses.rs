@@ -211,28 +211,33 @@ pub struct WorldPoses {
 
 impl WorldPoses {
     /// Number of tracks.
+    #[must_use]
     pub fn tracks(&self) -> usize {
         self.tracks
     }
 
     /// Samples of each track.
+    #[must_use]
     pub fn samples(&self) -> usize {
         self.samples
     }
 
     /// The rotation of a track at a sample; `None` out of range.
+    #[must_use]
     pub fn rotation(&self, track: usize, sample: usize) -> Option<Quat> {
         let place = self.place(track, sample)?;
         Some(Quat::from_array(self.values[place]))
     }
 
     /// Where a track's box hangs at a sample; `None` out of range.
+    #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
         let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
         Some(Vec3::new(x, y, z))
     }
 
     /// `[frame][track]`: the rotation `x y z w`, then the position `x y z 0`.
+    #[must_use]
     pub fn as_slice(&self) -> &[[f32; 4]] {
         &self.values
     }

@@ -16,6 +16,7 @@ pub enum Layout {
 
 impl Layout {
     /// Where a sample of a track lies among `tracks × samples` rotations.
+    #[must_use]
     pub fn index(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
         match self {
             Self::TrackMajor => track * samples + sample,
@@ -61,27 +62,32 @@ impl Rotations {
     }
 
     /// Number of tracks.
+    #[must_use]
     pub fn tracks(&self) -> usize {
         self.tracks
     }
 
     /// Samples of each track.
+    #[must_use]
     pub fn samples(&self) -> usize {
         self.samples
     }
 
     /// The order in memory.
+    #[must_use]
     pub fn layout(&self) -> Layout {
         self.layout
     }
 
     /// All rotations, without a copy: where a device maps its memory, these are the
     /// values that the device wrote.
+    #[must_use]
     pub fn as_quats(&self) -> &[Quat] {
         self.storage.quats()
     }
 
     /// The rotation of one track at one sample; `None` out of range.
+    #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Quat> {
         let inside = track < self.tracks && sample < self.samples;
         inside.then(|| self.as_quats()[self.layout.index(track, sample, self.tracks, self.samples)])

@@ -105,6 +105,7 @@ impl Skeleton {
 
     /// A chain of boxes: the first hangs at the origin, each other at the lower end of
     /// the one before it, `(0, -length, 0)`.
+    #[must_use]
     pub fn chain(boxes: usize, length: f64) -> Self {
         let offset = |track: usize| match track {
             0 => Vec3::ZERO,
@@ -118,11 +119,13 @@ impl Skeleton {
     }
 
     /// Number of tracks.
+    #[must_use]
     pub fn len(&self) -> usize {
         self.parents.len()
     }
 
     /// Whether it has no tracks.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.parents.is_empty()
     }

@@ -5,31 +5,22 @@
 //! everything behind it trusts it: every track has at least one key, times are
 //! finite and strictly increasing, keys are unit quaternions.
 
+mod check;
 mod error;
 mod key_data;
 mod vectors;
 
 use std::ops::Range;
 
+pub use check::NORM_TOLERANCE;
+pub(crate) use check::{CLOSEST, LATEST, ROUNDING};
+use check::{check_times, unit_key};
 pub use error::TrackError;
-use glam::{DQuat, DVec3, Quat};
+use glam::{DVec3, Quat};
 use key_data::KeyData;
 pub use key_data::Tcb;
 use vectors::VectorTracks;
 pub(crate) use vectors::{Channel, VectorTrack};
-
-use crate::numeric::{canonical, to_f64, unit_f32};
-
-/// Norms further from 1 than this are refused by [`TrackSet::push`]: such a key
-/// is more likely a mistake than a rotation.
-pub const NORM_TOLERANCE: f64 = 0.1;
-
-/// Seconds: later times are refused, as `.dat` files have it. The square of what two
-/// intervals have to each other must not overflow.
-pub(crate) const LATEST: f64 = f32::MAX as f64;
-
-/// Seconds between neighbouring keys: less is refused.
-pub(crate) const CLOSEST: f64 = f32::MIN_POSITIVE as f64;
 
 /// A set of keyframe tracks: the input of every evaluation.
 ///
@@ -92,6 +83,7 @@ pub struct Track<'a> {
 
 impl TrackSet {
     /// An empty set.
+    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -184,16 +176,19 @@ impl TrackSet {
     }
 
     /// The length of the boxes, when the input gave one.
+    #[must_use]
     pub fn box_length(&self) -> Option<f64> {
         self.box_length
     }
 
     /// Number of tracks.
+    #[must_use]
     pub fn track_count(&self) -> usize {
         self.tracks.len()
     }
 
     /// Number of keys of all tracks together.
+    #[must_use]
     pub fn key_count(&self) -> usize {
         self.keys.len()
     }
@@ -204,6 +199,7 @@ impl TrackSet {
     }
 
     /// Whether the set has no tracks.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.tracks.is_empty()
     }
@@ -246,6 +242,7 @@ impl TrackSet {
     }
 
     /// Every track in order.
+    #[must_use]
     pub fn tracks(&self) -> impl ExactSizeIterator<Item = Track<'_>> {
         (0..self.tracks.len()).map(|index| self.track(index))
     }
@@ -258,6 +255,7 @@ impl TrackSet {
     }
 
     /// First and last key time over all tracks, seconds; `None` when empty.
+    #[must_use]
     pub fn time_span(&self) -> Option<(f64, f64)> {
         self.span
     }
@@ -266,6 +264,7 @@ impl TrackSet {
     ///
     /// # Panics
     /// When the range passes [`TrackSet::track_count`].
+    #[must_use]
     pub fn select(&self, range: Range<usize>) -> Self {
         let mut set = Self {
             box_length: self.box_length,
@@ -311,64 +310,6 @@ impl TrackSet {
         self.times.extend_from_slice(times);
         first
     }
-}
-
-fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
-    if times.len() != keys {
-        return Err(TrackError::LengthMismatch {
-            track,
-            keys,
-            times: times.len(),
-        });
-    }
-    if times.is_empty() {
-        return Err(TrackError::Empty { track });
-    }
-    if let Some(key) = times.iter().position(|time| !time.is_finite()) {
-        return Err(TrackError::TimeNotFinite {
-            track,
-            key,
-            time: times[key],
-        });
-    }
-    if let Some(i) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
-        return Err(TrackError::TimeNotIncreasing {
-            track,
-            key: i + 1,
-            time: times[i + 1],
-            previous: times[i],
-        });
-    }
-    let far = times.iter().position(|time| time.abs() > LATEST);
-    let close = || {
-        times
-            .windows(2)
-            .position(|pair| pair[1] - pair[0] < CLOSEST)
-    };
-    match far.or_else(|| close().map(|first| first + 1)) {
-        Some(key) => Err(TrackError::TimeOutOfRange {
-            track,
-            key,
-            time: times[key],
-        }),
-        None => Ok(()),
-    }
-}
-
-/// f32 rounding moves a unit quaternion's squared norm by at most 4 × 2^-24 or
-/// so; below this the key is kept as it is, so that loading is idempotent.
-pub(crate) const ROUNDING: f64 = 4.0e-7;
-
-fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
-    let exact: DQuat = to_f64(quat);
-    let norm = exact.length();
-    if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
-        return Err(TrackError::NotUnit { track, key, norm });
-    }
-    if (norm - 1.0).abs() <= ROUNDING {
-        return Ok(Quat::from_array(quat.to_array().map(canonical)));
-    }
-    Ok(unit_f32(exact))
 }
 
 #[cfg(test)]

@@ -30,12 +30,14 @@ pub struct Vectors(Rotations);
 
 impl Vectors {
     /// The vector of one track at one sample; `None` out of range.
+    #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Vec3> {
         let [x, y, z, _] = self.0.get(track, sample)?.to_array();
         Some(Vec3::new(x, y, z))
     }
 
     /// All of them, in the order of the rotations beside them.
+    #[must_use]
     pub fn as_slice(&self) -> &[Vec4] {
         bytemuck::cast_slice(self.0.as_quats())
     }

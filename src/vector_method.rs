@@ -32,6 +32,7 @@ impl VectorMethod {
     ];
 
     /// The name by which programs call it.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Step => "step",

@@ -23,6 +23,7 @@ use crate::tracks::TrackSet;
 pub const NORM_BOUND: f64 = 4e-7;
 
 /// Largest allowed error of a form against the reference, radians.
+#[must_use]
 pub fn error_bound(form: Form) -> f64 {
     match form {
         Form::Arc => 6e-7,

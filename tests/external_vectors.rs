@@ -173,7 +173,7 @@ fn pairs_that_broke_others_give_unit_rotations() {
     }
 }
 
-/// KhronosGroup/glTF-Sample-Models, BoxAnimated (CC-BY 4.0): keys 180° apart, whose
+/// KhronosGroup/glTF-Sample-Models, `BoxAnimated` (CC-BY 4.0): keys 180° apart, whose
 /// dot product of -4.5e-11 is noise; the signs as stored decide, on every device.
 #[test]
 fn box_animated_turns_as_its_signs_say() {
@@ -188,7 +188,7 @@ fn box_animated_turns_as_its_signs_say() {
     }
 }
 
-/// KhronosGroup/glTF-Sample-Models, AnimatedTriangle (CC0): keys 1.5e-4 off unit
+/// KhronosGroup/glTF-Sample-Models, `AnimatedTriangle` (CC0): keys 1.5e-4 off unit
 /// length, and a last step that goes on turning the same way on the short path.
 #[test]
 fn animated_triangle_keeps_turning() {
@@ -209,7 +209,7 @@ fn animated_triangle_keeps_turning() {
     }
 }
 
-/// KhronosGroup/glTF-Asset-Generator, Animation_SamplerType: LINEAR yaw is linear.
+/// KhronosGroup/glTF-Asset-Generator, `Animation_SamplerType`: LINEAR yaw is linear.
 #[test]
 fn gltf_linear_yaw_is_linear() {
     let keys = [90.0, 0.0, -90.0, 0.0, 90.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
@@ -220,7 +220,7 @@ fn gltf_linear_yaw_is_linear() {
     }
 }
 
-/// scipy/scipy, scipy/spatial/tests/test_slerp.py (BSD-3-Clause).
+/// scipy/scipy, `scipy/spatial/tests/test_slerp.py` (BSD-3-Clause).
 #[test]
 fn scipy_geometric_slerp() {
     let (start, end) = (q([1.0, 0.0, 0.0, 0.0]), q([0.0, 1.0, 0.0, 0.0]));
@@ -238,7 +238,7 @@ fn scipy_geometric_slerp() {
     }
 }
 
-/// RobotLocomotion/drake, common/trajectories/test/piecewise_quaternion_test.cc
+/// RobotLocomotion/drake, `common/trajectories/test/piecewise_quaternion_test.cc`
 /// (BSD-3-Clause): angular velocity is constant between keys and takes the short
 /// way where the keys' signs differ. Our keys are f32, hence the tolerance.
 #[test]
@@ -304,7 +304,7 @@ fn magnum_gltf_cubic_spline() {
     assert_near(found[1], line[1], 1e-5);
 }
 
-/// KhronosGroup/glTF-Asset-Generator, Animation_SamplerType: CUBICSPLINE with tangents of
+/// KhronosGroup/glTF-Asset-Generator, `Animation_SamplerType`: CUBICSPLINE with tangents of
 /// zero is `normalise((1-s) q0 + s q1)`, `s = 3t² - 2t³`.
 #[test]
 fn gltf_cubic_spline_without_tangents_eases() {
@@ -324,7 +324,7 @@ fn rpy(angle: f64) -> DQuat {
     DQuat::from_rotation_z(angle) * DQuat::from_rotation_y(angle) * DQuat::from_rotation_x(angle)
 }
 
-/// gazebosim/gz-math, src/RotationSpline_TEST.cc (Apache-2.0). Where a neighbour is
+/// gazebosim/gz-math, `src/RotationSpline_TEST.cc` (Apache-2.0). Where a neighbour is
 /// missing it takes log(1) = 0 for it; a last key equal to the first closes the curve.
 #[test]
 fn gz_math_squad() {
@@ -350,7 +350,7 @@ fn gz_math_squad() {
     }
 }
 
-/// scipy/scipy, scipy/spatial/transform/tests/test_rotation_spline.py (BSD-3-Clause): with
+/// scipy/scipy, `scipy/spatial/transform/tests/test_rotation_spline.py` (BSD-3-Clause): with
 /// two keys it is slerp.
 #[test]
 fn scipy_rotation_spline_of_two_keys_is_slerp() {

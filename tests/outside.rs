@@ -182,7 +182,7 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
     }
 }
 
-/// SciPy, scipy/spatial/transform/tests/test_rotation_spline.py (BSD-3-Clause): two keys
+/// `SciPy`, `scipy/spatial/transform/tests/test_rotation_spline.py` (BSD-3-Clause): two keys
 /// are slerp, extended outside of them too, and turn at a constant rate.
 #[test]
 fn two_keys_go_on_turning() {

@@ -1,4 +1,4 @@
-//! Beside numbers that are not ours: SciPy and the Python package `splines`
+//! Beside numbers that are not ours: `SciPy` and the Python package `splines`
 //! (`tests/peers/check.py`). `scripts/test.sh` makes the environment.
 
 use std::path::Path;

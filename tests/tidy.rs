@@ -114,3 +114,47 @@ fn files_stay_short() {
         assert!(lines <= 450, "{}: {lines} lines", path.display());
     }
 }
+
+/// A crate that nobody can say the use of is one to leave out.
+#[test]
+fn every_dependency_is_justified() {
+    let manifest = read("Cargo.toml");
+    let architecture = read("ARCHITECTURE.md");
+    let mut section = "";
+    let mut count = 0;
+    for line in manifest.lines() {
+        if line.starts_with('[') {
+            section = line;
+        } else if section.ends_with("dependencies]")
+            && let Some((name, _)) = line.split_once(" = ")
+        {
+            count += 1;
+            assert!(
+                architecture.contains(&format!("`{name}`")),
+                "ARCHITECTURE.md does not say what {name} is for"
+            );
+        }
+    }
+    assert!(count > 30, "only {count} dependencies were found");
+}
+
+/// The oldest Rust that works is the one that the tests run with; a newer one may be used,
+/// and is not asked for.
+#[test]
+fn the_oldest_rust_is_declared_once() {
+    let declared = read("Cargo.toml")
+        .lines()
+        .find_map(|line| line.strip_prefix("rust-version = ").map(str::to_owned))
+        .unwrap();
+    let version = declared.trim_matches('"');
+    let readme = read("README.md");
+    assert!(
+        readme.contains(&format!("Rust {version}")),
+        "README.md names Rust {version}"
+    );
+    let script = read("scripts/test.sh");
+    assert!(
+        script.contains("rust-version"),
+        "scripts/test.sh checks with the oldest Rust where it is installed"
+    );
+}

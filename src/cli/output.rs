@@ -24,7 +24,7 @@ use super::{input, room, signals};
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
-    /// NumPy's, float32
+    /// `NumPy`'s, float32
     Npy,
     /// text, a row for each frame
     Csv,

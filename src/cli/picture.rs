@@ -14,7 +14,7 @@ pub(crate) fn png(out: impl Write, width: u32, height: u32, pixels: &[u8]) -> io
     writer.finish().map_err(io::Error::other)
 }
 
-/// How SVG becomes pixels: its letters are DejaVu Sans.
+/// How SVG becomes pixels: its letters are `DejaVu` Sans.
 pub(crate) fn svg_options() -> usvg::Options<'static> {
     let mut options = usvg::Options::default();
     let fonts = options.fontdb_mut();

@@ -16,7 +16,7 @@ use crate::segment::{ArcSegment, PolynomialSegment};
 /// Vector instructions that the twins can be compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum VectorWidth {
-    /// What the target always has: SSE2 on x86-64, NEON on AArch64.
+    /// What the target always has: SSE2 on x86-64, NEON on `AArch64`.
     Baseline,
     /// AVX2, eight lanes.
     Avx2,
@@ -26,6 +26,7 @@ pub enum VectorWidth {
 
 impl VectorWidth {
     /// Every width that this processor can run, narrowest first.
+    #[must_use]
     pub fn available() -> Vec<Self> {
         [Self::Baseline, Self::Avx2, Self::Avx512]
             .into_iter()

@@ -121,6 +121,7 @@ codes! {
 
 impl Code {
     /// The code with that name, in any case.
+    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL
             .iter()
@@ -129,6 +130,7 @@ impl Code {
     }
 
     /// Whether it refuses the input.
+    #[must_use]
     pub fn severity(self) -> Severity {
         if self.name().starts_with('W') {
             Severity::Warning

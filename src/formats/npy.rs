@@ -11,7 +11,7 @@ use crate::encoding::Encoding;
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum ComponentOrder {
-    /// `x y z w`, as in memory, glTF and SciPy.
+    /// `x y z w`, as in memory, glTF and `SciPy`.
     #[default]
     Xyzw,
     /// `w x y z`, as in `.dat` files.

@@ -57,6 +57,7 @@ pub enum OutputError {
 
 impl OutputError {
     /// Whether the reader of a pipe went away.
+    #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
     }
@@ -140,6 +141,7 @@ impl Output {
     }
 
     /// The temporary file, to remove when the process is stopped by a signal.
+    #[must_use]
     pub fn temporary_path(&self) -> Option<&Path> {
         match &self.writer {
             Sink::File { temporary, .. } => Some(temporary.get_ref().path()),
@@ -182,6 +184,7 @@ impl Output {
     }
 
     /// An error of writing to this output.
+    #[must_use]
     pub fn error(&self, source: io::Error) -> OutputError {
         OutputError::Write {
             path: self.path.clone(),

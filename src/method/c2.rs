@@ -11,7 +11,7 @@ use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
 use crate::tracks::Track;
 
-/// The curve of SciPy's `RotationSpline`: the rotation vector from each key is a cubic,
+/// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
 /// and the angular velocities at the keys are such that the angular acceleration is
 /// continuous. Every key moves all of the curve, less and less with distance.
 ///

@@ -31,6 +31,7 @@ pub struct Interpolation {
 
 impl Interpolation {
     /// What the kernels evaluate for it.
+    #[must_use]
     pub fn form(&self) -> Form {
         if self.is_by_formula() {
             Form::Polynomial

@@ -226,6 +226,7 @@ pub enum Keys {
 
 impl Method {
     /// How smooth it is, in words.
+    #[must_use]
     pub fn smoothness(&self) -> String {
         match (self.continuity, self.continuity_on_even_keys) {
             (any, even) if any == even => any.to_string(),
@@ -234,6 +235,7 @@ impl Method {
     }
 
     /// The method with that name.
+    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         METHODS.iter().copied().find(|method| method.name == name)
     }

@@ -59,11 +59,13 @@ impl Curve {
     /// The curve through (or near) `keys` at `times` (seconds), which carry nothing
     /// beside their rotations. Keys are taken as unit quaternions: normalised in f64. A
     /// track that [`Ends::Loop`] closes must repeat its first key at its end.
+    #[must_use]
     pub fn new(kind: Kind, path: Path, ends: Ends, times: &[f64], keys: &[Quat]) -> Self {
         Self::build(kind, ends, Track::new(path, times, keys))
     }
 
     /// The curve of a track of a set.
+    #[must_use]
     pub fn of(interpolation: &Interpolation, track: tracks::Track<'_>) -> Self {
         let kind = interpolation.method.reference;
         let path = match kind {
@@ -102,6 +104,7 @@ impl Curve {
 
     /// The rotation at a time in seconds; before the first key and after the last
     /// it holds the end values.
+    #[must_use]
     pub fn rotation(&self, time: f64) -> DQuat {
         let last = self.track.last();
         if last == 0 {
@@ -119,6 +122,7 @@ impl Curve {
 
     /// The angular velocity in the body frame, radians per second; zero outside the
     /// keys. At a key it is that of the later segment.
+    #[must_use]
     pub fn velocity(&self, time: f64) -> DVec3 {
         let Some((i, t)) = self.inside(time) else {
             return DVec3::ZERO;
@@ -136,6 +140,7 @@ impl Curve {
 
     /// The angular acceleration in the body frame, radians per second squared; zero
     /// outside the keys. At a key it is that of the later segment.
+    #[must_use]
     pub fn acceleration(&self, time: f64) -> DVec3 {
         let Some((i, t)) = self.inside(time) else {
             return DVec3::ZERO;
@@ -156,11 +161,13 @@ impl Curve {
 
     /// The angular velocity at parameter `t` of segment `i`; both sides of a key
     /// can be asked for.
+    #[must_use]
     pub fn segment_velocity(&self, i: usize, t: f64) -> DVec3 {
         self.segments[i].velocity(t) / self.track.step(i)
     }
 
     /// As [`Curve::segment_velocity`], the angular acceleration.
+    #[must_use]
     pub fn segment_acceleration(&self, i: usize, t: f64) -> DVec3 {
         self.segments[i].acceleration(t) / self.track.step(i).powi(2)
     }

@@ -64,6 +64,7 @@ pub(super) fn power(q: DQuat, s: f64) -> DQuat {
 
 /// Slerp, geometric: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`, `cos θ = a·b`
 /// (Shoemake 1985). The arc that the signs give; no shortest-path flip.
+#[must_use]
 pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     let chord = |q: DQuat| inner(q, q).sqrt();
     let angle = 2.0 * chord(b - a).atan2(chord(b + a));
@@ -76,32 +77,38 @@ pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
 }
 
 /// Slerp as `a (a⁻¹ b)^t`.
+#[must_use]
 pub fn slerp_from_start(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(a, power(multiply(invert(a), b), t))
 }
 
 /// Slerp as `(b a⁻¹)^t a`.
+#[must_use]
 pub fn slerp_from_start_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(power(multiply(b, invert(a)), t), a)
 }
 
 /// Slerp as `b (b⁻¹ a)^(1-t)`.
+#[must_use]
 pub fn slerp_from_end(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(b, power(multiply(invert(b), a), 1.0 - t))
 }
 
 /// Slerp as `(a b⁻¹)^(1-t) b`.
+#[must_use]
 pub fn slerp_from_end_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(power(multiply(a, invert(b)), 1.0 - t), b)
 }
 
 /// Spherical quadrangle: `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))` (Shoemake
 /// 1987); no shortest-path flip.
+#[must_use]
 pub fn squad([q0, s0, s1, q1]: [DQuat; 4], t: f64) -> DQuat {
     slerp(slerp(q0, q1, t), slerp(s0, s1, t), 2.0 * t * (1.0 - t))
 }
 
 /// Normalised linear interpolation; no shortest-path flip.
+#[must_use]
 pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     normalise(a * (1.0 - t) + b * t)
 }
@@ -109,6 +116,7 @@ pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
 /// The angle in radians (0 to pi) of the rotation between two rotations, accurate
 /// also when it is tiny. Neither needs to be exactly unit; `q` and `-q` are the
 /// same.
+#[must_use]
 pub fn angle_between(a: DQuat, b: DQuat) -> f64 {
     let (a, b) = (normalise(a), normalise(b));
     let (near, far) = ((a - b).length(), (a + b).length());

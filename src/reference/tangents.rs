@@ -28,7 +28,7 @@ impl Track {
         for (i, &key) in keys.iter().enumerate() {
             let flipped = i > 0 && inner(keys[i - 1], aligned[i - 1]) < 0.0;
             let turns = i > 0 && path == Path::Shortest && inner(keys[i - 1], key) < -SIGN_NOISE;
-            aligned.push(if flipped != turns { -key } else { key });
+            aligned.push(if flipped == turns { key } else { -key });
         }
         Self {
             times: times.to_vec(),

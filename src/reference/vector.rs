@@ -21,6 +21,7 @@ pub struct VectorCurve {
 
 impl VectorCurve {
     /// The vector at a time; before the first key and after the last the end values.
+    #[must_use]
     pub fn value(&self, time: f64) -> DVec3 {
         let last = self.keys.len() - 1;
         if time <= self.times[0] {

@@ -33,6 +33,7 @@ pub struct OutputVerification {
 
 impl OutputVerification {
     /// Whether all bits agree and the error is within its bound.
+    #[must_use]
     pub fn passes(&self) -> bool {
         self.differing == 0 && self.max_error <= self.error_bound
     }

@@ -21,7 +21,7 @@ pub fn vulkan_devices() -> Vec<Device> {
     devices
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// `SplitMix64` (Steele, Lea, Flood 2014).
 pub struct Random(pub u64);
 
 impl Random {

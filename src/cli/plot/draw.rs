@@ -15,7 +15,7 @@ use crate::cli::picture;
 type Area<'a, DB> = DrawingArea<DB, Shift>;
 type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// The name that people's own fonts go by in SVG; in PNG it is DejaVu Sans.
+/// The name that people's own fonts go by in SVG; in PNG it is `DejaVu` Sans.
 const FONT: &str = "sans-serif";
 /// Pixels of PNG for one of SVG.
 const PIXELS: u32 = 2;

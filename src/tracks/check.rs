@@ -1,0 +1,75 @@
+//! What a set trusts later, checked when keys come in.
+
+use glam::{DQuat, Quat};
+
+use super::TrackError;
+use crate::numeric::{canonical, to_f64, unit_f32};
+
+/// Norms further from 1 than this are refused by [`TrackSet::push`](super::TrackSet::push): such a key
+/// is more likely a mistake than a rotation.
+pub const NORM_TOLERANCE: f64 = 0.1;
+
+/// Seconds: later times are refused, as `.dat` files have it. The square of what two
+/// intervals have to each other must not overflow.
+pub(crate) const LATEST: f64 = f32::MAX as f64;
+
+/// Seconds between neighbouring keys: less is refused.
+pub(crate) const CLOSEST: f64 = f32::MIN_POSITIVE as f64;
+
+pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
+    if times.len() != keys {
+        return Err(TrackError::LengthMismatch {
+            track,
+            keys,
+            times: times.len(),
+        });
+    }
+    if times.is_empty() {
+        return Err(TrackError::Empty { track });
+    }
+    if let Some(key) = times.iter().position(|time| !time.is_finite()) {
+        return Err(TrackError::TimeNotFinite {
+            track,
+            key,
+            time: times[key],
+        });
+    }
+    if let Some(i) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        return Err(TrackError::TimeNotIncreasing {
+            track,
+            key: i + 1,
+            time: times[i + 1],
+            previous: times[i],
+        });
+    }
+    let far = times.iter().position(|time| time.abs() > LATEST);
+    let close = || {
+        times
+            .windows(2)
+            .position(|pair| pair[1] - pair[0] < CLOSEST)
+    };
+    match far.or_else(|| close().map(|first| first + 1)) {
+        Some(key) => Err(TrackError::TimeOutOfRange {
+            track,
+            key,
+            time: times[key],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// f32 rounding moves a unit quaternion's squared norm by at most 4 × 2^-24 or
+/// so; below this the key is kept as it is, so that loading is idempotent.
+pub(crate) const ROUNDING: f64 = 4.0e-7;
+
+pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
+    let exact: DQuat = to_f64(quat);
+    let norm = exact.length();
+    if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
+        return Err(TrackError::NotUnit { track, key, norm });
+    }
+    if (norm - 1.0).abs() <= ROUNDING {
+        return Ok(Quat::from_array(quat.to_array().map(canonical)));
+    }
+    Ok(unit_f32(exact))
+}
