@@ -13,6 +13,7 @@ use proptest::prelude::*;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use tumble::TrackSet;
 use tumble::formats::dat::{DatOptions, Limits, open_dat, read_dat, write_dat};
+use tumble::formats::times::read_times;
 use tumble::formats::{Code, Diagnostic, Severity};
 
 fn fixtures() -> Vec<PathBuf> {
@@ -147,6 +148,27 @@ fn limits_refuse_before_memory_runs_out() {
         read_dat("t", lines, &options).unwrap_err().code,
         Code::FileTooLong
     );
+}
+
+/// A disk that fails, at once or on the way, is a refusal with the system's reason.
+#[test]
+fn what_cannot_be_read_on_is_refused() {
+    struct Failing;
+    impl Read for Failing {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(io::Error::other("the disk is on fire"))
+        }
+    }
+    for start in ["", "# 1 1\n", "# 1 1\n0 1 0 0 0\n1 1 0"] {
+        let reader = BufReader::new(io::Cursor::new(start).chain(Failing));
+        let error = read_dat("t", reader, &DatOptions::default()).unwrap_err();
+        assert_eq!(error.code, Code::Open);
+        assert!(error.message.contains("the disk is on fire"), "{error}");
+        assert_eq!(
+            read_times("t", BufReader::new(Failing)).unwrap_err().code,
+            Code::Open
+        );
+    }
 }
 
 /// 65 536 boxes are allowed; a header alone must not cost what they would.

@@ -182,15 +182,6 @@ impl Output {
             }
         }
     }
-
-    /// An error of writing to this output.
-    #[must_use]
-    pub fn error(&self, source: io::Error) -> OutputError {
-        OutputError::Write {
-            path: self.path.clone(),
-            source,
-        }
-    }
 }
 
 impl Write for Output {
