@@ -33,6 +33,9 @@ impl Device {
     /// Every Vulkan device that can compute, fastest kind first. The CPU is always
     /// there and not listed.
     ///
+    /// The loader runs the drivers' code in this process: one that crashes as it is loaded
+    /// ends it. (The program `tumble` lets a child process load them first.)
+    ///
     /// # Errors
     /// When there is no Vulkan loader, or it fails.
     pub fn list() -> Result<Vec<Self>, VulkanError> {

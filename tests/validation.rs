@@ -214,11 +214,16 @@ fn no_layer_has_anything_to_say_of_the_program() {
     }
 }
 
-/// What the library does: the tests of this package that use Vulkan, once more.
+/// What the library does: the tests of this package that use Vulkan, once more; with
+/// `VALIDATE_ALL=1` also those that take longest.
 #[test]
 fn no_layer_has_anything_to_say_of_the_library() {
+    let mut tests = vec!["poses", "encoding", "transforms", "vulkan"];
+    if std::env::var_os("VALIDATE_ALL").is_some() {
+        tests.extend(["bit_identity", "stream", "motion", "outside", "accuracy"]);
+    }
     for layer in Layer::all() {
-        for test in ["poses", "encoding", "transforms", "vulkan"] {
+        for &test in &tests {
             let mut command = Command::new(env!("CARGO"));
             command.args(["test", "--quiet", "--test", test, "--", "--nocapture"]);
             let messages = layer.messages(&mut command);

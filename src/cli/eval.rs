@@ -182,7 +182,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             input: input::name(path),
             input_sha256: hash,
             options: options.clone(),
-            kernels_sha256: kernels_sha256(),
+            kernels_sha256: kernels_sha256().to_owned(),
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: device.label.clone(),
         })?;

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 use tumble::formats::output::Output;
@@ -51,8 +52,10 @@ impl Entry {
 }
 
 /// Of every kernel's SPIR-V, one behind the other.
-pub(crate) fn kernels_sha256() -> String {
-    digest::of_bytes(tumble::kernels().map(|(_, code)| code))
+pub(crate) fn kernels_sha256() -> &'static str {
+    static HASH: LazyLock<String> =
+        LazyLock::new(|| digest::of_bytes(tumble::kernels().map(|(_, code)| code)));
+    &HASH
 }
 
 /// A manifest's lines: the last one for each output, and how many are no entries.
@@ -182,7 +185,7 @@ mod tests {
             input: text("a.dat"),
             input_sha256: Some(text("1")),
             options: text("o"),
-            kernels_sha256: kernels_sha256(),
+            kernels_sha256: kernels_sha256().to_owned(),
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),
         }
