@@ -228,8 +228,7 @@ impl Engine {
             Backend::Vulkan(opened) => {
                 wanted.group_bytes = Some(opened.engine().group_bytes());
                 let data = ClipData::new(set, interpolation, wanted)?;
-                let mut spare = spare;
-                let buffers = opened.attempt(|engine| engine.upload(&data, spare.take()))?;
+                let buffers = opened.upload(&data, spare)?;
                 (data, Some(Arc::new(buffers)))
             }
         };

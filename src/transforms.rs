@@ -99,9 +99,7 @@ impl Engine {
         let data = ClipData::of_vectors(set, channel, method, interpolation, group_bytes);
         let buffers = match &*self.backend {
             Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(Arc::new(
-                opened.attempt(|engine| engine.upload(&data, None))?,
-            )),
+            Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, None)?)),
         };
         Ok(Clip {
             engine: self.clone(),

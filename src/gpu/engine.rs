@@ -237,18 +237,14 @@ impl VulkanEngine {
         smaller
     }
 
-    /// Gives back what is kept for the next evaluation, and halves the windows; false
-    /// when they are as small as they may be.
-    pub(super) fn shrink(&self) -> bool {
-        self.slots
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clear();
-        self.free
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clear();
-        self.halve_windows()
+    /// Gives back what is kept for the next evaluation; false when that is nothing.
+    pub(super) fn give_back(&self) -> bool {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = slots.len() + free.len();
+        slots.clear();
+        free.clear();
+        kept > 0
     }
 
     /// A buffer with these bytes, in the memory that kernels read fastest.

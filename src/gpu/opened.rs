@@ -4,11 +4,12 @@
 use std::sync::{Arc, PoisonError, RwLock};
 
 use super::canary::CanaryReport;
-use super::engine::{EvaluateError, VulkanEngine};
+use super::engine::{ClipBuffers, EvaluateError, VulkanEngine};
 use super::error::VulkanError;
 use super::physical::{DeviceInfo, PhysicalDevice};
 use crate::device::EngineOptions;
 use crate::engine::Error;
+use crate::prepare::ClipData;
 
 /// How often a lost device is opened again for one call.
 const REOPENINGS: usize = 3;
@@ -109,6 +110,21 @@ impl Opened {
         work(&self.engine())
     }
 
+    /// Brings a clip's segments to the device; where memory is short, with what is kept for
+    /// the next evaluation given back.
+    pub(crate) fn upload(
+        &self,
+        clip: &ClipData,
+        mut spare: Option<ClipBuffers>,
+    ) -> Result<ClipBuffers, VulkanError> {
+        self.attempt(|engine| match engine.upload(clip, spare.take()) {
+            Err(error) if error.is_out_of_memory() && engine.give_back() => {
+                engine.upload(clip, None)
+            }
+            done => done,
+        })
+    }
+
     /// As [`Opened::attempt`]; where memory runs out, in pieces half as large, down to
     /// 1 MiB.
     pub(crate) fn attempt_smaller<T, E: OfDevice>(
@@ -119,10 +135,17 @@ impl Opened {
             let done = self.attempt(&mut work);
             let short = |error: &E| error.vulkan().is_some_and(VulkanError::is_out_of_memory);
             match done {
-                Err(error) if short(&error) && self.engine().shrink() => {}
+                Err(error) if short(&error) && self.shrink() => {}
                 done => return done,
             }
         }
+    }
+
+    /// Whether there is anything to be gained from another attempt.
+    fn shrink(&self) -> bool {
+        let engine = self.engine();
+        engine.give_back();
+        engine.halve_windows()
     }
 
     /// Puts the device opened anew in the place of one that is lost; false for an
