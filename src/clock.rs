@@ -8,7 +8,6 @@
 use std::sync::Arc;
 
 use crate::frame_rate::FrameRate;
-use crate::tracks::LATEST;
 
 /// More samples of one track than this are refused.
 pub const MAX_FRAMES: u64 = 1 << 40;
@@ -62,14 +61,6 @@ pub enum FramesError {
         start: f64,
         /// End, seconds.
         end: f64,
-    },
-    /// A time is so far away that arithmetic would overflow.
-    #[error("time {index} is {time} s; times lie within ±{LATEST:e} s")]
-    TimeOutOfRange {
-        /// Its place among the times given.
-        index: usize,
-        /// The offending time, seconds.
-        time: f64,
     },
     /// A time is NaN or infinite.
     #[error("time {index} is {time}; times are finite numbers of seconds")]
@@ -167,19 +158,12 @@ impl Frames {
         tracks: usize,
         span: Option<(f64, f64)>,
     ) -> Result<Timeline, FramesError> {
-        let finite = |times: &[f64]| {
-            let wild = |time: &f64| !(-LATEST..=LATEST).contains(time);
-            match times.iter().position(wild) {
-                Some(index) if times[index].is_finite() => Err(FramesError::TimeOutOfRange {
-                    index,
-                    time: times[index],
-                }),
-                Some(index) => Err(FramesError::TimeNotFinite {
-                    index,
-                    time: times[index],
-                }),
-                None => Ok(()),
-            }
+        let finite = |times: &[f64]| match times.iter().position(|time| !time.is_finite()) {
+            Some(index) => Err(FramesError::TimeNotFinite {
+                index,
+                time: times[index],
+            }),
+            None => Ok(()),
         };
         let (first, last) = span.unwrap_or((0.0, 0.0));
         let (ticks, count) = match &self.request {

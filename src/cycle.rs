@@ -8,6 +8,7 @@ use rayon::iter::Either;
 use crate::clock::{Ticks, Timeline};
 use crate::frame_clock::FrameClock;
 use crate::frame_rate::FrameRate;
+use crate::tracks::LATEST;
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -142,9 +143,11 @@ impl Sides {
         if length <= 0.0 {
             return time;
         }
-        let (number, backwards) = self.copy((time - first) / length);
+        // Copies of times beyond those that keys may have cannot be counted.
+        let far = time.clamp(-LATEST, LATEST);
+        let (number, backwards) = self.copy((far - first) / length);
         // Far outside, the copies are narrower than the spaces between f64.
-        let into = ((time - first) - number * length).clamp(0.0, length);
+        let into = ((far - first) - number * length).clamp(0.0, length);
         match (number, backwards) {
             (0.0, _) => time,
             (_, true) => last - into,

@@ -10,6 +10,7 @@ use crate::cycle::Cycle;
 use crate::frame_clock::{Clock, CopyClock, FrameClock, in_frames};
 use crate::numeric::round_quat;
 use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::tracks::LATEST;
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +108,9 @@ impl Prepared {
         let t = match parameter {
             Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
             Parameter::Seconds { start, seconds } => {
-                (timeline.time(track, sample) - start) / seconds
+                // Further away than keys may be, a curve's powers overflow.
+                let time = timeline.time(track, sample).clamp(-LATEST, LATEST);
+                (time - start) / seconds
             }
         };
         round_quat(self.exact[index as usize].value(t))

@@ -226,3 +226,56 @@ fn two_keys_go_on_turning() {
         "velocities are not mirrored; hold, loop or extrapolate them"
     );
 }
+
+/// However far away, what is repeated or goes on stays a rotation. (Found by fuzzing.)
+#[test]
+fn times_beyond_counting_give_rotations() {
+    let set = set(3, 6);
+    let far = [1e16, 1e39, 1e300, f64::MAX];
+    let times: Vec<f64> = far.iter().flat_map(|&time| [time, -time]).collect();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for method in METHODS {
+        for outside in ALL {
+            let interpolation = Interpolation {
+                before: outside,
+                after: outside,
+                ..method.into()
+            };
+            let frames = Frames::at(times.clone());
+            let rotations = engine.evaluate(&set, interpolation, &frames).unwrap();
+            for q in rotations.as_quats() {
+                let norm = q.as_dquat().length();
+                assert!((norm - 1.0).abs() < 1e-6, "{method}, {outside:?}: {q}");
+            }
+        }
+    }
+}
+
+/// Turns of nearly 360° within a nanosecond, as authored: c2's iteration flees, and what it
+/// gives is its curve without the bends. (Found by fuzzing.)
+#[test]
+fn wild_turns_as_authored_give_rotations() {
+    let mut set = TrackSet::new();
+    let still = Quat::IDENTITY;
+    let turned = Quat::from_xyzw(-0.002_937_95, -0.003_484_545, -0.000_204_973, -0.999_989_6);
+    let times: Vec<f64> = [3.6]
+        .into_iter()
+        .chain((0..7).map(|i| 5.7 + f64::from(i) * 1e-9))
+        .collect();
+    let keys = [still, turned, still, still, still, still, still, still];
+    set.push("", &times, &keys).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for method in METHODS {
+        let interpolation = Interpolation {
+            path: method.path.unwrap_or(tumble::Path::AsAuthored),
+            ..method.into()
+        };
+        let rotations = engine
+            .evaluate(&set, interpolation, &Frames::fps(100))
+            .unwrap();
+        for q in rotations.as_quats() {
+            let norm = q.as_dquat().length();
+            assert!((norm - 1.0).abs() < 1e-6, "{method}: {q}");
+        }
+    }
+}

@@ -23,6 +23,12 @@ use crate::window::Window;
 /// share a short result among all threads.
 const TASK: usize = 16 * 1024;
 
+/// Tracks whose rows are made before they are written into frames: whole cache lines.
+const TILE: usize = 16;
+
+/// Frames that one task evaluates: fewer would cost as much as they do.
+const TASK_FRAMES: usize = 256;
+
 /// Keys that one turn of a task prepares: their segments stay in the cache.
 pub(crate) const TASK_KEYS: usize = 1024;
 
@@ -65,6 +71,14 @@ impl CpuEngine {
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
             return self.window(clip, timeline, window, output);
+        }
+        if window.layout == Layout::FrameMajor {
+            let tasks = frame_tasks(window, output);
+            return self.on_threads(|| {
+                tasks
+                    .into_par_iter()
+                    .try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
+            });
         }
         self.on_threads(|| {
             tasks(window, 1, output)
@@ -129,16 +143,36 @@ impl CpuEngine {
                     self.row(clip, track, timeline, window.samples.start, row)
                 }),
             Layout::FrameMajor => {
-                let mut row = vec![[0.0; 4]; samples];
-                for (place, track) in window.tracks.clone().enumerate() {
-                    self.row(clip, track, timeline, window.samples.start, &mut row)?;
-                    for (frame, &rotation) in output.chunks_mut(tracks).zip(&row) {
-                        frame[place] = rotation;
-                    }
-                }
-                Ok(())
+                let frames = output.chunks_mut(tracks).collect();
+                self.frames(clip, timeline, window, frames)
             }
         }
+    }
+
+    /// A window of which each frame lies in a place of its own, on this thread.
+    fn frames(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        mut frames: Vec<&mut [[f32; 4]]>,
+    ) -> Result<(), FramesError> {
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let mut rows = vec![[0.0; 4]; samples * TILE.min(tracks)];
+        for first in (0..tracks).step_by(TILE) {
+            let own = first..(first + TILE).min(tracks);
+            for (row, place) in rows.chunks_mut(samples).zip(own.clone()) {
+                let track = window.tracks.start + place;
+                self.row(clip, track, timeline, window.samples.start, row)?;
+            }
+            for (sample, frame) in frames.iter_mut().enumerate() {
+                let column = rows[sample..].iter().step_by(samples);
+                for (place, rotation) in frame[own.clone()].iter_mut().zip(column) {
+                    *place = *rotation;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The samples of one track from `first` on.
@@ -344,6 +378,42 @@ pub(crate) fn is_sampled(
     arcs && interpolation.sides() == Sides::default() && few
 }
 
+/// A window of frames cut into tasks, each some frames of some tracks, with their places.
+fn frame_tasks<'a>(
+    window: &Window,
+    output: &'a mut [[f32; 4]],
+) -> Vec<(Window, Vec<&'a mut [[f32; 4]]>)> {
+    let tracks = window.tracks.len();
+    let frames_each = TASK_FRAMES.min(window.samples.len());
+    let tracks_each = (TASK / frames_each).max(TILE);
+    let mut all = Vec::new();
+    let blocks = output.chunks_mut(frames_each * tracks);
+    for (block, first) in blocks.zip(window.samples.clone().step_by(frames_each)) {
+        let samples = first..first + block.len() / tracks;
+        let starts = window.tracks.clone().step_by(tracks_each);
+        let of_block = all.len();
+        all.extend(starts.map(|start| {
+            let tracks = start..(start + tracks_each).min(window.tracks.end);
+            let window = Window {
+                start: 0,
+                tracks,
+                samples: samples.clone(),
+                layout: Layout::FrameMajor,
+            };
+            (window, Vec::with_capacity(samples.len()))
+        }));
+        for frame in block.chunks_mut(tracks) {
+            for (task, piece) in all[of_block..]
+                .iter_mut()
+                .zip(frame.chunks_mut(tracks_each))
+            {
+                task.1.push(piece);
+            }
+        }
+    }
+    all
+}
+
 /// A window cut into tasks, each with its own part of the output, which has `each`
 /// elements for a rotation.
 fn tasks<'a, T>(
@@ -356,5 +426,12 @@ fn tasks<'a, T>(
         output = others;
         (window, own)
     };
-    window.cut(TASK).into_iter().map(with_output).collect()
+    let limit = match window.layout {
+        Layout::TrackMajor => TASK,
+        Layout::FrameMajor => {
+            let share = window.samples.len() / (4 * rayon::current_num_threads());
+            TASK.max(share.min(TASK_FRAMES / 4) * window.tracks.len())
+        }
+    };
+    window.cut(limit).into_iter().map(with_output).collect()
 }
