@@ -74,6 +74,7 @@ const ARGUMENTS: &str = "
 3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
 4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
 2 | eval - --times - -o o.npy                    | standard input cannot be both
+2 | verify a.dat --fps 1e11                      | of memory that are free
 2 | verify a.dat -m none                         | catmull-rom
 4 | verify none.dat                              | none.dat
 3 | info a.dat none.dat                          | none.dat
@@ -417,4 +418,45 @@ fn pipes_standard_input_and_files_that_change() {
     let run = finish(child.wait_with_output().unwrap());
     assert_eq!(run.code, 4, "{}", run.words);
     assert!(run.words.contains("error[E003]"), "{}", run.words);
+}
+
+/// Inputs that no file in a clone can stand for.
+#[cfg(unix)]
+#[test]
+fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    let place = sample_folder();
+    let at = place.path();
+    symlink(at.join("loop2.dat"), at.join("loop1.dat")).unwrap();
+    symlink(at.join("loop1.dat"), at.join("loop2.dat")).unwrap();
+    let _listener = std::os::unix::net::UnixListener::bind(at.join("socket.dat")).unwrap();
+    // More than 64 MiB of one line.
+    let mut long = b"# 1 1\n0 1 0 0 0".to_vec();
+    long.resize(65 << 20, b' ');
+    fs::write(at.join("long.dat"), long).unwrap();
+    fs::copy(at.join("a.dat"), at.join("secret.dat")).unwrap();
+    fs::set_permissions(at.join("secret.dat"), fs::Permissions::from_mode(0o000)).unwrap();
+    let is_root = fs::read(at.join("secret.dat")).is_ok();
+    fs::set_permissions(at, fs::Permissions::from_mode(0o777)).unwrap();
+    for (name, code, words) in [
+        ("loop1.dat", "E001", "symbolic links"),
+        ("socket.dat", "E002", "is a socket"),
+        ("long.dat", "E007", "longer than 67108864 bytes"),
+        ("secret.dat", "E001", "Permission denied"),
+    ] {
+        let mut command = command(at, &["eval", name, "-o", "o.npy", "--device", "cpu"]);
+        if is_root {
+            std::os::unix::process::CommandExt::uid(&mut command, 65_534);
+        }
+        let run = finish(command.output().unwrap());
+        assert_eq!(run.code, 4, "{}", run.words);
+        assert!(run.words.contains(words), "{}", run.words);
+        assert!(
+            run.words.contains(&format!("error[{code}]")),
+            "{}",
+            run.words
+        );
+        assert!(!at.join("o.npy").exists());
+    }
 }
