@@ -13,7 +13,7 @@ mod vectors;
 use std::ops::Range;
 
 pub use check::NORM_TOLERANCE;
-pub(crate) use check::{CLOSEST, LATEST, ROUNDING};
+pub(crate) use check::{LATEST, ROUNDING};
 use check::{check_times, unit_key};
 pub use error::TrackError;
 use glam::{DVec3, Quat};

@@ -289,10 +289,10 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
         let mut times = Vec::new();
         let mut keys = Vec::new();
         for _ in 0..count {
-            time += if numbers.byte() < 250 {
-                f64::from(numbers.byte()) / 64.0 + 1e-9
-            } else {
-                numbers.float()
+            time += match numbers.byte() {
+                0..240 => f64::from(numbers.byte()) / 64.0 + 1e-9,
+                240..248 => 10f64.powi(-i32::from(numbers.byte())),
+                _ => numbers.float(),
             };
             times.push(time);
             let wild = numbers.byte() > 250;

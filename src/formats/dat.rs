@@ -154,19 +154,40 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
     Ok(())
 }
 
-/// The next number of a line, and its column.
-fn read_number<'a, R: BufRead>(
-    lines: &mut Lines<R>,
-    numbers: &mut impl Iterator<Item = (u64, &'a str)>,
-) -> Result<(u64, f64), Diagnostic> {
-    // The columns were counted before.
-    let (place, token) = numbers.next().unwrap_or((1, ""));
-    let number = number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
-    if number.vanished {
-        let message = format!("`{token}` is too small for f32; it becomes 0");
-        lines.warn(place, Code::Tiny, message);
+/// A line's numbers, one by one.
+struct Row<'a, T> {
+    tokens: T,
+    line: &'a str,
+    /// Column and digits of the last number, and the fewest digits of those before it.
+    last: (u64, usize),
+    fewest_digits: usize,
+}
+
+impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
+    fn new(line: &'a str, tokens: T, fewest_digits: usize) -> Self {
+        Self {
+            tokens,
+            line,
+            last: (1, usize::MAX),
+            fewest_digits,
+        }
     }
-    Ok((place, number.value))
+
+    /// The next number, and its column.
+    fn next<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(u64, f64), Diagnostic> {
+        let Some((place, token)) = self.tokens.next() else {
+            return Err(lines.refuse(self.line.len() as u64, Code::Columns, String::new()));
+        };
+        let number =
+            number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
+        if number.vanished {
+            let message = format!("`{token}` is too small for f32; it becomes 0");
+            lines.warn(place, Code::Tiny, message);
+        }
+        self.fewest_digits = self.fewest_digits.min(self.last.1);
+        self.last = (place, number.digits);
+        Ok((place, number.value))
+    }
 }
 
 /// What was read so far.
@@ -201,19 +222,40 @@ impl Keys {
             let message = format!("line {blank} is blank; it is skipped");
             lines.warn(1, Code::BlankLine, message);
         }
-        self.check_columns(lines, line)?;
-        let mut numbers = tokens(line);
-        let (_, time) = read_number(lines, &mut numbers)?;
+        self.read_numbers(lines, line).or_else(|error| {
+            // What is wrong with the line as a whole explains more.
+            self.check_columns(lines, line)?;
+            Err(error)
+        })
+    }
+
+    fn read_numbers<R: BufRead>(
+        &mut self,
+        lines: &mut Lines<R>,
+        line: &str,
+    ) -> Result<(), Diagnostic> {
+        let mut row = Row::new(line, tokens(line), self.fewest_digits);
+        let (_, time) = row.next(lines)?;
         self.check_time(lines, time)?;
         for index in 0..self.rows.width() {
-            let (place, w) = read_number(lines, &mut numbers)?;
-            let (_, x) = read_number(lines, &mut numbers)?;
-            let (_, y) = read_number(lines, &mut numbers)?;
-            let (_, z) = read_number(lines, &mut numbers)?;
+            let (place, w) = row.next(lines)?;
+            let (_, x) = row.next(lines)?;
+            let (_, y) = row.next(lines)?;
+            let (_, z) = row.next(lines)?;
             self.push(lines, place, index, DQuat::from_xyzw(x, y, z, w))?;
         }
+        if row.tokens.next().is_some() {
+            self.check_columns(lines, line)?;
+        }
         self.times.push(time);
-        self.check_last_number(lines, line);
+        // A file that stops in the middle of its last number reads as a whole one.
+        let (place, digits) = row.last;
+        if !lines.ended && digits < row.fewest_digits {
+            let message = "the file ends in the middle of a line, and its last number is shorter \
+                           than all others; is it cut?";
+            lines.warn(place, Code::MaybeCut, message);
+        }
+        self.fewest_digits = row.fewest_digits.min(digits);
         Ok(())
     }
 
@@ -306,22 +348,6 @@ impl Keys {
         }
         self.rows.push(unit);
         Ok(())
-    }
-
-    /// A file that stops in the middle of its last number reads as a whole one.
-    fn check_last_number<R: BufRead>(&mut self, lines: &mut Lines<R>, line: &str) {
-        let digits = |token: &str| token.bytes().filter(u8::is_ascii_digit).count();
-        let mut last = (1, usize::MAX);
-        for (column, token) in tokens(line) {
-            self.fewest_digits = self.fewest_digits.min(last.1);
-            last = (column, digits(token));
-        }
-        if !lines.ended && last.1 < self.fewest_digits {
-            let message = "the file ends in the middle of a line, and its last number is shorter \
-                           than all others; is it cut?";
-            lines.warn(last.0, Code::MaybeCut, message);
-        }
-        self.fewest_digits = self.fewest_digits.min(last.1);
     }
 
     fn finish<R: BufRead>(

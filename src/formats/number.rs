@@ -12,6 +12,8 @@ pub(super) struct Number {
     pub(super) value: f64,
     /// It was not 0 but is too small for f32.
     pub(super) vanished: bool,
+    /// Digits that it is written with.
+    pub(super) digits: usize,
 }
 
 /// Why a token is no number: code and message.
@@ -27,9 +29,7 @@ pub(super) fn parse(token: &str) -> Result<Number, Refusal> {
         );
         return Err((Code::TokenTooLong, message));
     }
-    if !is_decimal(token) {
-        return Err(refuse(token));
-    }
+    let Decimal { digits, zero } = decimal(token).ok_or_else(|| refuse(token))?;
     // Rust's parser takes exactly this grammar, correctly rounded.
     let value: f64 = token.parse().map_err(|_| refuse(token))?;
     if value.abs() > f64::from(f32::MAX) {
@@ -37,31 +37,60 @@ pub(super) fn parse(token: &str) -> Result<Number, Refusal> {
             format!("`{token}` is too large; the largest f32 is 3.4e38, check the exponent");
         return Err((Code::TooLarge, message));
     }
-    let written_zero = !mantissa(token).bytes().any(|b| (b'1'..=b'9').contains(&b));
-    let vanished = value.abs() < f64::from(f32::MIN_POSITIVE) && !written_zero;
+    let vanished = value.abs() < f64::from(f32::MIN_POSITIVE) && !zero;
     let value = if vanished { 0.0 } else { value };
-    Ok(Number { value, vanished })
+    Ok(Number {
+        value,
+        vanished,
+        digits,
+    })
 }
 
-fn mantissa(token: &str) -> &str {
-    token.split(['e', 'E']).next().unwrap_or(token)
+/// What a decimal number is made of.
+#[derive(Clone, Copy)]
+struct Decimal {
+    /// All of them, the exponent's too.
+    digits: usize,
+    /// No digit of the mantissa is another than 0.
+    zero: bool,
 }
 
 /// `[+-] digits [. digits] [e [+-] digits]`, with a digit on either side of the
-/// point.
+/// point; nothing for what is no such number.
+fn decimal(token: &str) -> Option<Decimal> {
+    let signed = |bytes: &[u8], at: usize| usize::from(matches!(bytes.get(at), Some(b'+' | b'-')));
+    let bytes = token.as_bytes();
+    let mut at = signed(bytes, 0);
+    let (mut digits, mut zero, mut point) = (0, true, false);
+    while let Some(&byte) = bytes.get(at) {
+        match byte {
+            b'0'..=b'9' => {
+                digits += 1;
+                zero &= byte == b'0';
+            }
+            b'.' if !point => point = true,
+            _ => break,
+        }
+        at += 1;
+    }
+    if digits == 0 {
+        return None;
+    }
+    if let Some(b'e' | b'E') = bytes.get(at) {
+        at += 1;
+        at += signed(bytes, at);
+        let exponent = &bytes[at..];
+        if exponent.is_empty() || !exponent.iter().all(u8::is_ascii_digit) {
+            return None;
+        }
+        digits += exponent.len();
+        at = bytes.len();
+    }
+    (at == bytes.len()).then_some(Decimal { digits, zero })
+}
+
 fn is_decimal(token: &str) -> bool {
-    let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
-    let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
-        Some((mantissa, exponent)) => (mantissa, Some(exponent)),
-        None => (unsigned, None),
-    };
-    let digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
-    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-    let exponent_fits = exponent.is_none_or(|exponent| {
-        let unsigned = exponent.strip_prefix(['+', '-']).unwrap_or(exponent);
-        !unsigned.is_empty() && digits(unsigned)
-    });
-    digits(whole) && digits(fraction) && !(whole.is_empty() && fraction.is_empty()) && exponent_fits
+    decimal(token).is_some()
 }
 
 fn refuse(token: &str) -> Refusal {
@@ -121,11 +150,8 @@ mod tests {
             assert_eq!((number.value, number.vanished), (value, false), "{token}");
         }
         for token in ["1e-400", "1e-39", "-1.4e-45"] {
-            let vanished = Number {
-                value: 0.0,
-                vanished: true,
-            };
-            assert_eq!(parse(token), Ok(vanished), "{token}");
+            let number = parse(token).unwrap();
+            assert_eq!((number.value, number.vanished), (0.0, true), "{token}");
         }
     }
 

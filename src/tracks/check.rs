@@ -13,9 +13,6 @@ pub const NORM_TOLERANCE: f64 = 0.1;
 /// intervals have to each other must not overflow.
 pub(crate) const LATEST: f64 = f32::MAX as f64;
 
-/// Seconds between neighbouring keys: less is refused.
-pub(crate) const CLOSEST: f64 = f32::MIN_POSITIVE as f64;
-
 pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
     if times.len() != keys {
         return Err(TrackError::LengthMismatch {
@@ -42,13 +39,7 @@ pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
             previous: times[i],
         });
     }
-    let far = times.iter().position(|time| time.abs() > LATEST);
-    let close = || {
-        times
-            .windows(2)
-            .position(|pair| pair[1] - pair[0] < CLOSEST)
-    };
-    match far.or_else(|| close().map(|first| first + 1)) {
+    match times.iter().position(|time| time.abs() > LATEST) {
         Some(key) => Err(TrackError::TimeOutOfRange {
             track,
             key,

@@ -1,6 +1,6 @@
 //! Why a set refuses keys.
 
-use super::{CLOSEST, LATEST, NORM_TOLERANCE};
+use super::{LATEST, NORM_TOLERANCE};
 
 /// Why keys were refused. Places count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -32,10 +32,8 @@ pub enum TrackError {
         /// The offending time, seconds.
         time: f64,
     },
-    /// A time is so far away, or so close to the one before, that arithmetic would overflow.
-    #[error(
-        "track {track}, key {key}: time {time} s; times lie within ±{LATEST:e} s, and at least {CLOSEST:e} s apart"
-    )]
+    /// A time is so far away that arithmetic would overflow.
+    #[error("track {track}, key {key}: time {time} s; times lie within ±{LATEST:e} s")]
     TimeOutOfRange {
         /// The track's place in the set.
         track: usize,
