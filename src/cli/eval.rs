@@ -6,18 +6,18 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use tumble::formats::npy::ComponentOrder;
 use tumble::formats::poses::{Poses, TRANSFORM, WORLD};
-use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method};
+use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method, TrackSet};
 
+use super::batch::{Batch, Evaluated};
 use super::device::{DeviceArguments, Opened};
 use super::exit::{Failure, for_each};
 use super::input::Inputs;
 use super::interpolation::{Manner, method};
-use super::manifest::{Entry, kernels_sha256};
 use super::output::{Format, Plan, ResultShape, Target, Wish};
 use super::place::Written;
 use super::time::{Samples, Sampling};
 use super::what::{PoseKind, What};
-use super::{digest, input, output, room, signals, words};
+use super::{digest, input, output, room, words};
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -148,54 +148,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut device = arguments.device.open()?;
     let jobs: Vec<(PathBuf, Target)> = inputs.paths().into_iter().zip(targets).collect();
-    let Some(mut manifest) = manifest else {
-        return for_each(&jobs, |(path, target)| {
-            let (written, told) = arguments.evaluate(&mut device, &samples, path, target)?;
-            written.commit()?;
-            words::note(&told);
-            Ok(())
-        });
-    };
-    let options = arguments.options(&samples);
-    let mut skipped = 0;
-    let outcome = for_each(&jobs, |(path, target)| {
-        if let Some(stop) = signals::stopped() {
-            return Err(stop);
-        }
-        // What cannot be read is told about when it is opened.
-        let hash = match input::is_standard(path) {
-            true => None,
-            false => digest::of_file(path).ok(),
+    let mut evaluate =
+        |path: &Path, set, target: &_| arguments.evaluate(&mut device, &samples, path, set, target);
+    if let Some(manifest) = manifest {
+        let batch = Batch {
+            inputs: &arguments.inputs,
+            options: arguments.options(&samples),
+            resume: arguments.resume,
         };
-        if let (true, Some(hash)) = (arguments.resume, &hash)
-            && manifest.is_done(target.name(), hash, &options)
-        {
-            skipped += 1;
-            return Ok(());
-        }
-        let (mut written, told) = arguments.evaluate(&mut device, &samples, path, target)?;
-        let digest = written.digest.take().unwrap_or_default();
-        manifest.add(Entry {
-            output: target.name().to_owned(),
-            output_bytes: digest.bytes(),
-            output_sha256: digest.finish(),
-            input: input::name(path),
-            input_sha256: hash,
-            options: options.clone(),
-            kernels_sha256: kernels_sha256().to_owned(),
-            tumble: env!("CARGO_PKG_VERSION").to_owned(),
-            device: device.label.clone(),
-        })?;
-        written.commit()?;
-        words::note(&told);
-        Ok(())
-    });
-    if skipped > 0 {
-        let results = words::count(skipped, "result");
-        words::note(&format!("{results} skipped: done before, and whole"));
+        return batch.run(&jobs, manifest, evaluate);
     }
-    manifest.finish()?;
-    outcome
+    for_each(&jobs, |(path, target)| {
+        let set = arguments.inputs.load(path)?;
+        let evaluated = evaluate(path, set, target)?;
+        evaluated.written.commit()?;
+        words::note(&evaluated.told);
+        Ok(())
+    })
 }
 
 impl Arguments {
@@ -220,16 +189,16 @@ impl Arguments {
         )
     }
 
-    /// One input, from its file to its result.
+    /// One input, from its keys to its result.
     fn evaluate(
         &self,
         device: &mut Opened,
         samples: &Samples,
         path: &Path,
+        set: TrackSet,
         target: &Target,
-    ) -> Result<(Written, String), Failure> {
+    ) -> Result<Evaluated, Failure> {
         let name = input::name(path);
-        let set = self.inputs.load(path)?;
         let frames = samples.of(&set, &name);
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
@@ -264,7 +233,7 @@ impl Arguments {
         let written = target.write_rotations(&result, |sink| {
             device.stream(&set, interpolation, &frames, layout, sink)
         })?;
-        Ok((written, self.told(device, &result, target, started)))
+        Ok(self.evaluated(written, device, &result, target, started))
     }
 
     /// Whole poses, `[frame][track]`: of the boxes of a chain, each of which hangs at the
@@ -276,7 +245,7 @@ impl Arguments {
         frames: &Frames,
         kind: PoseKind,
         target: &Target,
-    ) -> Result<(Written, String), Failure> {
+    ) -> Result<Evaluated, Failure> {
         let ResultShape {
             name,
             set,
@@ -336,17 +305,18 @@ impl Arguments {
             Format::Csv => poses.write_csv(out),
             Format::Npy => poses.write_npy(out),
         })?;
-        Ok((written, self.told(device, result, target, started)))
+        Ok(self.evaluated(written, device, result, target, started))
     }
 
-    fn told(
+    fn evaluated(
         &self,
+        written: Written,
         device: &Opened,
         result: &ResultShape<'_>,
         target: &Target,
         started: Instant,
-    ) -> String {
-        format!(
+    ) -> Evaluated {
+        let told = format!(
             "{}: {} × {}, {}, on {} in {} → {target}",
             result.name,
             words::count(result.set.track_count(), "track"),
@@ -354,6 +324,11 @@ impl Arguments {
             self.method,
             device.label,
             words::duration(started.elapsed()),
-        )
+        );
+        Evaluated {
+            written,
+            device: device.label.clone(),
+            told,
+        }
     }
 }

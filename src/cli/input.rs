@@ -100,6 +100,11 @@ impl Inputs {
 
     /// Reads a keyframe file and hands over its warnings.
     pub(crate) fn load_quietly(&self, path: &Path) -> Result<(TrackSet, Vec<Diagnostic>), Failure> {
+        busy(&format!("reading {}", name(path)), || self.read(path))
+    }
+
+    /// As [`Inputs::load_quietly`], without a word of how far it is.
+    pub(crate) fn read(&self, path: &Path) -> Result<(TrackSet, Vec<Diagnostic>), Failure> {
         let limits = Limits {
             file: self.max_size,
             ..Limits::default()
@@ -108,10 +113,7 @@ impl Inputs {
             limits,
             pipes: self.pipes,
         };
-        let loaded = busy(&format!("reading {}", name(path)), || {
-            open_dat(path, &options)
-        });
-        let loaded = loaded.map_err(|diagnostic| {
+        let loaded = open_dat(path, &options).map_err(|diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",
                 Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
 use tumble::formats::output::Output;
@@ -87,7 +87,8 @@ impl Lines {
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
-    entries: BTreeMap<String, Entry>,
+    previous: Arc<BTreeMap<String, Entry>>,
+    added: BTreeMap<String, Entry>,
     /// The file, to whose end lines are added; locked.
     journal: File,
 }
@@ -122,23 +123,23 @@ impl Manifest {
         }
         Ok(Self {
             folder: folder.to_owned(),
-            entries: Lines::parse(&bytes[..whole]).entries,
+            previous: Arc::new(Lines::parse(&bytes[..whole]).entries),
+            added: BTreeMap::new(),
             journal,
         })
     }
 
     /// Whether the manifest names that output, which is then not a stranger's.
     pub(crate) fn knows(&self, output: &str) -> bool {
-        self.entries.contains_key(output)
+        self.previous.contains_key(output)
     }
 
-    /// Whether the output is there, whole, and the result of the same request.
-    pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
-        self.entries.get(output).is_some_and(|entry| {
-            entry.is_made_from(input_sha256, options)
-                && digest::of_file(&self.folder.join(output))
-                    .is_ok_and(|hash| hash == entry.output_sha256)
-        })
+    /// What it said when it was opened.
+    pub(crate) fn previous(&self) -> Previous {
+        Previous {
+            folder: self.folder.clone(),
+            entries: Arc::clone(&self.previous),
+        }
     }
 
     /// Adds a line, in one piece.
@@ -147,7 +148,7 @@ impl Manifest {
         let written = self.journal.write_all(line.as_bytes());
         let synced = written.and_then(|()| self.journal.sync_data());
         synced.map_err(|error| self.failed(&error))?;
-        self.entries.insert(entry.output.clone(), entry);
+        self.added.insert(entry.output.clone(), entry);
         Ok(())
     }
 
@@ -156,7 +157,9 @@ impl Manifest {
         let path = self.folder.join(NAME);
         let mut output =
             Output::create(&path, true, &[]).map_err(|error| Failure::output(&error))?;
-        for entry in self.entries.values() {
+        let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
+        entries.extend(&self.added);
+        for entry in entries.into_values() {
             let written = output.write_all(line(entry).as_bytes());
             written.map_err(|error| self.failed(&error))?;
         }
@@ -165,6 +168,23 @@ impl Manifest {
 
     fn failed(&self, error: &io::Error) -> Failure {
         Failure::writing(&self.folder.join(NAME).display().to_string(), error)
+    }
+}
+
+/// What a manifest said before the batch.
+pub(crate) struct Previous {
+    folder: PathBuf,
+    entries: Arc<BTreeMap<String, Entry>>,
+}
+
+impl Previous {
+    /// Whether the output is there, whole, and the result of the same request.
+    pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
+        self.entries.get(output).is_some_and(|entry| {
+            entry.is_made_from(input_sha256, options)
+                && digest::of_file(&self.folder.join(output))
+                    .is_ok_and(|hash| hash == entry.output_sha256)
+        })
     }
 }
 
@@ -208,7 +228,7 @@ mod tests {
         bytes.truncate(bytes.len() - 5);
         std::fs::write(&path, &bytes).unwrap();
         let mut manifest = Manifest::open(place.path()).unwrap();
-        assert_eq!(manifest.entries["b"].output_sha256, "1");
+        assert_eq!(manifest.previous["b"].output_sha256, "1");
         manifest.add(entry("b", "4")).unwrap();
         manifest.finish().unwrap();
         let ordered = line(&entry("a", "2")) + &line(&entry("b", "4"));
@@ -221,6 +241,8 @@ mod tests {
         let mut manifest = Manifest::open(place.path()).unwrap();
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
+        manifest.finish().unwrap();
+        let manifest = Manifest::open(place.path()).unwrap().previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");
         std::fs::write(place.path().join("a"), "abc").unwrap();
         assert!(manifest.is_done("a", "1", "o"));

@@ -3,6 +3,7 @@
 //! Data goes to standard output and words to standard error; [`exit`] says what
 //! the exit codes mean.
 
+mod batch;
 mod bench;
 mod check;
 mod colours;
