@@ -263,7 +263,13 @@ impl Submission {
         };
         let raw = &self.device.raw;
         let fences = [self.fence];
-        let timeout = TIMEOUT_SECONDS * 1_000_000_000;
+        // A device that has hung is not waited for again.
+        let seconds = if self.device.may_destroy() {
+            TIMEOUT_SECONDS
+        } else {
+            0
+        };
+        let timeout = seconds * 1_000_000_000;
         // SAFETY: the fence belongs to this device.
         match unsafe { raw.wait_for_fences(&fences, true, timeout) } {
             Err(vk::Result::TIMEOUT) => {
