@@ -38,11 +38,16 @@ struct Loader {
 
 /// A library that `cargo test` has built among the examples.
 fn example(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
+    let profile = if folder.ends_with("release") {
+        "release"
+    } else {
+        "dev"
+    };
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--example", name])
+        .args(["build", "--quiet", "--example", name, "--profile", profile])
         .status();
     assert!(built.unwrap().success(), "the example {name} builds");
-    let folder = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
     folder.join(format!("examples/lib{name}.so"))
 }
 
