@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use program::{Run, command, finish, sample_folder, succeed};
 use rayon::prelude::*;
-use support::vulkan_devices;
+use support::{lavapipe, vulkan_devices};
 
 const OUT_OF_HOST_MEMORY: i32 = -1;
 const OUT_OF_DEVICE_MEMORY: i32 = -2;
@@ -96,13 +96,6 @@ impl Loader {
         );
         (run, Log::new(&fs::read_to_string(log).unwrap_or_default()))
     }
-}
-
-/// Mesa's software driver, by its manifest.
-fn lavapipe() -> Option<PathBuf> {
-    let manifests = fs::read_dir("/usr/share/vulkan/icd.d").ok()?;
-    let mut paths = manifests.map(|entry| entry.unwrap().path());
-    paths.find(|path| path.to_string_lossy().contains("/lvp_icd"))
 }
 
 /// What the loader saw.

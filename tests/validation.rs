@@ -11,13 +11,13 @@ mod program;
 mod support;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use application::Application;
 use ash::vk;
 use program::sample_folder;
-use support::vulkan_devices;
+use support::{lavapipe, vulkan_devices};
 
 const CHROMIUM: &str = "/usr/lib/chromium/libVkLayer_khronos_validation.so";
 
@@ -26,6 +26,8 @@ struct Layer {
     name: &'static str,
     folder: tempfile::TempDir,
     own_manifest: bool,
+    /// The one driver to run with; else all there are.
+    driver: Option<PathBuf>,
     planted: &'static [(&'static str, &'static str)],
 }
 
@@ -60,6 +62,7 @@ impl Layer {
             name: "the system's layer",
             folder: tempfile::tempdir().unwrap(),
             own_manifest: false,
+            driver: None,
             planted: &[CORE, OLD_SYNCHRONIZATION],
         };
         layer.settings(&["enables = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT"]);
@@ -68,7 +71,7 @@ impl Layer {
 
     /// Chromium's, with core and synchronization checks, or with those on the device.
     fn chromium(on_device: bool) -> Option<Self> {
-        if !Path::new(CHROMIUM).exists() {
+        if !Path::new(CHROMIUM).exists() || on_device && lavapipe().is_none() {
             return None;
         }
         let (name, planted): (_, &[_]) = match on_device {
@@ -79,6 +82,8 @@ impl Layer {
             name,
             folder: tempfile::tempdir().unwrap(),
             own_manifest: true,
+            // Checks on the device need buffer addresses, which SwiftShader has not.
+            driver: on_device.then(lavapipe).flatten(),
             planted,
         };
         // What it says of its own settings is no fault.
@@ -120,6 +125,11 @@ impl Layer {
             .env("VK_LAYER_SETTINGS_PATH", self.folder.path());
         if self.own_manifest {
             command.env("VK_LAYER_PATH", self.folder.path());
+        }
+        if let Some(driver) = &self.driver {
+            command
+                .env("VK_DRIVER_FILES", driver)
+                .env_remove("VK_ADD_DRIVER_FILES");
         }
         let output = command.output().unwrap();
         let text = String::from_utf8_lossy(&output.stdout);

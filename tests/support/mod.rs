@@ -21,6 +21,13 @@ pub fn vulkan_devices() -> Vec<Device> {
     devices
 }
 
+/// Mesa's software driver, by its manifest.
+pub fn lavapipe() -> Option<std::path::PathBuf> {
+    let manifests = std::fs::read_dir("/usr/share/vulkan/icd.d").ok()?;
+    let mut paths = manifests.map(|entry| entry.unwrap().path());
+    paths.find(|path| path.to_string_lossy().contains("/lvp_icd"))
+}
+
 /// `SplitMix64` (Steele, Lea, Flood 2014).
 pub struct Random(pub u64);
 
