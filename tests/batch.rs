@@ -159,6 +159,14 @@ fn resuming_does_not_replace_what_no_manifest_names() {
     let resumed = run(at, &["eval", "a.dat", "b.dat", "-o", "out", "--resume"]);
     assert_eq!(resumed.code, 2, "{}", resumed.words);
     assert_eq!(fs::read(at.join("out/b.npy")).unwrap(), b"mine");
+    assert_eq!(
+        names(&at.join("out")),
+        ["b.npy"],
+        "a refusal leaves nothing"
+    );
+    let failed = run(at, &["eval", "bad.dat", "none.dat", "-o", "failed"]);
+    assert_eq!(failed.code, 4, "{}", failed.words);
+    assert_eq!(names(&at.join("failed")), Vec::<String>::new());
     let single = run(at, &["eval", "a.dat", "-o", "o.npy", "--resume"]);
     assert_eq!(single.code, 2, "{}", single.words);
 }

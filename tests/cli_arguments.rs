@@ -61,7 +61,6 @@ const ARGUMENTS: &str = "
 4 | check none.jsonl                             | none.jsonl
 4 | check a.dat                                  | is no manifest
 2 | eval a.dat -o o.npy --device vulcan          | vulkan
-2 | eval a.dat -o o.npy --fps 1e9                | 64.0 GB
 7 | eval a.dat -o /proc/o.npy                    | /proc/o.npy
 7 | eval a.dat -o /proc/self/o.npy --overwrite   | cannot be written
 4 | eval a.dat -o o.npy --max-size 20B           | --max-size

@@ -152,9 +152,16 @@ impl Manifest {
         Ok(())
     }
 
+    fn is_empty(&self) -> bool {
+        self.previous.is_empty() && self.added.is_empty()
+    }
+
     /// Puts the lines in order.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let path = self.folder.join(NAME);
+        if self.is_empty() {
+            return Ok(());
+        }
         let mut output =
             Output::create(&path, true, &[]).map_err(|error| Failure::output(&error))?;
         let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
@@ -168,6 +175,15 @@ impl Manifest {
 
     fn failed(&self, error: &io::Error) -> Failure {
         Failure::writing(&self.folder.join(NAME).display().to_string(), error)
+    }
+}
+
+/// A batch that was refused, or of which nothing came, leaves no manifest.
+impl Drop for Manifest {
+    fn drop(&mut self) {
+        if self.is_empty() {
+            let _ = std::fs::remove_file(self.folder.join(NAME)); // it says nothing
+        }
     }
 }
 
