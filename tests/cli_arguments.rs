@@ -22,7 +22,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy --fps 30fps              | `30fps` is no frame rate
 2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is no frame rate
 2 | eval a.dat -o o.npy --fps 1e13               | at most 1099511627776 frames
-2 | eval a.dat -o o.npy --fps 1e11               | 2 tracks × 200000000001 frames are 6.4 TB
+2 | eval a.dat -o o.npy --fps 5e11               | 2 tracks × 1000000000001 frames are 32.0 TB
 0 | eval a.dat -o o.npy --fps 1e-9               | 1 frame,
 0 | eval a.dat -o o.npy --fps 29.97              | 30000/1001
 0 | eval a.dat -o o.npy --fps 23.976             | 24000/1001
@@ -73,7 +73,7 @@ const ARGUMENTS: &str = "
 3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
 4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
 2 | eval - --times - -o o.npy                    | standard input cannot be both
-2 | verify a.dat --fps 1e11                      | of memory that are free
+2 | verify a.dat --fps 5e11                      | of memory that are free
 2 | verify a.dat -m none                         | catmull-rom
 4 | verify none.dat                              | none.dat
 3 | info a.dat none.dat                          | none.dat
