@@ -14,7 +14,8 @@ use std::time::Instant;
 
 use program::{Run, command, finish, sample_folder, succeed};
 use rayon::prelude::*;
-use support::{lavapipe, vulkan_devices};
+use support::{first_difference, hostile_set, lavapipe, vulkan_devices};
+use tumble::{Device, Engine, EngineOptions, Error, Frames, Layout, Transfer, VulkanError, method};
 
 const OUT_OF_HOST_MEMORY: i32 = -1;
 const OUT_OF_DEVICE_MEMORY: i32 = -2;
@@ -69,8 +70,7 @@ impl Loader {
         })
     }
 
-    fn command(&self, place: &Path, line: &[&str]) -> Command {
-        let mut command = command(place, line);
+    fn command(&self, mut command: Command) -> Command {
         command
             .env("LD_LIBRARY_PATH", self.own.path())
             .env("REAL_LOADER", &self.real);
@@ -84,9 +84,13 @@ impl Loader {
 
     /// A run with these faults, and what it logged.
     fn run(&self, place: &Path, line: &[&str], environment: &[(&str, &str)]) -> (Run, Log) {
+        self.run_command(command(place, line), environment)
+    }
+
+    fn run_command(&self, command: Command, environment: &[(&str, &str)]) -> (Run, Log) {
         let folder = tempfile::tempdir().unwrap();
         let log = folder.path().join("log");
-        let mut command = self.command(place, line);
+        let mut command = self.command(command);
         command.env("FAULT_LOG", &log).envs(environment.to_vec());
         let run = finish(command.output().unwrap());
         assert!(
@@ -375,7 +379,7 @@ fn absence_is_told_within_a_second() {
     for (what, (variable, value)) in cases {
         for device in ["first", "vulkan"] {
             let line = [&EVAL[..], &["--device", device]].concat();
-            let mut command = loader.command(place.path(), &line);
+            let mut command = loader.command(command(place.path(), &line));
             if variable == "VK_DRIVER_FILES" {
                 command.env("VK_ICD_FILENAMES", &value);
             }
@@ -395,5 +399,71 @@ fn absence_is_told_within_a_second() {
             };
             assert!(run.words.contains(words), "{what}: {}", run.words);
         }
+    }
+}
+
+/// What the program never does: validation, results that are staged, poses put together.
+/// Each call fails at its first and at its last occurrence.
+#[test]
+fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
+    let Some(loader) = Loader::new() else { return };
+    let child = || {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "library_work", "--ignored", "--nocapture"]);
+        command
+    };
+    let (undisturbed, log) = loader.run_command(child(), &[("WANTED", "done")]);
+    assert_eq!(undisturbed.code, 0, "{}", undisturbed.words);
+    assert_eq!(log.left, BTreeMap::new());
+    let messenger = "vkCreateDebugUtilsMessengerEXT".to_owned();
+    assert!(log.calls.contains_key(&messenger), "{:?}", log.calls);
+    let mut faults = Vec::new();
+    for (call, &count) in &log.calls {
+        for result in [OUT_OF_HOST_MEMORY, DEVICE_LOST] {
+            faults.extend([1, count].map(|first| format!("{call},{result},{first},1")));
+            faults.push(format!("{call},{result},1,1000000"));
+        }
+    }
+    // Not even waiting for everything works, so that nothing may be destroyed.
+    let idle = "vkWaitForFences,-1,1,1000000 vkDeviceWaitIdle,-2,1,1000000";
+    let (run, log) = loader.run_command(child(), &[("FAULTS", idle)]);
+    assert_eq!(run.code, 0, "{}", run.words);
+    assert!(log.calls.contains_key("vkDeviceWaitIdle"), "{log:?}");
+    faults.par_iter().for_each(|fault| {
+        let (run, log) = loader.run_command(child(), &[("FAULTS", fault)]);
+        assert_eq!(run.code, 0, "{fault}: {}", run.words);
+        assert_eq!(log.left, BTreeMap::new(), "{fault}");
+    });
+}
+
+/// Run by the test above, in a process of its own.
+#[test]
+#[ignore = "part of a_fault_in_the_library_is_an_error_and_leaks_nothing"]
+fn library_work() {
+    let work = || -> Result<(), Error> {
+        // With the validation layer where there is one.
+        let devices = match Device::list_with(true) {
+            Err(VulkanError::NoValidation) => Device::list()?,
+            devices => devices?,
+        };
+        let mut options = EngineOptions::default();
+        options.transfer = Transfer::Staged;
+        let engine = Engine::with_options(devices[0].clone(), &options)?;
+        let set = hostile_set(2, 8);
+        let clip = engine.upload(&set, method::C2)?;
+        let frames = Frames::fps(30).between(0.0, 5.0);
+        let poses = clip.evaluate_as(&frames, Layout::FrameMajor)?;
+        engine.blend(&[(&poses, 0.5), (&poses, 1.0)])?;
+        let found = engine.evaluate(&set, method::SLERP, &frames)?;
+        let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;
+        assert_eq!(
+            first_difference(expected.as_quats(), found.as_quats()),
+            None
+        );
+        Ok(())
+    };
+    let outcome = work();
+    if std::env::var_os("WANTED").is_some() {
+        outcome.unwrap();
     }
 }

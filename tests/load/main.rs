@@ -129,20 +129,20 @@ fn stream_all(
     );
 }
 
+/// As [`stream_all`], an arc and a cubic.
+fn stream_both(what: &str, set: &TrackSet, fps: u32) {
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let frames = Frames::fps(fps);
+        stream_all(what, set, method, &frames, &EngineOptions::default());
+    }
+}
+
 #[test]
 #[ignore = "10 GB of memory"]
 fn seven_gigabytes_of_keys() {
     let set = swinging(46_250, 10_000, 100.0);
     assert!(set.key_count() * size_of::<Quat>() >= 7_400_000_000);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
-        stream_all(
-            "7.4 GB of keys",
-            &set,
-            method,
-            &Frames::fps(10),
-            &EngineOptions::default(),
-        );
-    }
+    stream_both("7.4 GB of keys", &set, 10);
 }
 
 #[test]
@@ -243,30 +243,14 @@ fn indices_beyond_32_bits() {
 #[ignore = "some seconds"]
 fn one_track_of_ten_million_keys() {
     let set = swinging(1, 10_000_000, 120.0);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
-        stream_all(
-            "1 × 10 M keys",
-            &set,
-            method,
-            &Frames::fps(240),
-            &EngineOptions::default(),
-        );
-    }
+    stream_both("1 × 10 M keys", &set, 240);
 }
 
 #[test]
 #[ignore = "some seconds"]
 fn a_million_tracks_of_two_keys() {
     let set = swinging(1_000_000, 2, 1.0);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
-        stream_all(
-            "1 M tracks × 2 keys",
-            &set,
-            method,
-            &Frames::fps(30),
-            &EngineOptions::default(),
-        );
-    }
+    stream_both("1 M tracks × 2 keys", &set, 30);
 }
 
 #[test]
