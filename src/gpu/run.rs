@@ -12,7 +12,7 @@ use super::error::VulkanError;
 use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding};
-use super::work_list::work;
+use super::work_list::{WorkChunk, work};
 use crate::clock::{Ticks, Timeline};
 use crate::encoding::Encoding;
 use crate::method::Form;
@@ -110,7 +110,7 @@ impl VulkanEngine {
         }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let mut lists = work(clip, timeline, &window, shift as u32)?;
+        let mut lists = work(clip, timeline, &window, shift as u32, &mut slot.spare)?;
         slot.write(&self.device, &lists)?;
 
         let staged_items = !self.in_place;
@@ -199,6 +199,8 @@ impl VulkanEngine {
         let mut patches: Vec<(usize, [f32; 4])> = chunks
             .flat_map(|chunk| std::mem::take(&mut chunk.patches))
             .collect();
+        let used = lists.into_iter().flat_map(|list| list.chunks);
+        slot.spare.extend(used.map(WorkChunk::cleared));
         match (target, &slot.rotations, &slot.readback) {
             (Target::Slice(_), Some(rotations), Some(readback)) => {
                 slot.submission.barrier(Access::Kernel, Access::Copy);

@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
+use rayon::prelude::*;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
 use super::submission::{Spent, Submission};
-use super::work_list::GroupWork;
+use super::work_list::{GroupWork, WorkChunk};
 use crate::device::Timings;
 use crate::encoding::Encoding;
 use crate::segment::Item;
@@ -29,6 +30,8 @@ pub(super) struct Slot {
     pub(super) rotations: Option<Buffer>,
     pub(super) readback: Option<Buffer>,
     pub(super) done: Option<Finish>,
+    /// Work lists to fill again.
+    pub(super) spare: Vec<WorkChunk>,
     /// The kernel has run before: some drivers compile at the first dispatch.
     pub(super) compiled: bool,
 }
@@ -55,7 +58,7 @@ pub(super) struct Stopwatch {
 const LONG: Duration = Duration::from_millis(100);
 
 impl Stopwatch {
-    fn ran(&mut self, spent: Spent, compiled: bool) {
+    pub(super) fn ran(&mut self, spent: Spent, compiled: bool) {
         let start = self
             .last
             .map_or(spent.submitted, |l| l.max(spent.submitted));
@@ -106,6 +109,7 @@ impl Slot {
             rotations: None,
             readback: None,
             done: None,
+            spare: Vec::new(),
             compiled: false,
         })
     }
@@ -144,23 +148,29 @@ impl Slot {
                 Residence::Upload,
             )?;
         }
-        let items: &mut [Item] = bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
-        let distances: &mut [f32] =
+        let mut items: &mut [Item] = bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
+        let mut distances: &mut [f32] =
             bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes as usize));
-        let (mut next_item, mut next_distance) = (0, 0);
+        let mut next_distance = 0;
+        let mut places = Vec::new();
         for chunk in lists.iter().flat_map(|list| &list.chunks) {
-            let place = &mut items[next_item..next_item + chunk.items.len()];
-            place.copy_from_slice(&chunk.items);
-            if !chunk.distances.is_empty() {
-                for item in place {
-                    item.first += next_distance as i32;
-                }
-            }
-            let end = next_distance + chunk.distances.len();
-            distances[next_distance..end].copy_from_slice(&chunk.distances);
-            next_item += chunk.items.len();
-            next_distance = end;
+            let (own_items, other_items) = items.split_at_mut(chunk.items.len());
+            let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
+            (items, distances) = (other_items, others);
+            places.push((chunk, own_items, own_distances, next_distance));
+            next_distance += chunk.distances.len() as i32;
         }
+        places
+            .into_par_iter()
+            .for_each(|(chunk, items, distances, first)| {
+                items.copy_from_slice(&chunk.items);
+                distances.copy_from_slice(&chunk.distances);
+                if !distances.is_empty() {
+                    for item in items {
+                        item.first += first;
+                    }
+                }
+            });
         Ok(())
     }
 
@@ -187,7 +197,10 @@ impl Slot {
                 let output = &mut slice[all];
                 let written = self.readback.as_ref().or(self.rotations.as_ref());
                 let bytes = 0..output.len();
-                output.copy_from_slice(written.map_or(&[][..], |buffer| buffer.bytes(bytes)));
+                copy(
+                    output,
+                    written.map_or(&[][..], |buffer| buffer.bytes(bytes)),
+                );
                 output
             }
         };
@@ -198,4 +211,16 @@ impl Slot {
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
     }
+}
+
+/// Bytes of a result that one thread copies at once.
+const COPIED: usize = 1 << 20;
+
+/// Copies a result, on all threads where it is long.
+pub(super) fn copy(to: &mut [u8], from: &[u8]) {
+    if to.len() <= COPIED {
+        return to.copy_from_slice(from);
+    }
+    let pieces = to.par_chunks_mut(COPIED).zip(from.par_chunks(COPIED));
+    pieces.for_each(|(to, from)| to.copy_from_slice(from));
 }

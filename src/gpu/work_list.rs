@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use crate::clock::{FramesError, Timeline};
+use crate::cpu::{InLanes, in_lanes};
 use crate::numeric::round_f32;
-use crate::prepare::ClipData;
-use crate::prepare::Prepared;
-use crate::schedule::{Distance, Run, RunSource};
+use crate::prepare::{ClipData, Part, Prepared};
+use crate::schedule::{Distance, Emit, Run, RunSource};
 use crate::segment::Item;
 use crate::segment::shader::{HOLD, ITEM_SAMPLES};
 use crate::window::Window;
@@ -27,6 +27,16 @@ pub(super) struct WorkChunk {
     pub(super) patches: Vec<(usize, [f32; 4])>,
 }
 
+impl WorkChunk {
+    /// Empty, and ready to be used again.
+    pub(super) fn cleared(mut self) -> Self {
+        self.items.clear();
+        self.distances.clear();
+        self.patches.clear();
+        self
+    }
+}
+
 impl GroupWork {
     pub(super) fn item_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.items.len()).sum()
@@ -40,13 +50,15 @@ impl GroupWork {
 /// Parts of a group that one thread turns into items.
 const PARTS_PER_CHUNK: usize = 64;
 
-/// The work lists of a window: one for each group that has any of its tracks.
-/// `shift` is added to every place in the output.
+/// The work lists of a window: one for each group that has any of its tracks. `shift` is
+/// added to every place in the output; `spare` are chunks to use again, whose memory would
+/// cost more than their work.
 pub(super) fn work(
     clip: &ClipData,
     timeline: &Timeline,
     window: &Window,
     shift: u32,
+    spare: &mut Vec<WorkChunk>,
 ) -> Result<Vec<GroupWork>, FramesError> {
     let mut all = Vec::new();
     for (group, prepared) in clip.groups.iter().enumerate() {
@@ -56,19 +68,23 @@ pub(super) fn work(
         let last = prepared
             .parts
             .partition_point(|part| part.track < window.tracks.end);
-        let chunks: Vec<WorkChunk> = prepared.parts[first..last]
-            .par_chunks(PARTS_PER_CHUNK)
-            .map(|parts| {
-                let mut chunk = WorkChunk::default();
-                for part in parts {
-                    let mut push = |run| {
-                        chunk.push(prepared, timeline, window, part.track, shift, &run);
-                    };
-                    for cycle in prepared.cycles(part, timeline, window.samples.clone()) {
-                        prepared.runs(part, timeline, &cycle, &mut push)?;
-                    }
-                }
-                Ok(chunk)
+        let pieces = prepared.parts[first..last].chunks(PARTS_PER_CHUNK);
+        let listings: Vec<_> = pieces
+            .map(|parts| Listing {
+                prepared,
+                parts,
+                timeline,
+                window,
+                shift,
+                chunk: spare.pop().unwrap_or_default(),
+                listed: Ok(()),
+            })
+            .collect();
+        let chunks: Vec<WorkChunk> = listings
+            .into_par_iter()
+            .map(|mut listing| {
+                in_lanes(&mut listing);
+                listing.listed.map(|()| listing.chunk)
             })
             .collect::<Result<_, FramesError>>()?;
         if first < last {
@@ -78,16 +94,63 @@ pub(super) fn work(
     Ok(all)
 }
 
-impl WorkChunk {
-    fn push(
-        &mut self,
-        prepared: &Prepared,
-        timeline: &Timeline,
-        window: &Window,
-        track: usize,
-        shift: u32,
-        run: &Run,
-    ) {
+/// What some parts of a group have to do.
+struct Listing<'a> {
+    prepared: &'a Prepared,
+    parts: &'a [Part],
+    timeline: &'a Timeline,
+    window: &'a Window,
+    shift: u32,
+    chunk: WorkChunk,
+    listed: Result<(), FramesError>,
+}
+
+impl InLanes for Listing<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        for part in self.parts {
+            let mut list = List {
+                prepared: self.prepared,
+                timeline: self.timeline,
+                window: self.window,
+                shift: self.shift,
+                track: part.track,
+                chunk: &mut self.chunk,
+            };
+            let samples = self.window.samples.clone();
+            for cycle in self.prepared.cycles(part, self.timeline, samples) {
+                let listed = self.prepared.runs(part, self.timeline, &cycle, &mut list);
+                if listed.is_err() {
+                    self.listed = listed;
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// The runs of one part, as items.
+struct List<'a> {
+    prepared: &'a Prepared,
+    timeline: &'a Timeline,
+    window: &'a Window,
+    shift: u32,
+    track: usize,
+    chunk: &'a mut WorkChunk,
+}
+
+impl Emit for List<'_> {
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        let &mut Self {
+            prepared,
+            timeline,
+            window,
+            shift,
+            track,
+            ..
+        } = self;
+        let chunk = &mut *self.chunk;
         let output = |sample| window.place(track, sample) as u32 + shift;
         let samples = run.sample..run.sample + run.count;
         let (source, hold, scale, offset) = match run.source {
@@ -99,7 +162,7 @@ impl WorkChunk {
                 ..
             } => (index, 0, scale, offset),
             RunSource::Exact { index, parameter } => {
-                self.patches.extend(samples.map(|sample| {
+                chunk.patches.extend(samples.map(|sample| {
                     let value = prepared.exact(index, parameter, timeline, track, sample);
                     (window.place(track, sample), value)
                 }));
@@ -111,16 +174,16 @@ impl WorkChunk {
             first = match distance {
                 Distance::Frames { first } => first,
                 Distance::Seconds { middle } => {
-                    let own = self.distances.len() as i32;
+                    let own = chunk.distances.len() as i32;
                     let from_middle = |sample| round_f32(timeline.time(track, sample) - middle);
-                    self.distances.extend(samples.clone().map(from_middle));
+                    chunk.distances.extend(samples.clone().map(from_middle));
                     own
                 }
             };
         }
         for done in (0..run.count).step_by(ITEM_SAMPLES as usize) {
             let count = (run.count - done).min(ITEM_SAMPLES as usize) as u32;
-            self.items.push(Item {
+            chunk.items.push(Item {
                 source,
                 output: output(run.sample + done),
                 count: count | hold,
