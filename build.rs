@@ -71,6 +71,17 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
         let files = shared.into_iter().chain([pose]).map(str::to_owned);
         pipelines.push((pose.to_owned(), files.collect()));
     }
+    let sampled = [
+        "canonical",
+        "sine_cosine",
+        "evaluate_arc",
+        "arc",
+        "sampled_arcs",
+    ];
+    pipelines.push((
+        "sampled_arcs".to_owned(),
+        sampled.map(str::to_owned).to_vec(),
+    ));
     pipelines
 }
 

@@ -5,12 +5,18 @@
 struct Segment {
     // The rotation half way along the arc.
     middle: vec4f,
-    // The unit quaternion orthogonal to it, in the plane of the arc.
-    partner: vec4f,
+    // Its derivative there: orthogonal to it in the plane of the arc, and as long as the
+    // arc's angle in R4.
+    tangent: vec4f,
 }
 
-// `angle`: half-angle from the middle of the arc.
-fn evaluate(segment: Segment, angle: f32) -> vec4f {
-    let turn = sine_cosine(angle);
-    return segment.middle * turn.y + segment.partner * turn.x;
+// `parameter`: from -1/2 to 1/2.
+fn evaluate(segment: Segment, parameter: f32) -> vec4f {
+    let z = parameter * parameter * square(segment.tangent);
+    let turn = sine_and_fall(parameter, z);
+    return segment.middle + (segment.middle * turn.y + segment.tangent * turn.x);
+}
+
+fn square(q: vec4f) -> f32 {
+    return q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
 }

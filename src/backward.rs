@@ -45,8 +45,7 @@ impl Prepared {
                         },
                     },
                     Source::Segment(index) => {
-                        let extent = self.spans.extents[span];
-                        let run = in_frames(from.frame, to.frame, -extent);
+                        let run = in_frames(from.frame, to.frame, -1.0);
                         let distance = |sample: usize| sample as f64 - run.whole;
                         if distance(first).abs() >= COUNTABLE || distance(last).abs() >= COUNTABLE {
                             return Err(FramesError::GapTooLong {

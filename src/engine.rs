@@ -271,7 +271,10 @@ impl Engine {
         let samples = timeline.len();
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
         let by_segments = !(self.is_fused(set, &interpolation, layout)
-            || on_cpu && is_sampled(set, &interpolation, &timeline));
+            || on_cpu && is_sampled(set, &interpolation, &timeline)
+            || self
+                .key_job(set, 0..tracks, &interpolation, &timeline, layout)
+                .is_some());
         if by_segments && self.pieces(set, 0..tracks, &interpolation, &timeline).len() == 1 {
             let wanted = Wanted {
                 only_for: Some(&timeline),

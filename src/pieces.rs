@@ -10,6 +10,7 @@ use crate::clip::Clip;
 use crate::clock::{FramesError, Timeline};
 use crate::cpu::is_sampled;
 use crate::engine::{Backend, Engine, Error};
+use crate::key_pieces::KeyJob;
 use crate::method::Interpolation;
 use crate::prepare::Wanted;
 use crate::rotations::Layout;
@@ -45,6 +46,12 @@ impl Engine {
             return rows.try_for_each(|(track, row)| {
                 engine.sampled_track(set, track, &interpolation, timeline, row)
             });
+        }
+        if let Backend::Vulkan(opened) = &*self.backend
+            && let Some(job) = self.key_job(set, tracks.clone(), &interpolation, timeline, layout)
+        {
+            let output = bytemuck::cast_slice_mut(output);
+            return opened.attempt_smaller(|engine| engine.evaluate_keys(&job, output));
         }
         let mut pieces = VecDeque::from(self.pieces(set, tracks.clone(), &interpolation, timeline));
         // What one piece needed, the next one uses again: fresh memory costs more than
@@ -91,6 +98,22 @@ impl Engine {
             used = Some(clip);
         }
         Ok(())
+    }
+
+    /// What a Vulkan device does straight from keys.
+    pub(crate) fn key_job<'a>(
+        &self,
+        set: &'a TrackSet,
+        tracks: Range<usize>,
+        interpolation: &'a Interpolation,
+        timeline: &'a Timeline,
+        layout: Layout,
+    ) -> Option<KeyJob<'a>> {
+        let Backend::Vulkan(opened) = &*self.backend else {
+            return None;
+        };
+        let most = opened.engine().window();
+        KeyJob::new(set, tracks, interpolation, timeline, layout, most)
     }
 
     /// Ranges of tracks whose segments fit the device's budget; and where keys are far more

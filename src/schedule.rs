@@ -141,7 +141,6 @@ impl Prepared {
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
         let starts = &self.spans.starts[part.spans.clone()];
-        let extents = &self.spans.extents[part.spans.clone()];
         let sources = &self.spans.sources[part.spans.clone()];
         let keys = &self.spans.keys[part.spans.clone()];
         if part.before != NONE {
@@ -169,7 +168,7 @@ impl Prepared {
         'blocks: for block in (skipped..starts.len()).step_by(SpanBlock::LEN) {
             let end = (block + SpanBlock::LEN).min(starts.len());
             let next = starts.get(end).copied().unwrap_or(part.end);
-            spans.fill(clock, &starts[block..end], next, &extents[block..end]);
+            spans.fill(clock, &starts[block..end], next);
             let (sources, keys) = (&sources[block..end], &keys[block..end]);
             for (j, (&source, &key)) in sources.iter().zip(keys).enumerate() {
                 let mut first = spans.first[j] as usize; // saturates at 0
@@ -332,7 +331,7 @@ impl SpanBlock {
 
     /// At most [`Self::LEN`] spans; `next` is where the last of them ends.
     #[inline(always)]
-    fn fill(&mut self, clock: impl Clock, starts: &[f64], next: f64, extents: &[f64]) {
+    fn fill(&mut self, clock: impl Clock, starts: &[f64], next: f64) {
         let count = starts.len();
         let frame = &mut self.frame[..count];
         let first = &mut self.first[..count];
@@ -345,12 +344,11 @@ impl SpanBlock {
         (self.frame[count], self.first[count]) = (end.frame, end.first);
         let from = &self.frame[..count];
         let to = &self.frame[1..=count];
-        let extents = &extents[..count];
         let whole = &mut self.whole[..count];
         let scales = &mut self.scale[..count];
         let offsets = &mut self.offset[..count];
         for j in 0..count {
-            let span = in_frames(from[j], to[j], extents[j]);
+            let span = in_frames(from[j], to[j], 1.0);
             whole[j] = span.whole;
             scales[j] = span.scale;
             offsets[j] = span.offset;

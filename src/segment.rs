@@ -19,7 +19,7 @@ pub(crate) mod shader {
 #[repr(C)]
 pub(crate) struct ArcSegment {
     pub(crate) middle: [f32; 4],
-    pub(crate) partner: [f32; 4],
+    pub(crate) tangent: [f32; 4],
 }
 
 /// `Segment` of `evaluate_polynomial.wgsl`.
@@ -57,6 +57,22 @@ pub(crate) struct Launch {
 pub(crate) struct Pass {
     pub(crate) count: u32,
     pub(crate) detail: u32,
+}
+
+/// `Sample` of `sampled_arcs.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Sample {
+    pub(crate) key: u32,
+    pub(crate) parameter: f32,
+}
+
+/// `Rows` of `sampled_arcs.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Rows {
+    pub(crate) samples: u32,
+    pub(crate) keys: u32,
 }
 
 /// `Link` of `pose_world.wgsl`.
@@ -108,7 +124,7 @@ assert_layout!(
     ArcSegment,
     ARC_SEGMENT_SIZE,
     middle = ARC_SEGMENT_MIDDLE,
-    partner = ARC_SEGMENT_PARTNER
+    tangent = ARC_SEGMENT_TANGENT
 );
 assert_layout!(
     PolynomialSegment,
@@ -134,6 +150,13 @@ assert_layout!(
     detail = LAUNCH_DETAIL
 );
 assert_layout!(Pass, PASS_SIZE, count = PASS_COUNT, detail = PASS_DETAIL);
+assert_layout!(
+    Sample,
+    SAMPLE_SIZE,
+    key = SAMPLE_KEY,
+    parameter = SAMPLE_PARAMETER
+);
+assert_layout!(Rows, ROWS_SIZE, samples = ROWS_SAMPLES, keys = ROWS_KEYS);
 assert_layout!(
     Link,
     LINK_SIZE,

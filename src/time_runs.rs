@@ -88,7 +88,7 @@ impl Prepared {
                 distance: Distance::Seconds {
                     middle: start + seconds * 0.5,
                 },
-                scale: finite_scale(self.spans.extents[span] / seconds),
+                scale: finite_scale(1.0 / seconds),
                 offset: 0.0,
             },
         }

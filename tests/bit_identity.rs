@@ -449,6 +449,15 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
         let found = cpu().evaluate(&set, slerp, &frames).unwrap();
         let what = format!("{frames:?}").chars().take(60).collect::<String>();
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+        // A device with little memory gets the track in stretches, and those with many
+        // samples in pieces.
+        for device in vulkan_devices() {
+            for memory in [None, Some(1 << 20)] {
+                let engine = engine(&device, |options| options.memory = memory);
+                let found = engine.evaluate(&set, slerp, &frames).unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+            }
+        }
     }
 }
 
@@ -536,8 +545,11 @@ fn dense_sets_go_piece_by_piece() {
         let on_cpu = cpu().evaluate(&set, method, &frames).unwrap();
         assert_same_bits(expected.as_quats(), on_cpu.as_quats(), method.name);
         for device in vulkan_devices() {
-            let engine = Engine::new(device).unwrap();
+            let engine = Engine::new(device.clone()).unwrap();
             let found = engine.evaluate(&set, method, &frames).unwrap();
+            assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+            let small = self::engine(&device, |options| options.memory = Some(2 << 20));
+            let found = small.evaluate(&set, method, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             let layout = Layout::FrameMajor;
             let columns = engine.evaluate_as(&set, method, &frames, layout).unwrap();

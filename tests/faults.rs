@@ -454,12 +454,15 @@ fn library_work() {
         let frames = Frames::fps(30).between(0.0, 5.0);
         let poses = clip.evaluate_as(&frames, Layout::FrameMajor)?;
         engine.blend(&[(&poses, 0.5), (&poses, 1.0)])?;
-        let found = engine.evaluate(&set, method::SLERP, &frames)?;
-        let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;
-        assert_eq!(
-            first_difference(expected.as_quats(), found.as_quats()),
-            None
-        );
+        // By segments, and straight from keys.
+        for frames in [frames, Frames::at(vec![0.3, 0.7])] {
+            let found = engine.evaluate(&set, method::SLERP, &frames)?;
+            let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;
+            assert_eq!(
+                first_difference(expected.as_quats(), found.as_quats()),
+                None
+            );
+        }
         Ok(())
     };
     let outcome = work();

@@ -6,13 +6,14 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
-use super::sampled::{SampledArcs, Stretch};
+use super::sampled::SampledArcs;
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::{Cycle, Sides};
 use crate::encoding::Encoding;
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::method::{Form, Interpolation};
+use crate::plan::Stretch;
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared, Wanted};
 use crate::rotations::Layout;
 use crate::segment::Segments;
@@ -295,7 +296,7 @@ impl CpuEngine {
         let task = |(i, rows): (usize, &mut [[f32; 4]])| {
             let first = tracks.start + i * each;
             let own = first..first + rows.len() / samples;
-            SampledArcs::new(interpolation, timeline).tracks(set, own, timeline, rows)
+            SampledArcs::new(interpolation).tracks(set, own, timeline, rows)
         };
         if output.len() <= TASK {
             return task((0, output));
@@ -336,7 +337,7 @@ impl CpuEngine {
                 }
             })
             .collect();
-        let new = || SampledArcs::new(interpolation, timeline);
+        let new = || SampledArcs::new(interpolation);
         let flips: Vec<f32> = self.on_threads(|| {
             let stretches = stretches.par_iter();
             stretches
@@ -357,7 +358,7 @@ impl CpuEngine {
         self.on_threads(|| {
             work.into_par_iter()
                 .try_for_each_init(new, |arcs, (stretch, sign, window, own)| {
-                    arcs.stretch(stretch, sign, clock, window, own)
+                    arcs.stretch(stretch, sign, clock, &window, own)
                 })
         })
     }

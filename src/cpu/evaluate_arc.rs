@@ -1,14 +1,22 @@
 //! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
 
 use super::evaluate::Evaluate;
-use super::sine_cosine::sine_cosine;
+use super::sine_cosine::sine_and_fall;
 use crate::segment::ArcSegment;
 
 impl Evaluate for ArcSegment {
     #[inline(always)]
-    fn evaluate(&self, angle: f32) -> [f32; 4] {
+    fn evaluate(&self, parameter: f32) -> [f32; 4] {
         let segment = self;
-        let turn = sine_cosine(angle);
-        std::array::from_fn(|i| segment.middle[i] * turn.1 + segment.partner[i] * turn.0)
+        let z = parameter * parameter * square(segment.tangent);
+        let (sine, fall) = sine_and_fall(parameter, z);
+        std::array::from_fn(|i| {
+            segment.middle[i] + (segment.middle[i] * fall + segment.tangent[i] * sine)
+        })
     }
+}
+
+#[inline(always)]
+pub(super) fn square(q: [f32; 4]) -> f32 {
+    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
 }

@@ -1,6 +1,7 @@
 //! The CPU: the f32 twins of the shaders, and the walk over tracks and samples
 //! that feeds them.
 
+mod arc;
 mod arc_tangent;
 pub(crate) mod canary;
 mod dispatch;
@@ -24,6 +25,7 @@ mod store_euler;
 mod store_f16;
 mod store_snorm16;
 
+pub(crate) use arc::arc;
 #[cfg(test)]
 pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
@@ -31,6 +33,7 @@ pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::{CpuEngine, is_sampled};
 pub(crate) use matrix::rows;
 pub(crate) use poses::{add, blend, mix, world};
+pub(crate) use sample_lanes::Turns;
 pub(crate) use sine_cosine::sine_and_fall;
 pub(crate) use store_axis_angle::axis_angle;
 pub(crate) use store_euler::euler;

@@ -7,95 +7,35 @@ use std::ops::Range;
 use glam::Quat;
 
 use super::dispatch::in_lanes;
-use super::sample_lanes::{Boundaries, Dots, IN_DOUBT, LANES, SampleBlock};
-use crate::clock::{FramesError, Ticks, Timeline};
+use super::sample_lanes::{LANES, SampleBlock, Turns};
+use crate::clock::{Ticks, Timeline};
 use crate::engine::Error;
-use crate::frame_clock::{FrameClock, in_frames};
-use crate::method::{Form, Interpolation, InterpolationError, Path};
-use crate::prepare::arc;
-use crate::schedule::COUNTABLE;
+use crate::frame_clock::FrameClock;
+use crate::method::{Interpolation, InterpolationError, Path};
+use crate::plan::{FramePlan, Stretch, time_sample};
+use crate::prepare::{IN_DOUBT, any_arc, near_arc};
+use crate::segment::Sample;
+use crate::segment::shader::HELD;
 use crate::tracks::TrackSet;
 
 /// Evaluates tracks; what it needs for that is kept.
 pub(super) struct SampledArcs<'a> {
     interpolation: &'a Interpolation,
-    samples: Box<SampleBlock>,
-    boundaries: Boundaries,
-    plan: Plan<'a>,
-    dots: Dots,
-    /// For each interval of the track, the sign of its first key.
+    block: Box<SampleBlock>,
+    plan: FramePlan<'a>,
+    /// The sign of the track's first key.
+    sign: f32,
+    /// For each interval, the sign of its first key, where any of them differ.
     signs: Vec<f32>,
 }
 
-/// Where samples lie among the keys of a track. Tracks that share their times share it.
-#[derive(Default)]
-struct Plan<'a> {
-    times: &'a [f64],
-    clock: Option<FrameClock>,
-    window: Range<usize>,
-    /// Samples up to here lie before the first key, and from there on behind the last.
-    begin: usize,
-    end: usize,
-    /// Samples on keys: the sample, the key.
-    on_keys: Vec<(usize, usize)>,
-    between: Vec<Between>,
-}
-
-/// A sample between two keys.
-struct Between {
-    sample: usize,
-    /// The first of them.
-    key: usize,
-    /// Where they lie: frames.
-    start: f64,
-    end: f64,
-}
-
-/// Some intervals of a track that follow one another.
-#[derive(Clone, Copy)]
-pub(super) struct Stretch<'a> {
-    pub(super) times: &'a [f64],
-    pub(super) keys: &'a [Quat],
-    /// The track's place in the set.
-    pub(super) index: usize,
-    /// The first of their keys.
-    pub(super) first_key: usize,
-}
-
 impl<'a> SampledArcs<'a> {
-    pub(super) fn new(interpolation: &'a Interpolation, timeline: &Timeline) -> Self {
-        let identity = [0.0, 0.0, 0.0, 1.0];
+    pub(super) fn new(interpolation: &'a Interpolation) -> Self {
         Self {
             interpolation,
-            samples: Box::new(SampleBlock {
-                from: [identity; LANES],
-                to: [identity; LANES],
-                signs: [1.0; LANES],
-                starts: [0.0; LANES],
-                ends: [1.0; LANES],
-                places: [0.0; LANES],
-                frames: matches!(timeline.ticks, Ticks::Frames { .. }),
-                noise: interpolation.path.flips_below(),
-                as_polynomials: interpolation.form() == Form::Polynomial,
-                outputs: [0; LANES],
-                count: 0,
-                rotations: [identity; LANES],
-            }),
-            plan: Plan::default(),
-            boundaries: Boundaries {
-                times: [0.0; LANES],
-                count: 0,
-                clock: None,
-                frames: [0.0; LANES],
-                firsts: [0; LANES],
-                whole: [0; LANES],
-            },
-            dots: Dots {
-                keys: [identity; LANES + 1],
-                count: 0,
-                dots: [0.0; LANES],
-                doubtful: 0,
-            },
+            block: Box::new(SampleBlock::new(interpolation)),
+            plan: FramePlan::new(),
+            sign: 1.0,
             signs: Vec::new(),
         }
     }
@@ -109,7 +49,8 @@ impl<'a> SampledArcs<'a> {
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
         let samples = timeline.len();
-        for (place, index) in tracks.enumerate() {
+        let mut output = output.iter_mut();
+        for index in tracks {
             let (times, keys) = set.times_and_keys(index);
             self.interpolation.ends.check(keys, index)?;
             let stretch = Stretch {
@@ -123,20 +64,18 @@ impl<'a> SampledArcs<'a> {
                 Ticks::Frames { rate, start } => {
                     let latest = times[times.len() - 1];
                     let clock = FrameClock::new(*rate, *start, latest);
-                    let all = 0..samples;
-                    self.frames(stretch, clock, all, place * samples, output)?;
+                    self.frames(stretch, clock, &(0..samples), &mut output)?;
                 }
                 Ticks::Times {
                     times: asked,
                     stride,
                 } => {
                     let own = &asked[index * stride..][..samples];
-                    let row = place * samples..(place + 1) * samples;
-                    self.times(stretch, own, row, output);
+                    self.times(stretch, own, &mut output);
                 }
             }
         }
-        self.flush(output);
+        self.block.flush(&mut output);
         Ok(())
     }
 
@@ -147,12 +86,13 @@ impl<'a> SampledArcs<'a> {
         stretch: Stretch<'a>,
         sign: f32,
         clock: FrameClock,
-        window: Range<usize>,
+        window: &Range<usize>,
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
+        let mut output = output.iter_mut();
         self.align(stretch, sign)?;
-        self.frames(stretch, clock, window, 0, output)?;
-        self.flush(output);
+        self.frames(stretch, clock, window, &mut output)?;
+        self.block.flush(&mut output);
         Ok(())
     }
 
@@ -164,224 +104,111 @@ impl<'a> SampledArcs<'a> {
         mut sign: f32,
     ) -> Result<f32, InterpolationError> {
         let path = self.interpolation.path;
-        let noise = path.flips_below();
-        let keys = stretch.keys;
+        let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
         self.signs.clear();
+        self.sign = sign;
         if keys.len() == 2 && path == Path::Shortest && stretch.first_key == 0 {
             // The second key's sign is nobody's first.
-            self.signs.push(sign);
             return Ok(sign);
         }
-        for start in (0..keys.len() - 1).step_by(LANES) {
-            let keys = &keys[start..keys.len().min(start + LANES + 1)];
-            for (own, key) in self.dots.keys.iter_mut().zip(keys) {
-                *own = key.to_array();
-            }
-            self.dots.count = keys.len() - 1;
-            in_lanes(&mut self.dots);
-            if self.dots.doubtful == 0 {
-                self.signs.resize(self.signs.len() + keys.len() - 1, sign);
-                continue;
-            }
-            for (i, &near) in self.dots.dots[..keys.len() - 1].iter().enumerate() {
-                self.signs.push(sign);
-                let dot = if near > IN_DOUBT || (-0.99..-IN_DOUBT).contains(&near) {
-                    f64::from(near)
-                } else {
-                    arc(keys[i].to_array(), keys[i + 1].to_array(), noise).dot
-                };
-                if path.refuses(dot) {
+        let mut turns = Turns { keys, any: false };
+        in_lanes(&mut turns);
+        if !turns.any {
+            return Ok(sign);
+        }
+        self.signs.reserve(keys.len());
+        for (i, pair) in keys.windows(2).enumerate() {
+            self.signs.push(sign);
+            let near = near_arc(pair[0], pair[1], path);
+            let mut flip = near.flip;
+            if near.certain <= IN_DOUBT {
+                let any = any_arc(pair[0], pair[1], path);
+                if any.is_refused {
                     return Err(InterpolationError::Antipodal {
                         track: stretch.index,
-                        key: stretch.first_key + start + i,
+                        key: stretch.first_key + i,
                     });
                 }
-                if dot < noise {
-                    sign = -sign;
-                }
+                flip = any.flip;
             }
+            sign *= flip;
         }
         Ok(sign)
     }
 
     /// The samples in `window` of a stretch's intervals, and of what lies beside the
-    /// track where it ends; the first of them goes to `place`.
+    /// track where it ends, one behind the other.
     fn frames(
         &mut self,
         stretch: Stretch<'a>,
         clock: FrameClock,
-        window: Range<usize>,
-        place: usize,
-        output: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
-        self.plan(stretch, clock, &window)?;
-        // Apart from the rest, which changes while it is gone through.
-        let plan = std::mem::take(&mut self.plan);
-        let keys = stretch.keys;
-        let row = &mut output[place..place + window.len()];
-        row[..plan.begin].fill(keys[0].to_array());
-        row[plan.end..].fill(keys[keys.len() - 1].to_array());
-        for &(sample, key) in &plan.on_keys {
-            row[sample - window.start] = keys[key].to_array();
-        }
-        for between in &plan.between {
-            let &Between {
-                sample,
-                key,
-                start,
-                end,
-            } = between;
-            let interval = (start, end, sample as f64);
-            let place = place + sample - window.start;
-            self.push(keys, key, interval, place, output);
-        }
-        self.plan = plan;
-        Ok(())
-    }
-
-    /// Finds out where the samples of a window lie, unless that is known already.
-    fn plan(
-        &mut self,
-        stretch: Stretch<'a>,
-        clock: FrameClock,
         window: &Range<usize>,
-    ) -> Result<(), FramesError> {
-        let times = stretch.times;
-        let plan = &mut self.plan;
-        if std::ptr::eq(plan.times, times) && plan.clock == Some(clock) && plan.window == *window {
-            return Ok(());
+        output: &mut Output<'_>,
+    ) -> Result<(), Error> {
+        let samples = self.plan.samples(stretch, clock, window)?;
+        let signs = Signs {
+            all: self.sign,
+            each: &self.signs,
+        };
+        for &sample in samples {
+            self.block.push(stretch.keys, sample, &signs, output);
         }
-        plan.times = &[];
-        plan.on_keys.clear();
-        plan.between.clear();
-        let (from, samples) = (window.start, window.end);
-        let last = times.len() - 1;
-        let inside = |first: i64| first.clamp(from as i64, samples as i64) as usize - from;
-        (plan.begin, plan.end) = (0, samples - from);
-        if last == 0 {
-            plan.begin = inside(clock.first_frame(times[0]) as i64);
-            plan.end = plan.begin;
-        }
-        self.boundaries.clock = Some(clock);
-        // Each block starts with the boundary that the one before it ended with.
-        'blocks: for block in (0..last).step_by(LANES - 1) {
-            let own = &times[block..times.len().min(block + LANES)];
-            self.boundaries.times[..own.len()].copy_from_slice(own);
-            self.boundaries.count = own.len();
-            in_lanes(&mut self.boundaries);
-            let bounds = &self.boundaries;
-            if block == 0 {
-                plan.begin = inside(bounds.firsts[0]);
-            }
-            if block + own.len() == times.len() {
-                plan.end = inside(bounds.firsts[own.len() - 1]);
-            }
-            for j in 0..own.len() - 1 {
-                let (frame, end) = (bounds.frames[j], bounds.frames[j + 1]);
-                let mut first = bounds.firsts[j];
-                let to = bounds.firsts[j + 1].min(samples as i64);
-                if first >= samples as i64 {
-                    break 'blocks;
-                }
-                if bounds.whole[j] == 1 && (from as i64..to).contains(&first) {
-                    plan.on_keys.push((first as usize, block + j));
-                    first += 1;
-                }
-                for sample in first.max(from as i64)..to {
-                    let place = sample as f64;
-                    if end - frame >= COUNTABLE
-                        && (place - in_frames(frame, end, 0.0).whole).abs() >= COUNTABLE
-                    {
-                        return Err(FramesError::GapTooLong {
-                            track: stretch.index,
-                            key: stretch.first_key + block + j,
-                            frames: end - frame,
-                        });
-                    }
-                    plan.between.push(Between {
-                        sample: sample as usize,
-                        key: block + j,
-                        start: frame,
-                        end,
-                    });
-                }
-            }
-        }
-        (plan.times, plan.clock, plan.window) = (times, Some(clock), window.clone());
         Ok(())
     }
 
-    fn times(
-        &mut self,
-        Stretch {
-            times: starts,
-            keys,
-            ..
-        }: Stretch<'_>,
-        times: &[f64],
-        row: Range<usize>,
-        output: &mut [[f32; 4]],
-    ) {
-        let last = starts.len() - 1;
-        let mut i = 0;
-        for (&time, place) in times.iter().zip(row) {
-            if time >= starts[last] {
-                output[place] = keys[last].to_array();
-                continue;
-            }
-            if time < starts[0] {
-                output[place] = keys[0].to_array();
-                continue;
-            }
-            let holds = |i: usize| starts[i] <= time && time < starts[i + 1];
-            // Times mostly increase: look here and next before searching.
-            if !holds(i) {
-                i = if i + 1 < last && holds(i + 1) {
-                    i + 1
-                } else {
-                    starts.partition_point(|&start| start <= time) - 1
-                };
-            }
-            if time == starts[i] {
-                output[place] = keys[i].to_array();
-            } else {
-                let interval = (starts[i], starts[i + 1], time);
-                self.push(keys, i, interval, place, output);
-            }
+    fn times(&mut self, stretch: Stretch<'_>, times: &[f64], output: &mut Output<'_>) {
+        let signs = Signs {
+            all: self.sign,
+            each: &self.signs,
+        };
+        let mut near = 0;
+        for &time in times {
+            let sample = time_sample(stretch.times, time, near);
+            near = (sample.key & !HELD) as usize;
+            self.block.push(stretch.keys, sample, &signs, output);
         }
     }
+}
 
+/// The signs of intervals' first keys.
+struct Signs<'a> {
+    all: f32,
+    /// Where any of them differ.
+    each: &'a [f32],
+}
+
+/// What is still to be written.
+type Output<'a> = std::slice::IterMut<'a, [f32; 4]>;
+
+impl SampleBlock {
+    /// Adds a sample, and works the block out when it is full.
     #[inline(always)]
-    fn push(
-        &mut self,
-        keys: &[Quat],
-        key: usize,
-        (start, end, place): (f64, f64, f64),
-        output_place: usize,
-        output: &mut [[f32; 4]],
-    ) {
-        let samples = &mut *self.samples;
-        let lane = samples.count;
-        samples.from[lane] = keys[key].to_array();
-        samples.to[lane] = keys[key + 1].to_array();
-        samples.signs[lane] = self.signs[key];
-        samples.starts[lane] = start;
-        samples.ends[lane] = end;
-        samples.places[lane] = place;
-        samples.outputs[lane] = output_place;
-        samples.count += 1;
-        if samples.count == LANES {
+    fn push(&mut self, keys: &[Quat], sample: Sample, signs: &Signs<'_>, output: &mut Output<'_>) {
+        let lane = self.count;
+        let key = (sample.key & !HELD) as usize;
+        if sample.key & HELD == 0 {
+            self.from[lane] = keys[key].to_array();
+            self.to[lane] = keys[key + 1].to_array();
+            self.signs[lane] = signs.each.get(key).copied().unwrap_or(signs.all);
+        } else {
+            // Between a key and itself lies that key, as it is stored.
+            self.from[lane] = keys[key].to_array();
+            self.to[lane] = self.from[lane];
+            self.signs[lane] = 1.0;
+        }
+        self.parameters[lane] = sample.parameter;
+        self.count += 1;
+        if self.count == LANES {
             self.flush(output);
         }
     }
 
-    fn flush(&mut self, output: &mut [[f32; 4]]) {
-        let samples = &mut *self.samples;
-        in_lanes(samples);
-        let places = &samples.outputs[..samples.count];
-        for (&place, &rotation) in places.iter().zip(&samples.rotations) {
-            output[place] = rotation;
+    fn flush(&mut self, output: &mut Output<'_>) {
+        in_lanes(self);
+        // The output second, or one of it would be taken and not written.
+        for (&rotation, place) in self.rotations[..self.count].iter().zip(output) {
+            *place = rotation;
         }
-        samples.count = 0;
+        self.count = 0;
     }
 }

@@ -11,6 +11,7 @@ use super::error::VulkanError;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
 use super::pipeline::{KERNELS, POSES, Pipeline};
+use super::sampled::KeySlot;
 use super::slot::{External, Slot, Target};
 use super::submission::{Access, Submission};
 use crate::clock::{FramesError, Timeline};
@@ -38,6 +39,8 @@ pub(crate) struct VulkanEngine {
     pub(super) pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS]>,
     pub(super) pose_pipelines: Mutex<[Option<Arc<Pipeline>>; POSES]>,
     pub(super) slots: Mutex<Vec<Slot>>,
+    pub(super) key_pipeline: Mutex<Option<Arc<Pipeline>>>,
+    pub(super) key_slots: Mutex<Vec<KeySlot>>,
     /// Results are written in place, or copied out of the device's own memory.
     pub(super) in_place: bool,
     /// Rotations of one window.
@@ -125,6 +128,8 @@ impl VulkanEngine {
             pipelines: Mutex::default(),
             pose_pipelines: Mutex::default(),
             slots: Mutex::default(),
+            key_pipeline: Mutex::default(),
+            key_slots: Mutex::default(),
             in_place,
             window: AtomicUsize::new(window),
             group_bytes,
@@ -223,7 +228,7 @@ impl VulkanEngine {
     }
 
     /// Rotations of one window.
-    pub(super) fn window(&self) -> usize {
+    pub(crate) fn window(&self) -> usize {
         self.window.load(Ordering::Relaxed)
     }
 
@@ -240,9 +245,11 @@ impl VulkanEngine {
     /// Gives back what is kept for the next evaluation; false when that is nothing.
     pub(super) fn give_back(&self) -> bool {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut key_slots = (self.key_slots.lock()).unwrap_or_else(PoisonError::into_inner);
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = slots.len() + free.len();
+        let kept = slots.len() + key_slots.len() + free.len();
         slots.clear();
+        key_slots.clear();
         free.clear();
         kept > 0
     }

@@ -15,6 +15,7 @@ mod pass;
 mod physical;
 mod pipeline;
 mod run;
+mod sampled;
 mod slot;
 mod submission;
 mod work_list;

@@ -38,7 +38,7 @@ pub(super) enum Clock {
 
 /// Kernels that there are.
 pub(super) const KERNELS: usize = 32;
-const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES);
+const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES + 1);
 
 /// Kernels over poses that are already there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +54,11 @@ pub(super) const POSES: usize = 4;
 
 pub(super) fn pose_shader(kernel: PoseKernel) -> Shader {
     SHADERS[1 + KERNELS + kernel as usize]
+}
+
+/// Arcs with fewer samples than keys.
+pub(super) fn sampled_arcs() -> Shader {
+    SHADERS[1 + KERNELS + POSES]
 }
 
 /// A kernel, and its place among all.
@@ -84,6 +89,8 @@ pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, u
 pub(super) const KERNEL_BINDINGS: u32 = 5;
 /// Number of storage buffers that a `pose_*.wgsl` binds: three inputs and the output.
 pub(super) const POSE_BINDINGS: u32 = 4;
+/// Number of storage buffers that `sampled_arcs.wgsl` binds.
+pub(super) const SAMPLED_BINDINGS: u32 = 4;
 /// Number of storage buffers that `canary.wgsl` binds.
 pub(super) const CANARY_BINDINGS: u32 = 2;
 

@@ -6,17 +6,13 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use glam::Quat;
 
+use super::arc_lanes::{ArcLanes, Components, LANES, arcs};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
-use crate::branchless::{angle_by_sine, dot, norm, unit};
 use crate::cpu::{InLanes, in_lanes};
 use crate::method::{Ends, Interpolation, InterpolationError, Path};
-use crate::numeric::{canonical, round_f32};
 use crate::segment::{ArcSegment, Segments};
 use crate::tracks::Track;
-
-/// Intervals worked out together.
-const LANES: usize = 64;
 
 /// Intervals that wait for their block, and what has become of them.
 pub(crate) struct ArcBlock {
@@ -26,41 +22,24 @@ pub(crate) struct ArcBlock {
     /// The track and the key that each interval starts with.
     places: [(usize, usize); LANES],
     count: usize,
-    /// Dot products below this turn the second key's sign.
-    noise: f64,
-    /// Inner products of the two keys.
-    dots: [f64; LANES],
-    angles: [f64; LANES],
-    middles: [[f32; LANES]; 4],
-    partners: [[f32; LANES]; 4],
+    path: Path,
     /// The sign of each interval's first key after those before it in its track.
     signs: [f32; LANES],
-    /// With their signs, and a lane's components together.
-    signed_middles: [[f32; 4]; LANES],
-    signed_partners: [[f32; 4]; LANES],
+    arcs: ArcLanes,
+    segments: [ArcSegment; LANES],
 }
 
 impl ArcBlock {
-    /// Lanes to work out: whole vectors of them.
-    #[inline(always)]
-    fn whole(&self) -> usize {
-        self.count.next_multiple_of(16).min(LANES)
-    }
-
-    fn new(noise: f64) -> Self {
+    fn new(path: Path) -> Self {
         Self {
             from: [[0.0; 4]; LANES],
             to: [[0.0; 4]; LANES],
             places: [(0, 0); LANES],
             count: 0,
-            noise,
-            dots: [0.0; LANES],
-            angles: [0.0; LANES],
-            middles: [[0.0; LANES]; 4],
-            partners: [[0.0; LANES]; 4],
+            path,
             signs: [1.0; LANES],
-            signed_middles: [[0.0; 4]; LANES],
-            signed_partners: [[0.0; 4]; LANES],
+            arcs: ArcLanes::default(),
+            segments: [ArcSegment::zeroed(); LANES],
         }
     }
 }
@@ -69,68 +48,7 @@ impl InLanes for ArcBlock {
     /// Works out every interval that waits.
     #[inline(always)]
     fn run(&mut self) {
-        let noise = self.noise;
-        // Arrays of its own: the compiler must see that they do not overlap.
-        let (from, to) = (&self.from, &self.to);
-        let (mut dots, mut angles) = ([0.0; LANES], [0.0; LANES]);
-        let [mut mx, mut my, mut mz, mut mw] = [[0.0; LANES]; 4];
-        let [mut px, mut py, mut pz, mut pw] = [[0.0; LANES]; 4];
-        for j in 0..self.whole() {
-            let arc = arc(from[j], to[j], noise);
-            dots[j] = arc.dot;
-            angles[j] = arc.angle;
-            [mx[j], my[j], mz[j], mw[j]] = arc.middle;
-            [px[j], py[j], pz[j], pw[j]] = arc.partner;
-        }
-        (self.dots, self.angles) = (dots, angles);
-        self.middles = [mx, my, mz, mw];
-        self.partners = [px, py, pz, pw];
-    }
-}
-
-/// The great circle between two keys.
-pub(crate) struct Arc {
-    /// Their inner product as stored.
-    pub(crate) dot: f64,
-    /// The angle between them once their signs are aligned.
-    pub(crate) angle: f64,
-    /// As in [`ArcSegment`].
-    pub(crate) middle: [f32; 4],
-    pub(crate) partner: [f32; 4],
-}
-
-/// The arc between two keys; dot products below `noise` turn the second one's sign.
-#[inline(always)]
-pub(crate) fn arc(from: [f32; 4], to: [f32; 4], noise: f64) -> Arc {
-    let a = unit(from);
-    let b = unit(to);
-    let dot = dot(a, b);
-    let flip = if dot < noise { -1.0 } else { 1.0 };
-    let b = [b[0] * flip, b[1] * flip, b[2] * flip, b[3] * flip];
-    let sum = [b[0] + a[0], b[1] + a[1], b[2] + a[2], b[3] + a[3]];
-    let difference = [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]];
-    // 2 cos and 2 sin of half the angle between them: never acos, which loses half
-    // of the digits of a small one.
-    let cosine = norm(sum);
-    let chord = norm(difference);
-    let to_unit = 1.0 / cosine;
-    // Equal keys have no plane; with an angle of 0 any partner will do.
-    let to_partner = if chord > 0.0 { 1.0 / chord } else { 0.0 };
-    Arc {
-        dot,
-        angle: chord * angle_by_sine(1.0 - 0.5 * cosine),
-        middle: [
-            round_f32(sum[0] * to_unit),
-            round_f32(sum[1] * to_unit),
-            round_f32(sum[2] * to_unit),
-            round_f32(sum[3] * to_unit),
-        ],
-        partner: [
-            round_f32(difference[0] * to_partner),
-            round_f32(difference[1] * to_partner),
-            round_f32(difference[2] * to_partner),
-            round_f32(difference[3] * to_partner),
-        ],
+        self.arcs = arcs(&self.from, &self.to, self.count, self.path);
     }
 }
 
@@ -140,36 +58,33 @@ struct Signed<'a>(&'a mut ArcBlock);
 impl InLanes for Signed<'_> {
     #[inline(always)]
     fn run(&mut self) {
-        let count = self.0.whole();
-        let (mut middles, mut partners) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
-        let signs = &self.0.signs;
-        let [x, y, z, w] = &self.0.middles;
-        for j in 0..count {
-            middles[j] = signed(signs[j], [x[j], y[j], z[j], w[j]]);
+        let ArcBlock { signs, arcs, .. } = &*self.0;
+        let (middles, tangents) = (signed(signs, &arcs.middles), signed(signs, &arcs.tangents));
+        let mut segments = [ArcSegment::zeroed(); LANES];
+        for j in 0..LANES {
+            segments[j] = ArcSegment {
+                middle: middles[j],
+                tangent: tangents[j],
+            };
         }
-        let [x, y, z, w] = &self.0.partners;
-        for j in 0..count {
-            partners[j] = signed(signs[j], [x[j], y[j], z[j], w[j]]);
-        }
-        (self.0.signed_middles, self.0.signed_partners) = (middles, partners);
+        self.0.segments = segments;
     }
 }
 
-/// The same rotation with another sign.
+/// A lane's components together, in the lane's sign.
 #[inline(always)]
-pub(crate) fn signed(sign: f32, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
-    [
-        canonical(x * sign),
-        canonical(y * sign),
-        canonical(z * sign),
-        canonical(w * sign),
-    ]
+fn signed(signs: &[f32; LANES], [x, y, z, w]: &Components) -> [[f32; 4]; LANES] {
+    let mut signed = [[0.0; 4]; LANES];
+    for j in 0..LANES {
+        let sign = signs[j];
+        signed[j] = [x[j] * sign, y[j] * sign, z[j] * sign, w[j] * sign];
+    }
+    signed
 }
 
 /// Prepares arcs; its block is made once for many tracks.
 pub(crate) struct ArcPreparation {
     block: ArcBlock,
-    path: Path,
     ends: Ends,
     /// What the signs of the keys so far make of the next.
     sign: f32,
@@ -178,8 +93,7 @@ pub(crate) struct ArcPreparation {
 impl ArcPreparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
-            block: ArcBlock::new(interpolation.path.flips_below()),
-            path: interpolation.path,
+            block: ArcBlock::new(interpolation.path),
             ends: interpolation.ends,
             sign: 1.0,
         }
@@ -248,8 +162,7 @@ impl ArcPreparation {
         in_lanes(&mut self.block);
         let block = &mut self.block;
         let count = block.count;
-        let refused = |&dot: &f64| self.path.refuses(dot);
-        if let Some(lane) = block.dots[..count].iter().position(refused) {
+        if let Some(lane) = block.arcs.refused {
             let (track, key) = block.places[lane];
             return Err(InterpolationError::Antipodal { track, key });
         }
@@ -258,22 +171,13 @@ impl ArcPreparation {
                 self.sign = 1.0;
             }
             block.signs[lane] = self.sign;
-            if block.dots[lane] < block.noise {
-                self.sign = -self.sign;
-            }
+            self.sign *= block.arcs.flips[lane];
         }
         in_lanes(&mut Signed(block));
         let Segments::Arc(segments) = &mut prepared.segments else {
             unreachable!("the method's form")
         };
-        let start = segments.len();
-        segments.resize(start + count, ArcSegment::zeroed());
-        let middles = block.signed_middles.iter().zip(&block.signed_partners);
-        for (segment, (&middle, &partner)) in segments[start..].iter_mut().zip(middles) {
-            *segment = ArcSegment { middle, partner };
-        }
-        let angles = &block.angles[..count];
-        prepared.spans.extents.extend_from_slice(angles);
+        segments.extend_from_slice(&block.segments[..count]);
         block.count = 0;
         Ok(())
     }
@@ -289,7 +193,7 @@ mod tests {
     #[test]
     fn every_vector_width_prepares_the_same_bits() {
         let filled = || {
-            let mut block = ArcBlock::new(Path::Shortest.flips_below());
+            let mut block = ArcBlock::new(Path::Shortest);
             for lane in 0..LANES - 3 {
                 let step = 10.0f32.powi(-(lane as i32 % 8)) * 3.0;
                 let key = Quat::from_rotation_y(lane as f32) * Quat::from_rotation_x(0.3);
@@ -298,17 +202,18 @@ mod tests {
                 block.to[lane] = (key * Quat::from_rotation_z(step) * sign).to_array();
             }
             block.to[7] = block.from[7]; // no plane
+            block.to[9] = [1.0, 0.0, 0.0, 0.0]; // in doubt
+            block.from[9] = [0.0, 0.0, 0.0, 1.0];
             block.count = LANES - 3;
             in_lanes(&mut block);
-            let components = [block.middles, block.partners].concat();
-            let bits: Vec<u32> = components.concat().iter().map(|c| c.to_bits()).collect();
-            let dots = block.dots.map(f64::to_bits);
-            (bits, block.angles.map(f64::to_bits), dots)
+            in_lanes(&mut Signed(&mut block));
+            let bits: Vec<u32> = bytemuck::cast_slice(&block.segments).to_vec();
+            (bits, block.arcs.flips.map(f32::to_bits))
         };
         let results = at_every_width(filled);
         let (_, expected) = &results[0];
-        let negative = |&bits: &u64| f64::from_bits(bits) < 0.0;
-        assert!(expected.2.iter().any(negative) && !expected.2.iter().all(negative));
+        let negative = |&bits: &u32| f32::from_bits(bits) < 0.0;
+        assert!(expected.1.iter().any(negative) && !expected.1.iter().all(negative));
         for (width, found) in &results {
             assert!(found == expected, "{width:?}");
         }

@@ -11,7 +11,7 @@ use super::shape::Shape;
 use super::steady::SteadyBlock;
 use super::{NONE, Prepared, Source};
 use crate::cpu::in_lanes;
-use crate::method::Quantity;
+use crate::method::{Path, Quantity};
 use crate::segment::{PolynomialSegment, Segments};
 
 /// Fits curves; what it needs for that is kept.
@@ -110,21 +110,20 @@ impl Fitting {
         }
     }
 
-    /// Adds two keys that are alone; dot products below `noise` turn the second one's
-    /// sign.
+    /// Adds two keys that are alone.
     pub(super) fn push_steady(
         &mut self,
         prepared: &mut Prepared,
         place: Place,
         keys: [[f32; 4]; 2],
-        noise: f64,
+        path: Path,
     ) {
         let segments = polynomials(prepared);
         let segment = segments.len() as u32;
         segments.push(PolynomialSegment::zeroed());
         let source = CurveSource::Segment(segment);
         self.intervals.push(Fitted { place, source });
-        let new = || Box::new(SteadyBlock::new(noise));
+        let new = || Box::new(SteadyBlock::new(path));
         let block = self.steady.get_or_insert_with(new);
         block.push(keys, segment);
         if block.is_full() {
@@ -181,10 +180,10 @@ impl Fitting {
             let Place { start, key, .. } = place;
             match source {
                 CurveSource::Constant(constant) => {
-                    prepared.push_span(start, 0.0, Source::Constant(constant), NONE);
+                    prepared.push_span(start, Source::Constant(constant), NONE);
                 }
                 CurveSource::Segment(segment) => {
-                    prepared.push_span(start, 1.0, Source::Segment(segment), key);
+                    prepared.push_span(start, Source::Segment(segment), key);
                 }
                 CurveSource::Parts(mut spare) => {
                     let is_own = |part: &&CurvePart| part.interval == interval;
@@ -194,7 +193,7 @@ impl Fitting {
                         let start = start + (place.end - start) * from;
                         let key = if from == 0.0 { key } else { NONE };
                         let source = prepared.part_source(part, &mut spare);
-                        prepared.push_span(start, 1.0, source, key);
+                        prepared.push_span(start, source, key);
                     }
                 }
             }

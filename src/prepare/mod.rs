@@ -2,6 +2,7 @@
 //! clip and rounded once. Independent of frame rate and device, so the CPU and
 //! every Vulkan device evaluate the same segments.
 
+mod arc_lanes;
 mod arcs;
 mod clip_data;
 mod curve;
@@ -22,7 +23,7 @@ mod steady;
 mod steps;
 mod vectors;
 
-pub(crate) use arcs::{arc, signed};
+pub(crate) use arc_lanes::{IN_DOUBT, LANES as ARC_LANES, any_arc, arcs, flip, near_arc, whole};
 pub(crate) use clip_data::{ClipData, PartRef, Wanted};
 pub(crate) use curve::Curve;
 pub(crate) use intervals::{Intervals, Stretch};
@@ -65,8 +66,6 @@ pub(crate) struct Prepared {
 pub(crate) struct Spans {
     /// Seconds.
     pub(crate) starts: Vec<f64>,
-    /// What the kernel's parameter runs over, centred on zero: the arc's angle, or 1.
-    pub(crate) extents: Vec<f64>,
     pub(crate) sources: Vec<Source>,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) keys: Vec<u32>,
@@ -137,14 +136,12 @@ impl Spans {
 
     fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
-        self.extents.reserve(count);
         self.sources.reserve(count);
         self.keys.reserve(count);
     }
 
     fn clear(&mut self) {
         self.starts.clear();
-        self.extents.clear();
         self.sources.clear();
         self.keys.clear();
     }
@@ -191,7 +188,6 @@ impl Prepared {
         let shift = |constant: u32| place(constant, constants);
         let own = &mut self.spans;
         own.starts.extend(other.spans.starts);
-        own.extents.extend(other.spans.extents);
         own.sources
             .extend(other.spans.sources.iter().map(|source| match source {
                 Source::Segment(i) => Source::Segment(i + segments),
@@ -240,9 +236,8 @@ impl Prepared {
         self.constants.len() as u32 - 1
     }
 
-    fn push_span(&mut self, start: f64, extent: f64, source: Source, key: u32) {
+    fn push_span(&mut self, start: f64, source: Source, key: u32) {
         self.spans.starts.push(start);
-        self.spans.extents.push(extent);
         self.spans.sources.push(source);
         self.spans.keys.push(key);
     }

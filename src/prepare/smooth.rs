@@ -244,8 +244,8 @@ impl SmoothPreparation {
                     self.fitting.push_constant(place, NONE);
                 } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
                     let keys = self.intervals.keys(lane);
-                    let noise = self.intervals.noise;
-                    self.fitting.push_steady(prepared, place, keys, noise);
+                    let path = self.interpolation.path;
+                    self.fitting.push_steady(prepared, place, keys, path);
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);
                 } else if key == NONE {

@@ -4,16 +4,17 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use super::arcs::arc;
+use super::arc_lanes::{LANES, arcs};
 use crate::cpu::InLanes;
-use crate::numeric::{canonical, round_f32};
+use crate::method::Path;
+use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 
 /// Powers of the parameter in a segment.
 const COEFFICIENTS: usize = 11;
 
 /// 1, 1, -1/2!, -1/3!, 1/4! …: of cosine and sine in turn.
-const SERIES: [f64; COEFFICIENTS] = [
+const SERIES: [f32; COEFFICIENTS] = [
     1.0,
     1.0,
     -1.0 / 2.0,
@@ -27,26 +28,21 @@ const SERIES: [f64; COEFFICIENTS] = [
     -1.0 / 3_628_800.0,
 ];
 
-/// One component of an arc whose parameter runs from -1/2 to 1/2, as a polynomial; the
-/// angle in radians. Half of that is at most pi/4, and what the series leave out at most
-/// 2e-9.
+/// One component of an arc, of its middle and its tangent there, as a polynomial; its
+/// angle in R⁴, squared. Half of that angle is at most pi/4, and what the series leave out
+/// at most 2e-9.
 #[inline(always)]
-pub(crate) fn arc_component(middle: f32, partner: f32, angle: f64) -> [f32; COEFFICIENTS] {
-    let (middle, partner) = (f64::from(middle), f64::from(partner));
-    let square = angle * angle;
+pub(crate) fn arc_component(middle: f32, tangent: f32, square: f32) -> [f32; COEFFICIENTS] {
     let mut coefficients = [0.0; COEFFICIENTS];
-    let (mut even, mut odd) = (middle, partner * angle);
-    coefficients[0] = canonical(round_f32(even));
+    let (mut even, mut odd) = (middle, tangent);
+    coefficients[0] = even;
     for k in 0..COEFFICIENTS / 2 {
-        coefficients[2 * k + 1] = canonical(round_f32(odd * SERIES[2 * k + 1]));
+        coefficients[2 * k + 1] = canonical(odd * SERIES[2 * k + 1]);
         (even, odd) = (even * square, odd * square);
-        coefficients[2 * k + 2] = canonical(round_f32(even * SERIES[2 * k + 2]));
+        coefficients[2 * k + 2] = canonical(even * SERIES[2 * k + 2]);
     }
     coefficients
 }
-
-/// Intervals that wait.
-const LANES: usize = 64;
 
 /// Pairs of keys, and their polynomials.
 pub(super) struct SteadyBlock {
@@ -55,20 +51,19 @@ pub(super) struct SteadyBlock {
     /// Where each polynomial goes among the segments.
     segments: [u32; LANES],
     count: usize,
-    /// Dot products below this turn the second key's sign.
-    noise: f64,
+    path: Path,
     coefficients: [[[f32; LANES]; 4]; COEFFICIENTS],
 }
 
 impl SteadyBlock {
-    pub(super) fn new(noise: f64) -> Self {
+    pub(super) fn new(path: Path) -> Self {
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
             from: [identity; LANES],
             to: [identity; LANES],
             segments: [0; LANES],
             count: 0,
-            noise,
+            path,
             coefficients: [[[0.0; LANES]; 4]; COEFFICIENTS],
         }
     }
@@ -101,24 +96,13 @@ impl SteadyBlock {
 impl InLanes for SteadyBlock {
     #[inline(always)]
     fn run(&mut self) {
-        let mut middles = [[0.0; LANES]; 4];
-        let mut partners = [[0.0; LANES]; 4];
-        let mut angles = [0.0; LANES];
-        let count = self.count.next_multiple_of(16).min(LANES);
-        let (from, to) = (&self.from, &self.to);
-        for j in 0..count {
-            let arc = arc(from[j], to[j], self.noise);
-            angles[j] = arc.angle;
-            for c in 0..4 {
-                middles[c][j] = arc.middle[c];
-                partners[c][j] = arc.partner[c];
-            }
-        }
+        let arcs = arcs(&self.from, &self.to, self.count, self.path);
+        let squares = arcs.squares();
         let mut found = [[[0.0; LANES]; 4]; COEFFICIENTS];
         for c in 0..4 {
-            let (middle, partner) = (&middles[c], &partners[c]);
-            for j in 0..count {
-                let own = arc_component(middle[j], partner[j], angles[j]);
+            let (middle, tangent) = (&arcs.middles[c], &arcs.tangents[c]);
+            for j in 0..LANES {
+                let own = arc_component(middle[j], tangent[j], squares[j]);
                 for k in 0..COEFFICIENTS {
                     found[k][c][j] = own[k];
                 }

@@ -55,7 +55,7 @@ impl Prepare for StepPreparation {
             beyond,
         });
         for (i, constant) in intervals.zip(first..last) {
-            prepared.push_span(track.times[i], 0.0, Source::Constant(constant), NONE);
+            prepared.push_span(track.times[i], Source::Constant(constant), NONE);
         }
         Ok(())
     }

@@ -49,7 +49,7 @@ pub(super) fn add(
             && last > 1
             && (i == 0 || i + 1 == last);
         if method == VectorMethod::Step || is_frozen {
-            prepared.push_span(track.times[i], 0.0, Source::Constant(key), NONE);
+            prepared.push_span(track.times[i], Source::Constant(key), NONE);
             continue;
         }
         let [start, end] = [i, i + 1].map(|key| track.keys[key].as_dvec3());
@@ -57,7 +57,7 @@ pub(super) fn add(
         let segments = polynomials(prepared);
         let source = Source::Segment(segments.len() as u32);
         segments.push(cubic(start, leaving, arriving, end));
-        prepared.push_span(track.times[i], 1.0, source, key);
+        prepared.push_span(track.times[i], source, key);
         let rate = ratio(1.0, track.times[i + 1] - track.times[i]);
         let sides = [
             (i == 0, interpolation.before, start, leaving),

@@ -179,21 +179,10 @@ fn measure(
         contestants.push(Contestant::new(
             format!("{name}, from keys"),
             move |output: &mut [Quat]| {
-                if kind == Kind::Dense {
-                    // No clip of all of it is ever made.
-                    let (set, frames) = (&workload.set, &workload.frames);
-                    engine.evaluate_into(set, method, frames, Layout::TrackMajor, output)?;
-                    return Ok(Vec::new());
-                }
-                let started = Instant::now();
-                let clip = engine.upload(&workload.set, method)?;
-                let time = started.elapsed();
-                std::hint::black_box(clip.evaluate(&workload.frames)?);
+                let (set, frames) = (&workload.set, &workload.frames);
+                engine.evaluate_into(set, method, frames, Layout::TrackMajor, output)?;
                 let _ = engine.take_timings();
-                Ok(vec![Part {
-                    name: "prepare, upload",
-                    time,
-                }])
+                Ok(Vec::new())
             },
         ));
     }

@@ -1,0 +1,42 @@
+// The arc between two unit quaternions, at most pi/2 apart in R4, about its middle.
+// With sin(theta/2)^2 = x, a quarter of the square of their difference, half of the sum
+// is 1/cos(theta/2) too short to be the middle, and the difference is
+// (theta/2)/sin(theta/2) too short to be the tangent. Both are polynomials of x up to
+// 1/2: no root, no arc function, and nothing that is 0/0 where the keys are equal. Within
+// 8.3e-9 and 2.2e-9 of what they stand for.
+// Twin: src/cpu/arc.rs.
+
+const SECANT_1: f32 = 0.5000020265579224;
+const SECANT_2: f32 = 0.37484171986579895;
+const SECANT_3: f32 = 0.3166930079460144;
+const SECANT_4: f32 = 0.21955731511116028;
+const SECANT_5: f32 = 0.6317541599273682;
+const SECANT_6: f32 = -1.4024842977523804;
+const SECANT_7: f32 = 4.277366638183594;
+const SECANT_8: f32 = -5.467312335968018;
+const SECANT_9: f32 = 3.7398531436920166;
+
+const ARC_SINE_1: f32 = 0.16666622459888458;
+const ARC_SINE_2: f32 = 0.07502682507038116;
+const ARC_SINE_3: f32 = 0.044081781059503555;
+const ARC_SINE_4: f32 = 0.03599119558930397;
+const ARC_SINE_5: f32 = -0.00805768184363842;
+const ARC_SINE_6: f32 = 0.11032986640930176;
+const ARC_SINE_7: f32 = -0.13996805250644684;
+const ARC_SINE_8: f32 = 0.12611471116542816;
+
+fn arc(start: vec4f, end: vec4f) -> Segment {
+    let half = (start + end) * 0.5;
+    let difference = end - start;
+    let x = square(difference) * 0.25;
+    let secant_high = ((SECANT_9 * x + SECANT_8) * x + SECANT_7) * x + SECANT_6;
+    let secant_mid = ((secant_high * x + SECANT_5) * x + SECANT_4) * x + SECANT_3;
+    let secant = ((secant_mid * x + SECANT_2) * x + SECANT_1) * x;
+    let sine_high = ((ARC_SINE_8 * x + ARC_SINE_7) * x + ARC_SINE_6) * x + ARC_SINE_5;
+    let sine_mid = ((sine_high * x + ARC_SINE_4) * x + ARC_SINE_3) * x + ARC_SINE_2;
+    let arc_sine = (sine_mid * x + ARC_SINE_1) * x;
+    return Segment(
+        canonical(half * secant + half),
+        canonical(difference * arc_sine + difference),
+    );
+}

@@ -1,0 +1,186 @@
+//! Arcs with fewer samples than keys, straight from keys: two pieces are in flight, the
+//! host brings the keys of one while the device works on the other.
+
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
+
+use super::buffer::{Buffer, Residence};
+use super::device::LogicalDevice;
+use super::engine::{SLOTS, VulkanEngine};
+use super::error::VulkanError;
+use super::pipeline::{Exactness, Pipeline, SAMPLED_BINDINGS, sampled_arcs};
+use super::slot::{Slot, Stopwatch, copy};
+use super::submission::{Access, Binding, Submission};
+use crate::engine::Error;
+use crate::key_pieces::{KeyJob, KeyPiece};
+use crate::segment::shader::ROWS_WORKGROUP;
+
+/// What one piece in flight needs; the submission comes first, so that it is waited for
+/// before its buffers go.
+pub(super) struct KeySlot {
+    submission: Submission,
+    keys: Option<Buffer>,
+    signs: Option<Buffer>,
+    samples: Option<Buffer>,
+    rotations: Option<Buffer>,
+    /// Where the result of the piece in flight goes.
+    output: Range<usize>,
+    /// As [`Slot::compiled`].
+    compiled: bool,
+}
+
+impl VulkanEngine {
+    /// Evaluates a job, whose result `output` fits.
+    pub(crate) fn evaluate_keys(
+        &self,
+        job: &KeyJob<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), Error> {
+        let mut slots = self
+            .key_slots
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        while slots.len() < SLOTS {
+            slots.push(KeySlot::new(&self.device)?);
+        }
+        let mut stopwatch = Stopwatch::default();
+        let mut next = 0;
+        let mut result = self.submit_pieces(job, &mut slots, &mut next, output, &mut stopwatch);
+        // Also after an error: what was submitted uses the slots' buffers.
+        for i in 1..=SLOTS {
+            let finished = slots[(next + i) % SLOTS].finish(output, &mut stopwatch);
+            result = result.and(finished.map_err(Error::from));
+        }
+        if stopwatch.is_slow() {
+            self.halve_windows(); // those of the next call
+        }
+        if result.is_err() {
+            slots.clear(); // a fence or a recording may be half way
+        }
+        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
+        result
+    }
+
+    fn submit_pieces(
+        &self,
+        job: &KeyJob<'_>,
+        slots: &mut [KeySlot],
+        next: &mut usize,
+        output: &mut [[f32; 4]],
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), Error> {
+        let pipeline = self.key_pipeline()?;
+        let mut pieces = job.pieces();
+        let mut start = 0;
+        loop {
+            if stopwatch.is_slow() {
+                self.halve_windows();
+            }
+            let Some(piece) = pieces.next(self.window())? else {
+                return Ok(());
+            };
+            *next = (*next + 1) % SLOTS;
+            let slot = &mut slots[*next];
+            slot.finish(output, stopwatch)?;
+            let writing = Instant::now();
+            slot.start(&self.device, &pipeline, &piece)?;
+            stopwatch.timings.work_lists += writing.elapsed();
+            slot.output = start..start + piece.rotation_count();
+            start = slot.output.end;
+        }
+    }
+
+    /// The kernel, made when it is first needed.
+    fn key_pipeline(&self) -> Result<Arc<Pipeline>, VulkanError> {
+        let mut kept = (self.key_pipeline.lock()).unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = &*kept {
+            return Ok(Arc::clone(pipeline));
+        }
+        let exactness = Exactness::Demanded;
+        let pipeline = Pipeline::new(&self.device, sampled_arcs(), SAMPLED_BINDINGS, exactness)?;
+        Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
+    }
+}
+
+impl KeySlot {
+    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            submission: Submission::new(device)?,
+            keys: None,
+            signs: None,
+            samples: None,
+            rotations: None,
+            output: 0..0,
+            compiled: false,
+        })
+    }
+
+    /// Submits one piece.
+    fn start(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        pipeline: &Pipeline,
+        piece: &KeyPiece<'_, '_>,
+    ) -> Result<(), Error> {
+        let [key_bytes, sign_bytes, sample_bytes, rotation_bytes] = piece.bytes();
+        let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
+            Slot::grow(device, buffer, bytes as u64, residence)
+        };
+        room(&mut self.keys, key_bytes, Residence::Upload)?;
+        room(&mut self.signs, sign_bytes, Residence::Upload)?;
+        room(&mut self.samples, sample_bytes, Residence::Upload)?;
+        room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
+        let (Some(keys), Some(signs), Some(samples), Some(rotations)) = (
+            &mut self.keys,
+            &mut self.signs,
+            &mut self.samples,
+            &self.rotations,
+        ) else {
+            unreachable!("grown above");
+        };
+        piece.write(
+            bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes)),
+            bytemuck::cast_slice_mut(signs.bytes_mut(0..sign_bytes)),
+            bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
+        )?;
+        let bindings = [
+            Binding::whole(keys),
+            Binding::whole(signs),
+            Binding::whole(samples),
+            Binding::whole(rotations),
+        ];
+        let rows = piece.rows();
+        let groups = [
+            rows.samples.div_ceil(ROWS_WORKGROUP),
+            piece.row_count() as u32,
+        ];
+        self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
+        self.submission.begin(1)?;
+        self.submission
+            .dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
+        self.submission.barrier(Access::Kernel, Access::Host);
+        self.submission.submit()?;
+        Ok(())
+    }
+
+    /// Waits for the piece in flight, if any, and brings its results home.
+    fn finish(
+        &mut self,
+        output: &mut [[f32; 4]],
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError> {
+        if let Some(spent) = self.submission.wait()? {
+            stopwatch.ran(spent, self.compiled);
+        }
+        let copying = Instant::now();
+        let own: &mut [u8] =
+            bytemuck::cast_slice_mut(&mut output[std::mem::take(&mut self.output)]);
+        if let Some(rotations) = self.rotations.as_ref().filter(|_| !own.is_empty()) {
+            copy(own, rotations.bytes(0..own.len()));
+        }
+        stopwatch.timings.read_back += copying.elapsed();
+        Ok(())
+    }
+}

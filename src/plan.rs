@@ -1,0 +1,227 @@
+//! Where samples lie among the keys of a track, for rotations that are worked out from the
+//! two keys beside them. Tracks that share their times share it.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use crate::clock::FramesError;
+use crate::cpu::{InLanes, in_lanes};
+use crate::frame_clock::{FrameClock, finite_scale, in_frames};
+use crate::numeric::{round_f32, whole_number};
+use crate::schedule::COUNTABLE;
+use crate::segment::Sample;
+use crate::segment::shader::HELD;
+
+/// Boundaries, or samples, worked out together.
+const LANES: usize = 64;
+
+/// Some intervals of a track that follow one another.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretch<'a> {
+    pub(crate) times: &'a [f64],
+    pub(crate) keys: &'a [Quat],
+    /// The track's place in the set.
+    pub(crate) index: usize,
+    /// The first of their keys.
+    pub(crate) first_key: usize,
+}
+
+/// Where the frames of a window lie; what it needs to find out is kept.
+pub(crate) struct FramePlan<'a> {
+    times: &'a [f64],
+    clock: Option<FrameClock>,
+    window: Range<usize>,
+    samples: Vec<Sample>,
+    boundaries: Boundaries,
+}
+
+impl<'a> FramePlan<'a> {
+    pub(crate) fn new() -> Self {
+        Self {
+            times: &[],
+            clock: None,
+            window: 0..0,
+            samples: Vec::new(),
+            boundaries: Boundaries {
+                times: [0.0; LANES],
+                count: 0,
+                clock: None,
+                frames: [0.0; LANES],
+                firsts: [0; LANES],
+                on_frame: [0; LANES],
+                wholes: [0.0; LANES],
+                scales: [0.0; LANES],
+                offsets: [0.0; LANES],
+            },
+        }
+    }
+
+    /// The samples of a window, their keys counted from the stretch's first; found out
+    /// unless that is known already.
+    pub(crate) fn samples(
+        &mut self,
+        stretch: Stretch<'a>,
+        clock: FrameClock,
+        window: &Range<usize>,
+    ) -> Result<&[Sample], FramesError> {
+        let times = stretch.times;
+        if std::ptr::eq(self.times, times) && self.clock == Some(clock) && self.window == *window {
+            return Ok(&self.samples);
+        }
+        self.times = &[];
+        let (from, to) = (window.start as i64, window.end as i64);
+        let last = times.len() - 1;
+        let held = |key: usize| Sample {
+            key: HELD | key as u32,
+            parameter: 0.0,
+        };
+        self.samples.clear();
+        self.samples.resize(window.len(), held(0));
+        self.boundaries.clock = Some(clock);
+        // Each block starts with the boundary that the one before it ended with.
+        let mut end = 0;
+        'blocks: for block in (0..last.max(1)).step_by(LANES - 1) {
+            let own = &times[block..times.len().min(block + LANES)];
+            self.boundaries.times[..own.len()].copy_from_slice(own);
+            self.boundaries.count = own.len();
+            in_lanes(&mut self.boundaries);
+            let bounds = &self.boundaries;
+            end = bounds.firsts[own.len() - 1];
+            for j in 0..own.len() - 1 {
+                let first = bounds.firsts[j];
+                if first >= to {
+                    break 'blocks;
+                }
+                let own = first.max(from)..bounds.firsts[j + 1].min(to);
+                if own.is_empty() {
+                    continue;
+                }
+                let frames = bounds.frames[j + 1] - bounds.frames[j];
+                let (whole, scale) = (bounds.wholes[j], bounds.scales[j]);
+                let distance = |sample: i64| sample as f64 - whole;
+                if frames >= COUNTABLE
+                    && (distance(own.start).abs() >= COUNTABLE
+                        || distance(own.end - 1).abs() >= COUNTABLE)
+                {
+                    return Err(FramesError::GapTooLong {
+                        track: stretch.index,
+                        key: stretch.first_key + block + j,
+                        frames,
+                    });
+                }
+                let is_key = bounds.on_frame[j] == 1 && own.start == first;
+                let key = block + j;
+                let samples = &mut self.samples[(own.start - from) as usize..];
+                for (place, sample) in samples.iter_mut().zip(own) {
+                    *place = Sample {
+                        key: key as u32,
+                        parameter: distance(sample) as f32 * scale + bounds.offsets[j],
+                    };
+                }
+                if is_key {
+                    samples[0] = held(key);
+                }
+            }
+        }
+        if end < to {
+            self.samples[(end.max(from) - from) as usize..].fill(held(last));
+        }
+        (self.times, self.clock, self.window) = (times, Some(clock), window.clone());
+        Ok(&self.samples)
+    }
+}
+
+/// Where intervals start, in frames, and how the parameter runs through them.
+struct Boundaries {
+    times: [f64; LANES],
+    count: usize,
+    clock: Option<FrameClock>,
+    frames: [f64; LANES],
+    /// The first whole frame not before each.
+    firsts: [i64; LANES],
+    /// Whether that is the boundary itself: 1 or 0.
+    on_frame: [i64; LANES],
+    /// As in `InFrames`, of the interval from each to the next.
+    wholes: [f64; LANES],
+    scales: [f32; LANES],
+    offsets: [f32; LANES],
+}
+
+impl InLanes for Boundaries {
+    #[inline(always)]
+    fn run(&mut self) {
+        let Some(clock) = self.clock else { return };
+        let mut frames = [0.0; LANES];
+        let (mut firsts, mut on_frame) = ([0; LANES], [0; LANES]);
+        // Whole vectors, or those left over would be done one by one.
+        let count = self.count.next_multiple_of(8).min(LANES);
+        for j in 0..count {
+            let boundary = clock.boundary(self.times[j]);
+            frames[j] = boundary.frame;
+            firsts[j] = whole_number(within(boundary.first));
+            on_frame[j] = i64::from(boundary.first == boundary.frame);
+        }
+        let mut next = [0.0; LANES];
+        next[..LANES - 1].copy_from_slice(&frames[1..]);
+        let (mut wholes, mut scales, mut offsets) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for j in 0..count {
+            let span = in_frames(frames[j], next[j], 1.0);
+            wholes[j] = span.whole;
+            scales[j] = span.scale;
+            offsets[j] = span.offset;
+        }
+        (self.frames, self.firsts, self.on_frame) = (frames, firsts, on_frame);
+        (self.wholes, self.scales, self.offsets) = (wholes, scales, offsets);
+    }
+}
+
+/// Frames as far away as no sample is.
+#[inline(always)]
+fn within(frame: f64) -> f64 {
+    const FAR: f64 = (1u64 << 50) as f64;
+    let below = if frame < FAR { frame } else { FAR };
+    if below > -FAR { below } else { -FAR }
+}
+
+/// Where a time lies among keys; `near` is the key to look at first.
+#[inline]
+pub(crate) fn time_sample(starts: &[f64], time: f64, near: usize) -> Sample {
+    let last = starts.len() - 1;
+    let held = |key: usize| Sample {
+        key: HELD | key as u32,
+        parameter: 0.0,
+    };
+    if time >= starts[last] {
+        return held(last);
+    }
+    if time < starts[0] {
+        return held(0);
+    }
+    let holds = |key: usize| starts[key] <= time && time < starts[key + 1];
+    // Times mostly increase: there and next before searching.
+    let key = if near < last && holds(near) {
+        near
+    } else if near + 1 < last && holds(near + 1) {
+        near + 1
+    } else {
+        starts.partition_point(|&start| start <= time) - 1
+    };
+    if time == starts[key] {
+        return held(key);
+    }
+    Sample {
+        key: key as u32,
+        parameter: time_parameter(starts[key], starts[key + 1], time),
+    }
+}
+
+/// The parameter of a time between two keys.
+#[inline(always)]
+fn time_parameter(start: f64, end: f64, time: f64) -> f32 {
+    let seconds = end - start;
+    let middle = start + seconds * 0.5;
+    round_f32(time - middle) * finite_scale(1.0 / seconds) + 0.0
+}
