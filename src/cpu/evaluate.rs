@@ -3,7 +3,7 @@
 use crate::segment::shader::TINY_BITS;
 
 /// Samples are evaluated in multiples of this many: the lanes of the widest vector.
-const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = 16;
 
 /// So few samples are evaluated one by one: a block would be mostly waste.
 pub(super) const FEW: usize = 3;
@@ -11,26 +11,57 @@ pub(super) const FEW: usize = 3;
 /// Samples whose components are kept before they are stored.
 pub(super) const CHUNK: usize = 4 * BLOCK;
 
-/// Room for the components of some samples, before they are put together. Aligned to
-/// the widest vector: where one lies across two cache lines, everything takes a sixth
-/// longer.
-#[repr(align(64))]
-pub(crate) struct Scratch {
-    components: [[f32; CHUNK]; 4],
+/// Room for the components of some samples, before they are put together.
+pub(crate) trait Room {
+    /// So many samples.
+    const SAMPLES: usize;
+
+    fn new() -> Self;
+
+    /// The components of the first `count` samples.
+    fn components(&mut self, count: usize) -> [&mut [f32]; 4];
 }
 
-impl Scratch {
-    pub(crate) fn new() -> Self {
+/// Aligned to the widest vector: where one lies across two cache lines, everything takes
+/// a sixth longer.
+#[repr(align(64))]
+pub(crate) struct RoomFor<const SAMPLES: usize> {
+    components: [[f32; SAMPLES]; 4],
+}
+
+impl<const SAMPLES: usize> Room for RoomFor<SAMPLES> {
+    const SAMPLES: usize = SAMPLES;
+
+    #[inline(always)]
+    fn new() -> Self {
         Self {
-            components: [[0.0; CHUNK]; 4],
+            components: [[0.0; SAMPLES]; 4],
         }
+    }
+
+    #[inline(always)]
+    fn components(&mut self, count: usize) -> [&mut [f32]; 4] {
+        // Slices of one length: no bounds check is left to keep a loop scalar.
+        self.components
+            .each_mut()
+            .map(|component| &mut component[..count])
     }
 }
 
 /// One form's formula.
 pub(crate) trait Evaluate {
+    /// Room for the components of the samples that are worked out before they are put
+    /// together.
+    type Room: Room;
+
+    /// What is the same for all samples.
+    #[inline(always)]
+    fn constant(&self) -> f32 {
+        0.0
+    }
+
     /// The rotation at a parameter of the segment, `x y z w`.
-    fn evaluate(&self, parameter: f32) -> [f32; 4];
+    fn evaluate(&self, constant: f32, parameter: f32) -> [f32; 4];
 }
 
 /// How a run's parameter follows from the distance to the segment's middle.
@@ -48,13 +79,13 @@ pub(super) fn frames<S: Evaluate>(
     affine: Affine,
     first: i32,
     count: usize,
-    scratch: &mut Scratch,
+    room: &mut S::Room,
     output: &mut [[f32; 4]],
 ) {
     // An integer converts with one rounding, like the shader's sum of two exact
     // halves.
     let distance = |j: u32| first.wrapping_add(j as i32) as f32;
-    run(segment, affine, count, distance, scratch, output);
+    run(segment, affine, count, distance, room, output);
 }
 
 /// Evaluates the samples whose distances from the middle are given.
@@ -63,17 +94,17 @@ pub(super) fn distances<S: Evaluate>(
     segment: &S,
     affine: Affine,
     distances: &[f32],
-    scratch: &mut Scratch,
+    room: &mut S::Room,
     output: &mut [[f32; 4]],
 ) {
     let distance = |j: u32| distances[(j as usize).min(distances.len() - 1)];
-    run(segment, affine, distances.len(), distance, scratch, output);
+    run(segment, affine, distances.len(), distance, room, output);
 }
 
 /// Evaluates the sample at a distance from the middle.
 #[inline(always)]
 pub(super) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
-    let q = segment.evaluate(distance * affine.scale + affine.offset);
+    let q = segment.evaluate(segment.constant(), distance * affine.scale + affine.offset);
     [
         canonical(q[0]),
         canonical(q[1]),
@@ -92,7 +123,7 @@ fn run<S: Evaluate>(
     affine: Affine,
     count: usize,
     distance: impl Fn(u32) -> f32,
-    scratch: &mut Scratch,
+    room: &mut S::Room,
     output: &mut [[f32; 4]],
 ) {
     if count <= FEW {
@@ -101,17 +132,14 @@ fn run<S: Evaluate>(
         }
         return;
     }
-    for start in (0..count).step_by(CHUNK) {
-        let wanted = (count - start).min(CHUNK);
+    let constant = segment.constant();
+    for start in (0..count).step_by(S::Room::SAMPLES) {
+        let wanted = (count - start).min(S::Room::SAMPLES);
         let whole = wanted.next_multiple_of(BLOCK);
-        // Slices of one length: no bounds check is left to keep the loop scalar.
-        let [x, y, z, w] = scratch
-            .components
-            .each_mut()
-            .map(|component| &mut component[..whole]);
+        let [x, y, z, w] = room.components(whole);
         for j in 0..whole {
             let parameter = distance(start as u32 + j as u32) * affine.scale + affine.offset;
-            let q = segment.evaluate(parameter);
+            let q = segment.evaluate(constant, parameter);
             x[j] = canonical(q[0]);
             y[j] = canonical(q[1]);
             z[j] = canonical(q[2]);

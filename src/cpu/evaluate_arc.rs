@@ -1,14 +1,21 @@
 //! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
 
-use super::evaluate::Evaluate;
+use super::evaluate::{BLOCK, Evaluate, RoomFor};
 use super::sine_cosine::sine_and_fall;
 use crate::segment::ArcSegment;
 
 impl Evaluate for ArcSegment {
+    type Room = RoomFor<{ 4 * BLOCK }>;
+
     #[inline(always)]
-    fn evaluate(&self, parameter: f32) -> [f32; 4] {
+    fn constant(&self) -> f32 {
+        square(self.tangent)
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, square: f32, parameter: f32) -> [f32; 4] {
         let segment = self;
-        let z = parameter * parameter * square(segment.tangent);
+        let z = parameter * parameter * square;
         let (sine, fall) = sine_and_fall(parameter, z);
         std::array::from_fn(|i| {
             segment.middle[i] + (segment.middle[i] * fall + segment.tangent[i] * sine)

@@ -1,11 +1,13 @@
 //! Twin of `shaders/evaluate_polynomial.wgsl`: the same names, the same order.
 
-use super::evaluate::Evaluate;
+use super::evaluate::{BLOCK, Evaluate, RoomFor};
 use crate::segment::PolynomialSegment;
 
 impl Evaluate for PolynomialSegment {
+    type Room = RoomFor<BLOCK>;
+
     #[inline(always)]
-    fn evaluate(&self, s: f32) -> [f32; 4] {
+    fn evaluate(&self, _: f32, s: f32) -> [f32; 4] {
         let segment = self;
         std::array::from_fn(|i| component(|power| segment.coefficients[power][i], s))
     }

@@ -1,7 +1,7 @@
 //! The samples of one track: its runs, evaluated one behind the other. Compiled as
 //! one function for each vector width, so that nothing is called for a run.
 
-use super::evaluate::{Affine, CHUNK, Evaluate, FEW, Scratch, distances, frames, one};
+use super::evaluate::{Affine, CHUNK, Evaluate, FEW, Room, distances, frames, one};
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::numeric::round_f32;
@@ -36,19 +36,19 @@ pub(super) fn row<S: Evaluate>(
         first,
         output,
         // Its own, and not borrowed: the compiler must see that it is not the output.
-        scratch: Scratch::new(),
+        room: S::Room::new(),
     };
     prepared.runs(part, timeline, cycle, &mut row)
 }
 
-struct Row<'a, S> {
+struct Row<'a, S: Evaluate> {
     part: PartRef<'a>,
     segments: &'a [S],
     timeline: &'a Timeline,
     /// The sample that `output` starts with.
     first: usize,
     output: &'a mut [[f32; 4]],
-    scratch: Scratch,
+    room: S::Room,
 }
 
 impl<S: Evaluate> Emit for Row<'_, S> {
@@ -68,7 +68,7 @@ impl<S: Evaluate> Emit for Row<'_, S> {
             } => {
                 let segment = &self.segments[index as usize];
                 let affine = Affine { scale, offset };
-                frames(segment, affine, first, run.count, &mut self.scratch, output);
+                frames(segment, affine, first, run.count, &mut self.room, output);
             }
             RunSource::Segment {
                 index,
@@ -88,7 +88,7 @@ impl<S: Evaluate> Emit for Row<'_, S> {
                         *distance = round_f32(time - middle);
                     }
                     let output = &mut output[start..];
-                    distances(segment, affine, from_middle, &mut self.scratch, output);
+                    distances(segment, affine, from_middle, &mut self.room, output);
                 }
             }
             RunSource::Exact { index, parameter } => {

@@ -109,7 +109,7 @@ fn at(ArcSegment { middle, tangent }: ArcSegment, sign: f32, parameter: f32) -> 
         middle: [mx * sign, my * sign, mz * sign, mw * sign],
         tangent: [tx * sign, ty * sign, tz * sign, tw * sign],
     };
-    let q = segment.evaluate(parameter);
+    let q = segment.evaluate(segment.constant(), parameter);
     [
         canonical(q[0]),
         canonical(q[1]),
