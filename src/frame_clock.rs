@@ -73,8 +73,9 @@ impl FrameClock {
 
     /// The first frame not before a time.
     #[inline(always)]
-    pub(crate) fn first_frame(self, time: f64) -> usize {
-        self.boundary(time).first as usize
+    pub(crate) fn first_frame(self, time: f64) -> f64 {
+        let first = self.boundary(time).first;
+        if first > 0.0 { first } else { 0.0 }
     }
 
     fn time(self, frame: usize) -> f64 {

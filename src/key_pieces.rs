@@ -184,7 +184,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         let last = keys.len() - 1;
         let last_key = (long.key + most - 1).min(last);
         let end = match self.job.clock(times) {
-            Some(clock) if last_key < last => clock.first_frame(times[last_key]),
+            Some(clock) if last_key < last => clock.first_frame(times[last_key]) as usize,
             _ => samples,
         };
         let end = end.clamp(long.sample, samples);

@@ -348,7 +348,7 @@ impl CpuEngine {
         let mut work = Vec::new();
         for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
             let to = match stretches.get(i + 1) {
-                Some(next) => clock.first_frame(next.times[0]).min(timeline.len()),
+                Some(next) => (clock.first_frame(next.times[0]) as usize).min(timeline.len()),
                 None => timeline.len(),
             };
             let (own, others) = output.split_at_mut(to.max(from) - from);

@@ -7,10 +7,11 @@
 
 use std::marker::PhantomData;
 
-use super::intervals::{Intervals, Lane, ROOM, at, energy, put};
+use super::intervals::{Intervals, LANES, Lane, ROOM, at, energy, put};
 use crate::branchless::{self, Algebra, Anywhere, Near, Quaternion, Vector, product, scaled, sum};
 use crate::cpu::InLanes;
 use crate::formula::Product;
+use crate::frame_clock::FrameClock;
 
 /// Steps between keys, and their logarithms.
 pub(super) struct Steps<'a>(pub(super) &'a mut Intervals);
@@ -39,6 +40,30 @@ impl InLanes for Steps<'_> {
             put(&mut logs, j, branchless::log(at(&steps, j)));
         }
         (self.0.dots, self.0.steps, self.0.logs) = (dots, steps, logs);
+    }
+}
+
+/// Whether intervals hold a frame.
+pub(super) struct FramesHeld<'a> {
+    pub(super) clock: FrameClock,
+    pub(super) intervals: &'a Intervals,
+    pub(super) held: [bool; LANES],
+}
+
+impl InLanes for FramesHeld<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let (mut from, mut to) = ([0.0; LANES], [0.0; LANES]);
+        let Intervals { starts, ends, .. } = self.intervals;
+        for j in 0..LANES {
+            from[j] = self.clock.first_frame(starts[j]);
+            to[j] = self.clock.first_frame(ends[j]);
+        }
+        let mut held = [true; LANES];
+        for j in 0..LANES {
+            held[j] = from[j] < to[j];
+        }
+        self.held = held;
     }
 }
 

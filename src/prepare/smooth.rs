@@ -7,7 +7,7 @@ use glam::Quat;
 
 use super::fitting::{Fitting, Place};
 use super::intervals::{Intervals, LANES, Stretch};
-use super::passes::Steps;
+use super::passes::{FramesHeld, Steps};
 use super::retime::Waiting;
 use super::set::Prepare;
 use super::{NONE, Part, Prepared};
@@ -216,9 +216,16 @@ impl SmoothPreparation {
             self.end_values(prepared, &stretch);
             self.beyond(prepared, &stretch);
             let latest = prepared.parts[stretch.part].end;
-            let clock = self
-                .frames
-                .map(|(rate, start)| FrameClock::new(rate, start, latest));
+            let mut holds_frame = [true; LANES];
+            if let Some((rate, start)) = self.frames {
+                let mut held = FramesHeld {
+                    clock: FrameClock::new(rate, start, latest),
+                    intervals: &self.intervals,
+                    held: holds_frame,
+                };
+                in_lanes(&mut held);
+                holds_frame = held.held;
+            }
             for (i, lane) in stretch.lanes().enumerate() {
                 let key = if stretch.key == NONE {
                     NONE
@@ -231,16 +238,13 @@ impl SmoothPreparation {
                     end: self.intervals.ends[lane],
                     key,
                 };
-                let is_empty = |clock: FrameClock| {
-                    clock.first_frame(place.start) == clock.first_frame(place.end)
-                };
                 if self.interpolation.speed == Speed::Constant {
                     let moves = !self.holds(&stretch, lane);
                     let quantity = self.interpolation.quantity;
                     let curve =
                         moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
                     self.waiting.push(place, curve);
-                } else if clock.is_some_and(is_empty) {
+                } else if !holds_frame[lane] {
                     self.fitting.push_constant(place, NONE);
                 } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
                     let keys = self.intervals.keys(lane);
