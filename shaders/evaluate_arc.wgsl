@@ -13,7 +13,7 @@ struct Segment {
 // `parameter`: from -1/2 to 1/2.
 fn evaluate(segment: Segment, parameter: f32) -> vec4f {
     let z = parameter * parameter * square(segment.tangent);
-    let turn = sine_and_fall(parameter, z);
+    let turn = short_sine_and_fall(parameter, z);
     return segment.middle + (segment.middle * turn.y + segment.tangent * turn.x);
 }
 

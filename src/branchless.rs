@@ -20,12 +20,6 @@ pub(crate) fn dot(a: Quaternion, b: Quaternion) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 }
 
-/// `|q|`.
-#[inline(always)]
-pub(crate) fn norm(q: Quaternion) -> f64 {
-    dot(q, q).sqrt()
-}
-
 /// `|v|`.
 #[inline(always)]
 pub(crate) fn length(v: Vector) -> f64 {

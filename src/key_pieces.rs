@@ -10,7 +10,7 @@ use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cpu::{Turns, in_lanes, is_sampled};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::method::{Form, Interpolation, Path};
+use crate::method::{Form, Interpolation};
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
 use crate::rotations::Layout;
@@ -44,7 +44,7 @@ impl<'a> KeyJob<'a> {
         most: usize,
     ) -> Option<Self> {
         let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
-        let is_arcs = interpolation.form() == Form::Arc && interpolation.path == Path::Shortest;
+        let is_arcs = interpolation.form() == Form::Arc;
         // Where samples are explicit times, a track is not cut.
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
@@ -425,7 +425,7 @@ fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32
     let mut sign = first;
     for (i, key) in keys.iter().enumerate() {
         if i > 0 {
-            sign *= flip(keys[i - 1], *key, Path::Shortest);
+            sign *= flip(keys[i - 1], *key);
         }
         if sign < 0.0 {
             turn(i);

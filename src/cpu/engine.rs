@@ -342,8 +342,8 @@ impl CpuEngine {
             let stretches = stretches.par_iter();
             stretches
                 .map_init(new, |arcs, &stretch| arcs.align(stretch, 1.0))
-                .collect::<Result<_, _>>()
-        })?;
+                .collect()
+        });
         let (mut sign, mut from) = (1.0, 0);
         let mut work = Vec::new();
         for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {

@@ -1,7 +1,7 @@
 //! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
 
 use super::evaluate::{BLOCK, Evaluate, RoomFor};
-use super::sine_cosine::sine_and_fall;
+use super::sine_cosine::short_sine_and_fall;
 use crate::segment::ArcSegment;
 
 impl Evaluate for ArcSegment {
@@ -16,7 +16,7 @@ impl Evaluate for ArcSegment {
     fn evaluate(&self, square: f32, parameter: f32) -> [f32; 4] {
         let segment = self;
         let z = parameter * parameter * square;
-        let (sine, fall) = sine_and_fall(parameter, z);
+        let (sine, fall) = short_sine_and_fall(parameter, z);
         std::array::from_fn(|i| {
             segment.middle[i] + (segment.middle[i] * fall + segment.tangent[i] * sine)
         })

@@ -5,8 +5,10 @@
 use super::dispatch::InLanes;
 use super::evaluate::{Evaluate, canonical};
 use super::evaluate_polynomial::component;
-use crate::method::{Form, Interpolation};
-use crate::prepare::{ARC_LANES, IN_DOUBT, any_arc, arc_component, arcs, near_arc, whole};
+use crate::method::Form;
+use crate::prepare::{
+    ARC_LANES, any_turns, arc_component, arc_in_doubt, arc_in_lanes, arcs, whole,
+};
 use crate::segment::ArcSegment;
 
 /// Samples, or intervals, worked out together.
@@ -14,7 +16,7 @@ pub(super) const LANES: usize = ARC_LANES;
 
 /// Samples that wait, one behind the other in the result.
 pub(super) struct SampleBlock {
-    interpolation: Interpolation,
+    form: Form,
     /// The keys beside each; the same one twice where the sample is that key.
     pub(super) from: [[f32; 4]; LANES],
     pub(super) to: [[f32; 4]; LANES],
@@ -25,10 +27,10 @@ pub(super) struct SampleBlock {
 }
 
 impl SampleBlock {
-    pub(super) fn new(interpolation: &Interpolation) -> Self {
+    pub(super) fn new(form: Form) -> Self {
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
-            interpolation: *interpolation,
+            form,
             from: [identity; LANES],
             to: [identity; LANES],
             signs: [1.0; LANES],
@@ -44,7 +46,7 @@ impl InLanes for SampleBlock {
     fn run(&mut self) {
         // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
         // Their signs are as stored.
-        match self.interpolation.form() {
+        match self.form {
             Form::Arc => self.arcs(),
             Form::Polynomial => self.polynomials(),
         }
@@ -54,29 +56,27 @@ impl InLanes for SampleBlock {
 impl SampleBlock {
     #[inline(always)]
     fn arcs(&mut self) {
-        let path = self.interpolation.path;
         let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
-        let mut certain = [1.0; LANES];
+        let mut in_doubt = [false; LANES];
         let mut doubtful = 0;
         for j in 0..whole(self.count) {
-            let near = near_arc(self.from[j], self.to[j], path);
-            let q = at(near.arc, self.signs[j], self.parameters[j]);
-            [x[j], y[j], z[j], w[j]] = q;
-            certain[j] = near.certain;
-            doubtful += u32::from(near.certain <= IN_DOUBT);
+            let lane = arc_in_lanes(self.from[j], self.to[j]);
+            [x[j], y[j], z[j], w[j]] = at(lane.arc, self.signs[j], self.parameters[j]);
+            in_doubt[j] = lane.is_in_doubt();
+            doubtful += u32::from(lane.is_in_doubt());
         }
         self.keep(&[x, y, z, w]);
         if doubtful > 0 {
-            for lane in (0..self.count).filter(|&lane| certain[lane] <= IN_DOUBT) {
-                let any = any_arc(self.from[lane], self.to[lane], path);
-                self.rotations[lane] = at(any.arc, self.signs[lane], self.parameters[lane]);
+            for lane in (0..self.count).filter(|&lane| in_doubt[lane]) {
+                let (arc, _) = arc_in_doubt(self.from[lane], self.to[lane]);
+                self.rotations[lane] = at(arc, self.signs[lane], self.parameters[lane]);
             }
         }
     }
 
     #[inline(always)]
     fn polynomials(&mut self) {
-        let arcs = arcs(&self.from, &self.to, self.count, self.interpolation.path);
+        let arcs = arcs(&self.from, &self.to, self.count);
         let squares = arcs.squares();
         let mut found = [[0.0; LANES]; 4];
         for c in 0..4 {
@@ -118,7 +118,7 @@ fn at(ArcSegment { middle, tangent }: ArcSegment, sign: f32, parameter: f32) -> 
     ]
 }
 
-/// Whether the sign of any key of some is turned, or in doubt.
+/// [`any_turns`].
 pub(crate) struct Turns<'a> {
     pub(crate) keys: &'a [[f32; 4]],
     pub(crate) any: bool,
@@ -127,17 +127,6 @@ pub(crate) struct Turns<'a> {
 impl InLanes for Turns<'_> {
     #[inline(always)]
     fn run(&mut self) {
-        let intervals = self.keys.len().saturating_sub(1);
-        let (from, to) = (
-            &self.keys[..intervals],
-            &self.keys[self.keys.len() - intervals..],
-        );
-        let mut doubtful = 0;
-        for j in 0..intervals {
-            let (a, b) = (from[j], to[j]);
-            let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-            doubtful |= u32::from(dot <= IN_DOUBT);
-        }
-        self.any = doubtful != 0;
+        self.any = any_turns(self.keys);
     }
 }

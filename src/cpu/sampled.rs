@@ -11,9 +11,9 @@ use super::sample_lanes::{LANES, SampleBlock, Turns};
 use crate::clock::{Ticks, Timeline};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::method::{Interpolation, InterpolationError, Path};
+use crate::method::Interpolation;
 use crate::plan::{FramePlan, Stretch, time_sample};
-use crate::prepare::{IN_DOUBT, any_arc, near_arc};
+use crate::prepare::flip;
 use crate::segment::Sample;
 use crate::segment::shader::HELD;
 use crate::tracks::TrackSet;
@@ -33,7 +33,7 @@ impl<'a> SampledArcs<'a> {
     pub(super) fn new(interpolation: &'a Interpolation) -> Self {
         Self {
             interpolation,
-            block: Box::new(SampleBlock::new(interpolation)),
+            block: Box::new(SampleBlock::new(interpolation.form())),
             plan: FramePlan::new(),
             sign: 1.0,
             signs: Vec::new(),
@@ -59,7 +59,7 @@ impl<'a> SampledArcs<'a> {
                 index,
                 first_key: 0,
             };
-            self.align(stretch, 1.0)?;
+            self.align(stretch, 1.0);
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
                     let latest = times[times.len() - 1];
@@ -90,7 +90,7 @@ impl<'a> SampledArcs<'a> {
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
         let mut output = output.iter_mut();
-        self.align(stretch, sign)?;
+        self.align(stretch, sign);
         self.frames(stretch, clock, window, &mut output)?;
         self.block.flush(&mut output);
         Ok(())
@@ -98,42 +98,24 @@ impl<'a> SampledArcs<'a> {
 
     /// The sign of every interval's first key, where the first one's is given; what it
     /// is behind the last.
-    pub(super) fn align(
-        &mut self,
-        stretch: Stretch<'_>,
-        mut sign: f32,
-    ) -> Result<f32, InterpolationError> {
-        let path = self.interpolation.path;
+    pub(super) fn align(&mut self, stretch: Stretch<'_>, mut sign: f32) -> f32 {
         let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
         self.signs.clear();
         self.sign = sign;
-        if keys.len() == 2 && path == Path::Shortest && stretch.first_key == 0 {
+        if keys.len() == 2 && stretch.first_key == 0 {
             // The second key's sign is nobody's first.
-            return Ok(sign);
+            return sign;
         }
         let mut turns = Turns { keys, any: false };
         in_lanes(&mut turns);
-        if !turns.any {
-            return Ok(sign);
-        }
-        self.signs.reserve(keys.len());
-        for (i, pair) in keys.windows(2).enumerate() {
-            self.signs.push(sign);
-            let near = near_arc(pair[0], pair[1], path);
-            let mut flip = near.flip;
-            if near.certain <= IN_DOUBT {
-                let any = any_arc(pair[0], pair[1], path);
-                if any.is_refused {
-                    return Err(InterpolationError::Antipodal {
-                        track: stretch.index,
-                        key: stretch.first_key + i,
-                    });
-                }
-                flip = any.flip;
+        if turns.any {
+            self.signs.reserve(keys.len());
+            for pair in keys.windows(2) {
+                self.signs.push(sign);
+                sign *= flip(pair[0], pair[1]);
             }
-            sign *= flip;
         }
-        Ok(sign)
+        sign
     }
 
     /// The samples in `window` of a stretch's intervals, and of what lies beside the

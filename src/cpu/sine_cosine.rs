@@ -1,7 +1,9 @@
 //! Twin of `shaders/sine_cosine.wgsl`: the same names, the same order.
 
 use crate::segment::shader::{
-    COSINE_2, COSINE_4, COSINE_6, COSINE_8, COSINE_10, SINE_3, SINE_5, SINE_7, SINE_9,
+    COSINE_2, COSINE_4, COSINE_6, COSINE_8, COSINE_10, SHORT_COSINE_2, SHORT_COSINE_4,
+    SHORT_COSINE_6, SHORT_COSINE_8, SHORT_SINE_3, SHORT_SINE_5, SHORT_SINE_7, SINE_3, SINE_5,
+    SINE_7, SINE_9,
 };
 
 /// Sine and cosine for |angle| <= pi/2.
@@ -22,6 +24,16 @@ pub(crate) fn sine_and_fall(x: f32, z: f32) -> (f32, f32) {
     (sine, fall)
 }
 
+/// The same for |a| <= pi/4.
+#[inline(always)]
+pub(super) fn short_sine_and_fall(x: f32, z: f32) -> (f32, f32) {
+    let sine_tail = (SHORT_SINE_7 * z + SHORT_SINE_5) * z + SHORT_SINE_3;
+    let sine = sine_tail * (z * x) + x;
+    let cosine_high = (SHORT_COSINE_8 * z + SHORT_COSINE_6) * z + SHORT_COSINE_4;
+    let fall = (cosine_high * z + SHORT_COSINE_2) * z;
+    (sine, fall)
+}
+
 #[cfg(test)]
 mod tests {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
@@ -29,14 +41,18 @@ mod tests {
     use super::*;
 
     /// Catches a wrong digit in a coefficient, which bit equality alone would not:
-    /// both twins read the same one. Arcs of the shortest path stay within pi/4.
+    /// both twins read the same one.
     #[test]
     fn sine_and_cosine_are_as_accurate_as_stated() {
-        for (range, bound) in [(FRAC_PI_4, 7e-8), (FRAC_PI_2, 1.2e-7)] {
+        let short: fn(f32) -> (f32, f32) = |angle| {
+            let (sine, fall) = short_sine_and_fall(angle, angle * angle);
+            (sine, fall + 1.0)
+        };
+        for (range, bound, pair) in [(FRAC_PI_4, 7e-8, short), (FRAC_PI_2, 1.2e-7, sine_cosine)] {
             let mut worst = 0.0f64;
             for i in -100_000..=100_000 {
                 let angle = i as f32 * (range / 100_000.0);
-                let (sine, cosine) = sine_cosine(angle);
+                let (sine, cosine) = pair(angle);
                 let exact = f64::from(angle).sin_cos();
                 worst = worst.max((f64::from(sine) - exact.0).abs());
                 worst = worst.max((f64::from(cosine) - exact.1).abs());

@@ -33,10 +33,9 @@ impl Interpolation {
     /// What the kernels evaluate for it.
     #[must_use]
     pub fn form(&self) -> Form {
-        if self.is_by_formula() {
-            Form::Polynomial
-        } else {
-            self.method.form
+        match self.method.form {
+            Form::Arc if self.is_by_formula() => Form::Polynomial,
+            form => form,
         }
     }
 
@@ -51,11 +50,13 @@ impl Interpolation {
             && self.speed == Speed::AsKeyed
     }
 
-    /// Whether arcs too are curves with a formula: for what follows from derivatives.
+    /// Whether arcs too are curves with a formula: for what follows from derivatives, and
+    /// where they may be longer than half a turn.
     pub(crate) fn is_by_formula(&self) -> bool {
         let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
         let constant = self.speed == Speed::Constant;
-        self.quantity != Quantity::Rotation || extrapolates || constant
+        let any_length = self.path == Path::AsAuthored;
+        self.quantity != Quantity::Rotation || extrapolates || constant || any_length
     }
 
     pub(crate) fn sides(&self) -> Sides {

@@ -10,7 +10,7 @@ use super::arc_lanes::{ArcLanes, Components, LANES, arcs};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
 use crate::cpu::{InLanes, in_lanes};
-use crate::method::{Ends, Interpolation, InterpolationError, Path};
+use crate::method::{Ends, Interpolation, InterpolationError};
 use crate::segment::{ArcSegment, Segments};
 use crate::tracks::Track;
 
@@ -19,10 +19,9 @@ pub(crate) struct ArcBlock {
     /// Plain numbers: a vector type would keep the loop from being vectorised.
     from: [[f32; 4]; LANES],
     to: [[f32; 4]; LANES],
-    /// The track and the key that each interval starts with.
-    places: [(usize, usize); LANES],
+    /// Whether each starts a track.
+    is_first: [bool; LANES],
     count: usize,
-    path: Path,
     /// The sign of each interval's first key after those before it in its track.
     signs: [f32; LANES],
     arcs: ArcLanes,
@@ -30,13 +29,12 @@ pub(crate) struct ArcBlock {
 }
 
 impl ArcBlock {
-    fn new(path: Path) -> Self {
+    fn new() -> Self {
         Self {
             from: [[0.0; 4]; LANES],
             to: [[0.0; 4]; LANES],
-            places: [(0, 0); LANES],
+            is_first: [false; LANES],
             count: 0,
-            path,
             signs: [1.0; LANES],
             arcs: ArcLanes::default(),
             segments: [ArcSegment::zeroed(); LANES],
@@ -48,7 +46,7 @@ impl InLanes for ArcBlock {
     /// Works out every interval that waits.
     #[inline(always)]
     fn run(&mut self) {
-        self.arcs = arcs(&self.from, &self.to, self.count, self.path);
+        self.arcs = arcs(&self.from, &self.to, self.count);
     }
 }
 
@@ -93,7 +91,7 @@ pub(crate) struct ArcPreparation {
 impl ArcPreparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
-            block: ArcBlock::new(interpolation.path),
+            block: ArcBlock::new(),
             ends: interpolation.ends,
             sign: 1.0,
         }
@@ -140,34 +138,30 @@ impl Prepare for ArcPreparation {
         });
         for key in intervals {
             if self.block.count == LANES {
-                self.flush(prepared)?;
+                self.flush(prepared);
             }
             let lane = self.block.count;
             self.block.from[lane] = track.keys[key].to_array();
             self.block.to[lane] = track.keys[key + 1].to_array();
-            self.block.places[lane] = (index, key);
+            self.block.is_first[lane] = key == 0;
             self.block.count += 1;
         }
         Ok(())
     }
 
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
-        self.flush(prepared)?;
+        self.flush(prepared);
         Ok(self.sign)
     }
 }
 
 impl ArcPreparation {
-    fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
+    fn flush(&mut self, prepared: &mut Prepared) {
         in_lanes(&mut self.block);
         let block = &mut self.block;
         let count = block.count;
-        if let Some(lane) = block.arcs.refused {
-            let (track, key) = block.places[lane];
-            return Err(InterpolationError::Antipodal { track, key });
-        }
         for lane in 0..count {
-            if block.places[lane].1 == 0 {
+            if block.is_first[lane] {
                 self.sign = 1.0;
             }
             block.signs[lane] = self.sign;
@@ -179,7 +173,6 @@ impl ArcPreparation {
         };
         segments.extend_from_slice(&block.segments[..count]);
         block.count = 0;
-        Ok(())
     }
 }
 
@@ -193,7 +186,7 @@ mod tests {
     #[test]
     fn every_vector_width_prepares_the_same_bits() {
         let filled = || {
-            let mut block = ArcBlock::new(Path::Shortest);
+            let mut block = ArcBlock::new();
             for lane in 0..LANES - 3 {
                 let step = 10.0f32.powi(-(lane as i32 % 8)) * 3.0;
                 let key = Quat::from_rotation_y(lane as f32) * Quat::from_rotation_x(0.3);

@@ -11,7 +11,7 @@ use super::shape::Shape;
 use super::steady::SteadyBlock;
 use super::{NONE, Prepared, Source};
 use crate::cpu::in_lanes;
-use crate::method::{Path, Quantity};
+use crate::method::Quantity;
 use crate::segment::{PolynomialSegment, Segments};
 
 /// Fits curves; what it needs for that is kept.
@@ -116,14 +116,13 @@ impl Fitting {
         prepared: &mut Prepared,
         place: Place,
         keys: [[f32; 4]; 2],
-        path: Path,
     ) {
         let segments = polynomials(prepared);
         let segment = segments.len() as u32;
         segments.push(PolynomialSegment::zeroed());
         let source = CurveSource::Segment(segment);
         self.intervals.push(Fitted { place, source });
-        let new = || Box::new(SteadyBlock::new(path));
+        let new = || Box::new(SteadyBlock::new());
         let block = self.steady.get_or_insert_with(new);
         block.push(keys, segment);
         if block.is_full() {

@@ -23,7 +23,9 @@ mod steady;
 mod steps;
 mod vectors;
 
-pub(crate) use arc_lanes::{IN_DOUBT, LANES as ARC_LANES, any_arc, arcs, flip, near_arc, whole};
+pub(crate) use arc_lanes::{
+    LANES as ARC_LANES, any_turns, arc_in_doubt, arc_in_lanes, arcs, flip, whole,
+};
 pub(crate) use clip_data::{ClipData, PartRef, Wanted};
 pub(crate) use curve::Curve;
 pub(crate) use intervals::{Intervals, Stretch};

@@ -248,8 +248,7 @@ impl SmoothPreparation {
                     self.fitting.push_constant(place, NONE);
                 } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
                     let keys = self.intervals.keys(lane);
-                    let path = self.interpolation.path;
-                    self.fitting.push_steady(prepared, place, keys, path);
+                    self.fitting.push_steady(prepared, place, keys);
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);
                 } else if key == NONE {

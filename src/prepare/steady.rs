@@ -6,7 +6,6 @@
 
 use super::arc_lanes::{LANES, arcs};
 use crate::cpu::InLanes;
-use crate::method::Path;
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 
@@ -51,19 +50,17 @@ pub(super) struct SteadyBlock {
     /// Where each polynomial goes among the segments.
     segments: [u32; LANES],
     count: usize,
-    path: Path,
     coefficients: [[[f32; LANES]; 4]; COEFFICIENTS],
 }
 
 impl SteadyBlock {
-    pub(super) fn new(path: Path) -> Self {
+    pub(super) fn new() -> Self {
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
             from: [identity; LANES],
             to: [identity; LANES],
             segments: [0; LANES],
             count: 0,
-            path,
             coefficients: [[[0.0; LANES]; 4]; COEFFICIENTS],
         }
     }
@@ -96,7 +93,7 @@ impl SteadyBlock {
 impl InLanes for SteadyBlock {
     #[inline(always)]
     fn run(&mut self) {
-        let arcs = arcs(&self.from, &self.to, self.count, self.path);
+        let arcs = arcs(&self.from, &self.to, self.count);
         let squares = arcs.squares();
         let mut found = [[[0.0; LANES]; 4]; COEFFICIENTS];
         for c in 0..4 {
