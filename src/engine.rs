@@ -272,6 +272,7 @@ impl Engine {
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
         let by_segments = !(self.is_fused(set, &interpolation, layout)
             || on_cpu && is_sampled(set, &interpolation, &timeline)
+            || self.is_in_stretches(set, &interpolation, &timeline, layout)
             || self
                 .key_job(set, 0..tracks, &interpolation, &timeline, layout)
                 .is_some());

@@ -8,7 +8,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{FramesError, Timeline};
-use crate::cpu::is_sampled;
+use crate::cpu::{is_in_stretches, is_sampled};
 use crate::engine::{Backend, Engine, Error};
 use crate::key_pieces::KeyJob;
 use crate::method::Interpolation;
@@ -45,6 +45,15 @@ impl Engine {
             let mut rows = tracks.zip(output.chunks_mut(samples));
             return rows.try_for_each(|(track, row)| {
                 engine.sampled_track(set, track, &interpolation, timeline, row)
+            });
+        }
+        if let (Backend::Cpu(engine), true) = (
+            &*self.backend,
+            self.is_in_stretches(set, &interpolation, timeline, layout),
+        ) {
+            let mut rows = tracks.zip(output.chunks_mut(samples));
+            return rows.try_for_each(|(track, row)| {
+                engine.long_track(set, track, &interpolation, timeline, row)
             });
         }
         if let Backend::Vulkan(opened) = &*self.backend
@@ -98,6 +107,20 @@ impl Engine {
             used = Some(clip);
         }
         Ok(())
+    }
+
+    /// Whether a set's tracks are so long that the threads share each.
+    pub(crate) fn is_in_stretches(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+    ) -> bool {
+        let on_cpu = matches!(*self.backend, Backend::Cpu(_));
+        let in_rows = layout == Layout::TrackMajor && !timeline.is_empty();
+        let long = !self.is_fused(set, interpolation, layout);
+        on_cpu && in_rows && long && is_in_stretches(interpolation, timeline)
     }
 
     /// What a Vulkan device does straight from keys.

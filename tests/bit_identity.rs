@@ -461,6 +461,53 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     }
 }
 
+/// A long track goes through the CPU in stretches that are prepared, evaluated and
+/// forgotten, by every method: the same bits as of a clip, whatever its keys' signs are, and
+/// the same refusals.
+#[test]
+fn long_tracks_in_stretches_have_the_same_bits() {
+    let mut random = Random(81);
+    let (mut times, mut keys) = (Vec::new(), Vec::new());
+    let (mut time, mut key) = (-20.0, random.rotation());
+    for _ in 0..20_000 {
+        times.push(time);
+        let sign = random.pick(&[1.0, 1.0, 1.0, -1.0]);
+        keys.push(key.as_quat() * sign);
+        time += random.between(0.01, 0.1);
+        key = (DQuat::from_axis_angle(random.direction(), 0.3) * key).normalize();
+    }
+    let mut set = TrackSet::new();
+    set.push("", &times, &keys).unwrap();
+    let (start, end) = set.time_span().unwrap();
+    let requests = [
+        Frames::fps(30),
+        Frames::fps(2).between(start - 3.0, end + 3.0),
+        Frames::fps(24).between(start + 50.0, start + 300.0),
+    ];
+    for (method, ends) in METHODS.into_iter().zip(ENDS.into_iter().cycle()) {
+        let interpolation = Interpolation {
+            ends,
+            ..method.into()
+        };
+        for frames in &requests {
+            let clip = cpu().upload(&set, interpolation).unwrap();
+            let expected = clip.evaluate(frames).unwrap();
+            let found = cpu().evaluate(&set, interpolation, frames).unwrap();
+            assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+        }
+    }
+    keys[9000] = -keys[8999];
+    let mut set = TrackSet::new();
+    set.push("", &times, &keys).unwrap();
+    let as_authored = Interpolation {
+        path: Path::AsAuthored,
+        ..method::CATMULL_ROM.into()
+    };
+    let refused = cpu().evaluate(&set, as_authored, &requests[0]);
+    let words = refused.unwrap_err().to_string();
+    assert!(words.contains("keys 8999 and 9000"), "{words}");
+}
+
 /// Tracks of two keys alone take a way of their own on the CPU, and have polynomials that
 /// nobody fitted: the same bits as by segments, at every width, and near the reference.
 #[test]

@@ -7,13 +7,11 @@ use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
 use super::sampled::SampledArcs;
-use crate::clock::{FramesError, Ticks, Timeline};
+use crate::clock::{FramesError, Timeline};
 use crate::cycle::{Cycle, Sides};
 use crate::encoding::Encoding;
 use crate::engine::Error;
-use crate::frame_clock::FrameClock;
 use crate::method::{Form, Interpolation};
-use crate::plan::Stretch;
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared, Wanted};
 use crate::rotations::Layout;
 use crate::segment::Segments;
@@ -32,9 +30,6 @@ const TASK_FRAMES: usize = 256;
 
 /// Keys that one turn of a task prepares: their segments stay in the cache.
 pub(crate) const TASK_KEYS: usize = 1024;
-
-/// Intervals of a long track that one task takes.
-const STRETCH: usize = 16 * 1024;
 
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
@@ -120,7 +115,7 @@ impl CpuEngine {
     }
 
     /// Runs `work` with the engine's own threads, where it has any.
-    fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+    pub(super) fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
@@ -201,7 +196,7 @@ impl CpuEngine {
     }
 
     /// The samples of one part of a track.
-    fn part(
+    pub(super) fn part(
         &self,
         part: PartRef<'_>,
         timeline: &Timeline,
@@ -283,7 +278,7 @@ impl CpuEngine {
     }
 
     /// As [`CpuEngine::evaluate_set`], for arcs with fewer samples than keys.
-    fn sampled_arcs(
+    pub(super) fn sampled_arcs(
         &self,
         set: &TrackSet,
         tracks: Range<usize>,
@@ -304,62 +299,6 @@ impl CpuEngine {
         self.on_threads(|| {
             let rows = output.par_chunks_mut(samples * each).enumerate();
             rows.try_for_each(task)
-        })
-    }
-
-    /// As [`CpuEngine::sampled_arcs`], for one track that all threads share: stretches
-    /// of its intervals, once for the signs of their keys and once for their samples.
-    pub(crate) fn sampled_track(
-        &self,
-        set: &TrackSet,
-        index: usize,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
-        let track = set.track(index);
-        let (Ticks::Frames { rate, start }, 1..) = (&timeline.ticks, track.keys.len() - 1) else {
-            return self.sampled_arcs(set, index..index + 1, interpolation, timeline, output);
-        };
-        interpolation.ends.check(track.keys, index)?;
-        let last = track.keys.len() - 1;
-        let clock = FrameClock::new(*rate, *start, track.times[last]);
-        let stretches: Vec<Stretch<'_>> = (0..last)
-            .step_by(STRETCH)
-            .map(|first_key| {
-                let last_key = (first_key + STRETCH).min(last);
-                Stretch {
-                    times: &track.times[first_key..=last_key],
-                    keys: &track.keys[first_key..=last_key],
-                    index,
-                    first_key,
-                }
-            })
-            .collect();
-        let new = || SampledArcs::new(interpolation);
-        let flips: Vec<f32> = self.on_threads(|| {
-            let stretches = stretches.par_iter();
-            stretches
-                .map_init(new, |arcs, &stretch| arcs.align(stretch, 1.0))
-                .collect()
-        });
-        let (mut sign, mut from) = (1.0, 0);
-        let mut work = Vec::new();
-        for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
-            let to = match stretches.get(i + 1) {
-                Some(next) => (clock.first_frame(next.times[0]) as usize).min(timeline.len()),
-                None => timeline.len(),
-            };
-            let (own, others) = output.split_at_mut(to.max(from) - from);
-            work.push((stretch, sign, from..to.max(from), own));
-            (output, sign, from) = (others, sign * flip, to.max(from));
-        }
-        self.on_threads(|| {
-            work.into_par_iter()
-                .try_for_each_init(new, |arcs, (stretch, sign, window, own)| {
-                    arcs.stretch(stretch, sign, clock, &window, own)
-                })
         })
     }
 }

@@ -151,7 +151,7 @@ impl Prepare for ArcPreparation {
 
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
         self.flush(prepared);
-        Ok(self.sign)
+        Ok(std::mem::replace(&mut self.sign, 1.0))
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) use passes::{
     BetweenHandles, BetweenNeighbours, ControlRotations, EndHandle, EndInterval, HandleRule,
     Handles, Interval, KeyHandles,
 };
-pub(crate) use set::Preparation;
+pub(crate) use set::{BATCH, Preparation};
 pub(crate) use shape::Shape;
 pub(crate) use steady::arc_component;
 

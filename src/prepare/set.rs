@@ -20,7 +20,7 @@ use crate::segment::segment_size;
 use crate::tracks::{Track, TrackSet};
 
 /// Key intervals prepared as one piece of work.
-const BATCH: usize = 4096;
+pub(crate) const BATCH: usize = 4096;
 
 /// Prepares tracks of a set, in parallel: one [`Prepared`] for each batch of tracks, or of
 /// intervals where a track is long, in order.
@@ -120,7 +120,7 @@ fn prepare_long(
     let mut sign = 1.0;
     let with_sign = |(mut prepared, own): (Prepared, f32)| {
         if sign < 0.0 {
-            negate(&mut prepared, interpolation);
+            prepared.negate(interpolation);
         }
         sign *= own;
         prepared
@@ -128,21 +128,23 @@ fn prepare_long(
     Ok(pieces.into_iter().map(with_sign).collect())
 }
 
-/// The same rotations with the other sign, but for those that are the keys' own.
-fn negate(prepared: &mut Prepared, interpolation: &Interpolation) {
-    if interpolation.quantity != Quantity::Rotation {
-        return; // both signs move alike
-    }
-    prepared.segments.negate();
-    for curve in &mut prepared.exact {
-        curve.negate();
-    }
-    let frozen = matches!(interpolation.ends, Ends::Frozen);
-    if !interpolation.method.interpolates && !frozen {
-        let ends = prepared.parts.iter().map(|part| part.after);
-        for constant in ends.filter(|&constant| constant != NONE) {
-            let value = &mut prepared.constants[constant as usize];
-            *value = value.map(|component| canonical(-component));
+impl Prepared {
+    /// The same rotations with the other sign, but for those that are the keys' own.
+    pub(crate) fn negate(&mut self, interpolation: &Interpolation) {
+        if interpolation.quantity != Quantity::Rotation {
+            return; // both signs move alike
+        }
+        self.segments.negate();
+        for curve in &mut self.exact {
+            curve.negate();
+        }
+        let frozen = matches!(interpolation.ends, Ends::Frozen);
+        if !interpolation.method.interpolates && !frozen {
+            let ends = self.parts.iter().map(|part| part.after);
+            for constant in ends.filter(|&constant| constant != NONE) {
+                let value = &mut self.constants[constant as usize];
+                *value = value.map(|component| canonical(-component));
+            }
         }
     }
 }
@@ -159,7 +161,8 @@ pub(super) trait Prepare: Send {
     ) -> Result<(), InterpolationError>;
 
     /// Finishes what was added; what the signs of the last track's keys make of the
-    /// next, if the first interval added has its key's sign as stored.
+    /// next, if the first interval added has its key's sign as stored, as the next one
+    /// added will have.
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError>;
 
     /// From now on only intervals that hold a frame need segments.
@@ -209,8 +212,10 @@ impl Preparation {
 
     /// Prepares some intervals of one track as a part, its first key as it is
     /// stored; what the sign of the key after the last interval is then.
-    fn push_piece(
-        mut self,
+    /// Prepares some intervals of a track, the `index`th of its set, as if the first of their
+    /// keys had the sign it is stored with; what it would make of the sign of the last.
+    pub(crate) fn push_piece(
+        &mut self,
         prepared: &mut Prepared,
         track: Track,
         index: usize,

@@ -1,0 +1,173 @@
+//! Long tracks, which all threads share: stretches of their intervals, in memory that is
+//! used again.
+
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use super::engine::CpuEngine;
+use super::sampled::SampledArcs;
+use crate::clock::{Ticks, Timeline};
+use crate::cycle::{Cycle, Sides};
+use crate::engine::Error;
+use crate::frame_clock::FrameClock;
+use crate::method::{Interpolation, Speed};
+use crate::plan::Stretch;
+use crate::prepare::{BATCH, PartRef, Preparation, Prepared};
+use crate::tracks::TrackSet;
+
+/// Intervals that one task takes, where nothing is prepared.
+const STRETCH: usize = 16 * 1024;
+
+/// Whether a track can be evaluated stretch by stretch: its samples are in order, and lie
+/// between its keys or are held.
+pub(crate) fn is_in_stretches(interpolation: &Interpolation, timeline: &Timeline) -> bool {
+    matches!(timeline.ticks, Ticks::Frames { .. })
+        && interpolation.sides() == Sides::default()
+        && interpolation.speed == Speed::AsKeyed
+}
+
+/// Some intervals of a track, and its samples among them.
+struct Piece<'o> {
+    intervals: Range<usize>,
+    samples: Range<usize>,
+    output: &'o mut [[f32; 4]],
+    /// What its keys' signs make of the next key's.
+    flip: f32,
+}
+
+impl CpuEngine {
+    /// As [`CpuEngine::sampled_arcs`], for one track that all threads share: stretches
+    /// of its intervals, once for the signs of their keys and once for their samples.
+    pub(crate) fn sampled_track(
+        &self,
+        set: &TrackSet,
+        index: usize,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let track = set.track(index);
+        let (Ticks::Frames { rate, start }, 1..) = (&timeline.ticks, track.keys.len() - 1) else {
+            return self.sampled_arcs(set, index..index + 1, interpolation, timeline, output);
+        };
+        interpolation.ends.check(track.keys, index)?;
+        let last = track.keys.len() - 1;
+        let clock = FrameClock::new(*rate, *start, track.times[last]);
+        let stretches: Vec<Stretch<'_>> = (0..last)
+            .step_by(STRETCH)
+            .map(|first_key| {
+                let last_key = (first_key + STRETCH).min(last);
+                Stretch {
+                    times: &track.times[first_key..=last_key],
+                    keys: &track.keys[first_key..=last_key],
+                    index,
+                    first_key,
+                }
+            })
+            .collect();
+        let new = || SampledArcs::new(interpolation);
+        let flips: Vec<f32> = self.on_threads(|| {
+            let stretches = stretches.par_iter();
+            stretches
+                .map_init(new, |arcs, &stretch| arcs.align(stretch, 1.0))
+                .collect()
+        });
+        let (mut sign, mut from) = (1.0, 0);
+        let mut work = Vec::new();
+        for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
+            let to = match stretches.get(i + 1) {
+                Some(next) => (clock.first_frame(next.times[0]) as usize).min(timeline.len()),
+                None => timeline.len(),
+            };
+            let (own, others) = output.split_at_mut(to.max(from) - from);
+            work.push((stretch, sign, from..to.max(from), own));
+            (output, sign, from) = (others, sign * flip, to.max(from));
+        }
+        self.on_threads(|| {
+            work.into_par_iter()
+                .try_for_each_init(new, |arcs, (stretch, sign, window, own)| {
+                    arcs.stretch(stretch, sign, clock, &window, own)
+                })
+        })
+    }
+
+    /// One track that [`is_in_stretches`]: each is prepared, evaluated and forgotten.
+    pub(crate) fn long_track(
+        &self,
+        set: &TrackSet,
+        index: usize,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), Error> {
+        let Ticks::Frames { rate, start } = timeline.ticks else {
+            unreachable!("samples in order");
+        };
+        let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let track = set.track(index);
+        let intervals = track.keys.len() - 1;
+        let first_sample = |interval: usize| {
+            let end = (interval + BATCH).min(intervals);
+            let clock = FrameClock::new(rate, start, track.times[end]);
+            (clock.first_frame(track.times[interval]) as usize).min(timeline.len())
+        };
+        let mut pieces = Vec::new();
+        let mut from = 0;
+        for first in (0..intervals.max(1)).step_by(BATCH) {
+            let end = (first + BATCH).min(intervals);
+            let to = match end < intervals {
+                true => first_sample(end).max(from),
+                false => timeline.len(),
+            };
+            let (own, others) = output.split_at_mut(to - from);
+            pieces.push(Piece {
+                intervals: first..end,
+                samples: from..to,
+                output: own,
+                flip: 1.0,
+            });
+            (output, from) = (others, to);
+        }
+        let new = || {
+            let mut preparation = Preparation::new(interpolation);
+            preparation.only_for(timeline, set);
+            (Prepared::new(interpolation), preparation)
+        };
+        let evaluate = |(prepared, preparation): &mut (Prepared, Preparation),
+                        piece: &mut Piece<'_>,
+                        sign: f32|
+         -> Result<(), Error> {
+            prepared.clear();
+            piece.flip = preparation.push_piece(prepared, track, index, piece.intervals.clone())?;
+            if sign < 0.0 {
+                prepared.negate(interpolation);
+            }
+            let part = PartRef {
+                prepared,
+                part: &prepared.parts[0],
+            };
+            let cycle = Cycle::own(piece.samples.clone());
+            Ok(self.part(part, timeline, &cycle, piece.output)?)
+        };
+        self.on_threads(|| {
+            let all = pieces.par_iter_mut();
+            all.try_for_each_init(new, |memory, piece| evaluate(memory, piece, 1.0))?;
+            // Those whose keys before them turn their sign, once more.
+            let mut sign = 1.0;
+            let mut turned = Vec::new();
+            for piece in &mut pieces {
+                let flip = piece.flip;
+                if sign < 0.0 && !piece.samples.is_empty() {
+                    turned.push(piece);
+                }
+                sign *= flip;
+            }
+            turned
+                .into_par_iter()
+                .try_for_each_init(new, |memory, piece| evaluate(memory, piece, -1.0))
+        })
+    }
+}
