@@ -14,12 +14,17 @@ impl Evaluate for ArcSegment {
 
     #[inline(always)]
     fn evaluate(&self, square: f32, parameter: f32) -> [f32; 4] {
-        let segment = self;
         let z = parameter * parameter * square;
         let (sine, fall) = short_sine_and_fall(parameter, z);
-        std::array::from_fn(|i| {
-            segment.middle[i] + (segment.middle[i] * fall + segment.tangent[i] * sine)
-        })
+        let [mx, my, mz, mw] = self.middle;
+        let [tx, ty, tz, tw] = self.tangent;
+        // Written out: closures are not always inlined.
+        [
+            mx + (mx * fall + tx * sine),
+            my + (my * fall + ty * sine),
+            mz + (mz * fall + tz * sine),
+            mw + (mw * fall + tw * sine),
+        ]
     }
 }
 

@@ -8,8 +8,35 @@ impl Evaluate for PolynomialSegment {
 
     #[inline(always)]
     fn evaluate(&self, _: f32, s: f32) -> [f32; 4] {
-        let segment = self;
-        std::array::from_fn(|i| component(|power| segment.coefficients[power][i], s))
+        // Written out: closures are not always inlined.
+        let c = &self.coefficients;
+        let z = s * s;
+        let (mut even, mut odd) = (c[10], c[9]);
+        macro_rules! step {
+            ($sum:ident, $power:literal) => {
+                $sum = [
+                    $sum[0] * z + c[$power][0],
+                    $sum[1] * z + c[$power][1],
+                    $sum[2] * z + c[$power][2],
+                    $sum[3] * z + c[$power][3],
+                ];
+            };
+        }
+        step!(even, 8);
+        step!(odd, 7);
+        step!(even, 6);
+        step!(odd, 5);
+        step!(even, 4);
+        step!(odd, 3);
+        step!(even, 2);
+        step!(odd, 1);
+        step!(even, 0);
+        [
+            odd[0] * s + even[0],
+            odd[1] * s + even[1],
+            odd[2] * s + even[2],
+            odd[3] * s + even[3],
+        ]
     }
 }
 
