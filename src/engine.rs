@@ -276,7 +276,12 @@ impl Engine {
             || self
                 .key_job(set, 0..tracks, &interpolation, &timeline, layout)
                 .is_some());
-        if by_segments && self.pieces(set, 0..tracks, &interpolation, &timeline).len() == 1 {
+        if by_segments
+            && self
+                .pieces(set, 0..tracks, &interpolation, &timeline, layout)
+                .len()
+                == 1
+        {
             let wanted = Wanted {
                 only_for: Some(&timeline),
                 ..Wanted::all(set, None)

@@ -8,17 +8,33 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{FramesError, Timeline};
-use crate::cpu::{is_in_stretches, is_sampled};
+use crate::cpu::{first_sample, is_in_stretches, is_sampled};
 use crate::engine::{Backend, Engine, Error};
 use crate::key_pieces::KeyJob;
 use crate::method::Interpolation;
-use crate::prepare::Wanted;
+use crate::prepare::{BATCH, Wanted};
 use crate::rotations::Layout;
 use crate::segment::segment_size;
 use crate::tracks::TrackSet;
+use crate::window::Window;
 
 /// Bytes of segments that a Vulkan device gets at once where keys are many.
 const DENSE_PIECE: usize = 64 << 20;
+
+/// What a device gets at once: some tracks, or some intervals of one.
+pub(crate) struct Piece {
+    tracks: Range<usize>,
+    intervals: Option<Range<usize>>,
+}
+
+impl Piece {
+    fn of_tracks(tracks: Range<usize>) -> Self {
+        Self {
+            tracks,
+            intervals: None,
+        }
+    }
+}
 
 impl Engine {
     /// Some tracks at the samples of a timeline, which is the whole set's; `output` fits
@@ -62,30 +78,61 @@ impl Engine {
             let output = bytemuck::cast_slice_mut(output);
             return opened.attempt_smaller(|engine| engine.evaluate_keys(&job, output));
         }
-        let mut pieces = VecDeque::from(self.pieces(set, tracks.clone(), &interpolation, timeline));
+        let pieces = self.pieces(set, tracks.clone(), &interpolation, timeline, layout);
+        let mut pieces = VecDeque::from(pieces);
         // What one piece needed, the next one uses again: fresh memory costs more than
         // what is done with it.
         let mut used: Option<Clip> = None;
         let mut columns: Vec<Quat> = Vec::new();
-        while let Some(piece) = pieces.pop_front() {
+        while let Some(Piece {
+            tracks: piece,
+            intervals,
+        }) = pieces.pop_front()
+        {
             let of_piece = timeline.of_tracks(piece.clone());
+            let sign = match (&used, &intervals) {
+                (Some(before), Some(own)) if own.start > 0 => before.data.sign,
+                _ => 1.0,
+            };
             let (spare, buffers) = used.take().map_or_else(Default::default, Clip::into_spare);
             let wanted = Wanted {
                 tracks: piece.clone(),
-                few_groups: piece != tracks,
+                few_groups: piece != tracks || intervals.is_some(),
                 only_for: Some(&of_piece),
+                intervals: intervals.clone().map(|own| (own, sign)),
                 spare,
                 ..Wanted::all(set, None)
             };
             let clip = match self.upload_wanted(set, interpolation, wanted, buffers) {
                 Err(Error::Vulkan(error)) if error.is_out_of_memory() && piece.len() > 1 => {
                     let middle = piece.start + piece.len() / 2;
-                    pieces.push_front(middle..piece.end);
-                    pieces.push_front(piece.start..middle);
+                    pieces.push_front(Piece::of_tracks(middle..piece.end));
+                    pieces.push_front(Piece::of_tracks(piece.start..middle));
                     continue;
                 }
                 clip => clip?,
             };
+            if let Some(own) = intervals {
+                let track = set.track(piece.start);
+                let from = match own.start {
+                    0 => 0,
+                    start => first_sample(track.times, timeline, start),
+                };
+                let to = match own.end + 1 == track.keys.len() {
+                    true => samples,
+                    false => first_sample(track.times, timeline, own.end).max(from),
+                };
+                let window = Window {
+                    samples: from..to,
+                    ..Window::whole(1, samples, layout)
+                };
+                let row = (piece.start - tracks.start) * samples;
+                let place = &mut output[row + from..row + to];
+                clip.evaluate_window_into(&of_piece, &window, place)
+                    .map_err(|error| error.of_tracks_from(piece.start))?;
+                used = Some(clip);
+                continue;
+            }
             let own = piece.start - tracks.start..piece.end - tracks.start;
             let is_contiguous = layout == Layout::TrackMajor || piece == tracks;
             let place = if is_contiguous {
@@ -139,16 +186,17 @@ impl Engine {
         KeyJob::new(set, tracks, interpolation, timeline, layout, most)
     }
 
-    /// Ranges of tracks whose segments fit the device's budget; and where keys are far more
-    /// than samples, pieces that are quickly done with: fresh memory for all of their
-    /// segments would cost more than making them.
+    /// Tracks whose segments fit the device's budget, or intervals of a track that does not;
+    /// and where keys are far more than samples, pieces that are quickly done with: fresh
+    /// memory for all of their segments would cost more than making them.
     pub(crate) fn pieces(
         &self,
         set: &TrackSet,
         tracks: Range<usize>,
         interpolation: &Interpolation,
         timeline: &Timeline,
-    ) -> Vec<Range<usize>> {
+        layout: Layout,
+    ) -> Vec<Piece> {
         let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
         let result = set.track_count() * timeline.len() * size_of::<Quat>();
         let is_dense = (set.key_count() * key_bytes) / 4 > result;
@@ -163,17 +211,30 @@ impl Engine {
             }
             Backend::Cpu(_) => usize::MAX,
         };
+        let in_stretches = layout == Layout::TrackMajor && is_in_stretches(interpolation, timeline);
         let mut pieces = Vec::new();
         let (mut start, mut bytes) = (tracks.start, 0usize);
         for index in tracks.clone() {
-            let own = set.times_and_keys(index).1.len() * key_bytes;
+            let keys = set.times_and_keys(index).1.len();
+            let own = keys * key_bytes;
             if bytes.saturating_add(own) > limit && index > start {
-                pieces.push(start..index);
+                pieces.push(Piece::of_tracks(start..index));
                 (start, bytes) = (index, 0);
+            }
+            if own > limit && in_stretches && keys > BATCH {
+                let each = (limit / key_bytes / BATCH).max(1) * BATCH;
+                pieces.extend((0..keys - 1).step_by(each).map(|first| Piece {
+                    tracks: index..index + 1,
+                    intervals: Some(first..(first + each).min(keys - 1)),
+                }));
+                start = index + 1;
+                continue;
             }
             bytes += own;
         }
-        pieces.push(start..tracks.end);
+        if start < tracks.end || pieces.is_empty() {
+            pieces.push(Piece::of_tracks(start..tracks.end));
+        }
         pieces
     }
 }

@@ -461,8 +461,8 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     }
 }
 
-/// A long track goes through the CPU in stretches that are prepared, evaluated and
-/// forgotten, by every method: the same bits as of a clip, whatever its keys' signs are, and
+/// A long track goes through the CPU, and through a device with little memory, in stretches
+/// that are prepared, evaluated and forgotten, by every method: the same bits as of a clip, whatever its keys' signs are, and
 /// the same refusals.
 #[test]
 fn long_tracks_in_stretches_have_the_same_bits() {
@@ -494,6 +494,12 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             let expected = clip.evaluate(frames).unwrap();
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+            // A device that has not the memory for the whole track.
+            for device in vulkan_devices() {
+                let engine = engine(&device, |options| options.memory = Some(2 << 20));
+                let found = engine.evaluate(&set, interpolation, frames).unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+            }
         }
     }
     keys[9000] = -keys[8999];

@@ -28,6 +28,17 @@ pub(crate) fn is_in_stretches(interpolation: &Interpolation, timeline: &Timeline
         && interpolation.speed == Speed::AsKeyed
 }
 
+/// The first sample of the piece that starts with an interval of a track that
+/// [`is_in_stretches`].
+pub(crate) fn first_sample(times: &[f64], timeline: &Timeline, interval: usize) -> usize {
+    let Ticks::Frames { rate, start } = timeline.ticks else {
+        return 0;
+    };
+    let end = (interval + BATCH).min(times.len() - 1);
+    let clock = FrameClock::new(rate, start, times[end]);
+    (clock.first_frame(times[interval]) as usize).min(timeline.len())
+}
+
 /// Some intervals of a track, and its samples among them.
 struct Piece<'o> {
     intervals: Range<usize>,
@@ -103,23 +114,15 @@ impl CpuEngine {
         timeline: &Timeline,
         output: &mut [Quat],
     ) -> Result<(), Error> {
-        let Ticks::Frames { rate, start } = timeline.ticks else {
-            unreachable!("samples in order");
-        };
         let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let track = set.track(index);
         let intervals = track.keys.len() - 1;
-        let first_sample = |interval: usize| {
-            let end = (interval + BATCH).min(intervals);
-            let clock = FrameClock::new(rate, start, track.times[end]);
-            (clock.first_frame(track.times[interval]) as usize).min(timeline.len())
-        };
         let mut pieces = Vec::new();
         let mut from = 0;
         for first in (0..intervals.max(1)).step_by(BATCH) {
             let end = (first + BATCH).min(intervals);
             let to = match end < intervals {
-                true => first_sample(end).max(from),
+                true => first_sample(track.times, timeline, end).max(from),
                 false => timeline.len(),
             };
             let (own, others) = output.split_at_mut(to - from);

@@ -32,7 +32,7 @@ pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::{CpuEngine, is_sampled};
-pub(crate) use long::is_in_stretches;
+pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
 pub(crate) use poses::{add, blend, mix, world};
 pub(crate) use sample_lanes::Turns;

@@ -26,6 +26,8 @@ pub(crate) struct ClipData {
     /// Where each track's parts start in `parts`, and one end more.
     tracks: Vec<usize>,
     span: Option<(f64, f64)>,
+    /// What the signs of a long track's keys make of that of its last.
+    pub(crate) sign: f32,
 }
 
 /// A part and the lists that it points into.
@@ -46,6 +48,9 @@ pub(crate) struct Wanted<'a> {
     pub(crate) few_groups: bool,
     /// The samples of one timeline: what is prepared serves no other then.
     pub(crate) only_for: Option<&'a Timeline>,
+    /// Only these intervals of the one track that is wanted, as prepared by so many; and the
+    /// sign of the first of their keys.
+    pub(crate) intervals: Option<(Range<usize>, f32)>,
     /// Memory to use again.
     pub(crate) spare: Vec<Prepared>,
 }
@@ -58,6 +63,7 @@ impl Wanted<'_> {
             group_bytes,
             few_groups: false,
             only_for: None,
+            intervals: None,
             spare: Vec::new(),
         }
     }
@@ -76,8 +82,11 @@ impl ClipData {
             return Err(InterpolationError::MirroredVelocity);
         }
         let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
-        let groups = prepare(set, &interpolation, wanted)?;
-        Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
+        let (groups, sign) = prepare(set, &interpolation, wanted)?;
+        Ok(Self {
+            sign,
+            ..Self::of_groups(groups, set, interpolation, merged_bytes)
+        })
     }
 
     /// Prepares a set's translations or scales.
@@ -136,6 +145,7 @@ impl ClipData {
             parts,
             tracks,
             span: set.time_span(),
+            sign: 1.0,
         }
     }
 

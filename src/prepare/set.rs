@@ -23,13 +23,15 @@ use crate::tracks::{Track, TrackSet};
 pub(crate) const BATCH: usize = 4096;
 
 /// Prepares tracks of a set, in parallel: one [`Prepared`] for each batch of tracks, or of
-/// intervals where a track is long, in order.
+/// intervals where a track is long, in order; and what the signs of the last long track's
+/// keys make of that of its last.
 pub(super) fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
     wanted: Wanted<'_>,
-) -> Result<Vec<Prepared>, InterpolationError> {
+) -> Result<(Vec<Prepared>, f32), InterpolationError> {
     let tracks = wanted.tracks.clone();
+    let intervals = wanted.intervals.clone();
     let batch = wanted.batch(set, interpolation.form());
     let held = interpolation.sides() == Sides::default();
     let only_for = wanted.only_for.filter(|_| held);
@@ -41,28 +43,31 @@ pub(super) fn prepare(
         }
         preparation
     };
-    let batches: Vec<Vec<Prepared>> = batches(set, tracks.clone(), batch)
+    let batches: Vec<(Vec<Prepared>, f32)> = batches(set, tracks.clone(), batch)
         .into_par_iter()
         .map(|tracks| {
             let alone = tracks.clone().next().filter(|_| tracks.len() == 1);
             let in_pieces = interpolation.speed == Speed::AsKeyed;
             if let (Some(long), true) = (alone, in_pieces) {
-                return prepare_long(set, long, interpolation, &preparation);
+                let all = (0..set.track(long).keys.len() - 1, 1.0);
+                let (own, sign) = intervals.clone().unwrap_or(all);
+                return prepare_long(set, long, own, sign, interpolation, &preparation, &spare);
             }
             let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
             prepared.clear();
             prepared.reserve(keys_of(set, tracks.clone()));
             preparation().push(&mut prepared, set, tracks)?;
-            Ok(vec![prepared])
+            Ok((vec![prepared], 1.0))
         })
         .collect::<Result<_, _>>()?;
-    let mut groups: Vec<Prepared> = batches.into_iter().flatten().collect();
+    let sign = batches.last().map_or(1.0, |&(_, sign)| sign);
+    let mut groups: Vec<Prepared> = batches.into_iter().flat_map(|(own, _)| own).collect();
     // Their places are those among the tracks asked for.
     for part in groups.iter_mut().flat_map(|group| &mut group.parts) {
         part.track -= tracks.start;
     }
-    Ok(groups)
+    Ok((groups, sign))
 }
 
 impl Wanted<'_> {
@@ -96,20 +101,26 @@ fn batches(set: &TrackSet, tracks: Range<usize>, batch: usize) -> Vec<Range<usiz
     batches
 }
 
-/// A track in pieces, each prepared as if its first key had the sign it is stored
-/// with, and turned round afterwards where the keys before it say so.
+/// Intervals of a track in pieces, each prepared as if its first key had the sign it is
+/// stored with, and turned round afterwards where the keys before it say so; `sign` is that
+/// of the first, and comes back as that of the last.
 fn prepare_long(
     set: &TrackSet,
     index: usize,
+    intervals: Range<usize>,
+    mut sign: f32,
     interpolation: &Interpolation,
     preparation: &(impl Fn() -> Preparation + Sync),
-) -> Result<Vec<Prepared>, InterpolationError> {
+    spare: &Mutex<Vec<Prepared>>,
+) -> Result<(Vec<Prepared>, f32), InterpolationError> {
     let track = set.track(index);
-    let intervals = track.keys.len() - 1;
-    let pieces = intervals.div_ceil(BATCH).max(1);
+    let pieces = intervals.len().div_ceil(BATCH).max(1);
     let piece = |i: usize| {
-        let own = i * BATCH..((i + 1) * BATCH).min(intervals);
-        let mut prepared = Prepared::new(interpolation);
+        let start = intervals.start + i * BATCH;
+        let own = start..(start + BATCH).min(intervals.end);
+        let memory = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut prepared = memory.unwrap_or_else(|| Prepared::new(interpolation));
+        prepared.clear();
         let sign = preparation().push_piece(&mut prepared, track, index, own)?;
         Ok((prepared, sign))
     };
@@ -117,7 +128,6 @@ fn prepare_long(
         .into_par_iter()
         .map(piece)
         .collect::<Result<_, _>>()?;
-    let mut sign = 1.0;
     let with_sign = |(mut prepared, own): (Prepared, f32)| {
         if sign < 0.0 {
             prepared.negate(interpolation);
@@ -125,7 +135,8 @@ fn prepare_long(
         sign *= own;
         prepared
     };
-    Ok(pieces.into_iter().map(with_sign).collect())
+    let prepared = pieces.into_iter().map(with_sign).collect();
+    Ok((prepared, sign))
 }
 
 impl Prepared {
@@ -268,7 +279,7 @@ mod tests {
             Preparation::new(&interpolation)
                 .push(&mut whole, &set, 0..1)
                 .unwrap();
-            let pieces = prepare(&set, &interpolation, Wanted::all(&set, None)).unwrap();
+            let (pieces, _) = prepare(&set, &interpolation, Wanted::all(&set, None)).unwrap();
             assert!(pieces.len() > 3, "{method}");
             let mut together = Prepared::new(&interpolation);
             pieces.into_iter().for_each(|piece| together.append(piece));
