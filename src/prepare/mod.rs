@@ -191,9 +191,9 @@ impl Prepared {
         let own = &mut self.spans;
         own.starts.extend(other.spans.starts);
         own.sources
-            .extend(other.spans.sources.iter().map(|source| match source {
+            .extend(other.spans.sources.iter().map(|&source| match source {
                 Source::Segment(i) => Source::Segment(i + segments),
-                Source::Constant(i) => Source::Constant(i + constants),
+                Source::Constant(i) => Source::Constant(shift(i)),
                 Source::Exact(i) => Source::Exact(i + exact),
             }));
         own.keys.extend(other.spans.keys.into_iter().map(shift));
