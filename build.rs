@@ -36,6 +36,12 @@ const ENCODINGS: [(&str, &[&str]); 8] = [
 /// Kernels over poses that are already there.
 const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
 
+/// Kernels from keys to samples, each with the files that it needs beside its own.
+const SAMPLED: [(&str, &[&str]); 2] = [
+    ("sampled_arcs", &["sine_cosine", "evaluate_arc", "arc"]),
+    ("sampled_cubics", &["gentle"]),
+];
+
 /// Every pipeline: its name, and the files that are joined into it.
 fn pipelines() -> Vec<(String, Vec<String>)> {
     let mut pipelines = vec![(
@@ -71,17 +77,11 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
         let files = shared.into_iter().chain([pose]).map(str::to_owned);
         pipelines.push((pose.to_owned(), files.collect()));
     }
-    let sampled = [
-        "canonical",
-        "sine_cosine",
-        "evaluate_arc",
-        "arc",
-        "sampled_arcs",
-    ];
-    pipelines.push((
-        "sampled_arcs".to_owned(),
-        sampled.map(str::to_owned).to_vec(),
-    ));
+    for (sampled, needed) in SAMPLED {
+        let files = ["canonical", "sampled"].iter().chain(needed).copied();
+        let files = files.chain([sampled]).map(str::to_owned);
+        pipelines.push((sampled.to_owned(), files.collect()));
+    }
     pipelines
 }
 
@@ -150,7 +150,11 @@ fn collect_constants(module: &naga::Module, constants: &mut BTreeMap<String, Str
             naga::Literal::I32(value) => format!("i32 = {value}"),
             _ => continue,
         };
-        constants.insert(name.clone(), typed);
+        let other = constants.insert(name.clone(), typed.clone());
+        assert!(
+            other.is_none_or(|other| other == typed),
+            "two shaders have a constant {name}, with different values"
+        );
     }
 }
 

@@ -6,7 +6,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{Frames, FramesError};
-use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, is_sampled};
+use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, straight};
 use crate::cycle::Sides;
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::encoding::Encoding;
@@ -271,7 +271,7 @@ impl Engine {
         let samples = timeline.len();
         let on_cpu = matches!(*self.backend, Backend::Cpu(_));
         let by_segments = !(self.is_fused(set, &interpolation, layout)
-            || on_cpu && is_sampled(set, &interpolation, &timeline)
+            || on_cpu && straight(set, &interpolation, &timeline).is_some()
             || self.is_in_stretches(set, &interpolation, &timeline, layout)
             || self
                 .key_job(set, 0..tracks, &interpolation, &timeline, layout)

@@ -7,15 +7,16 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cpu::{Turns, in_lanes, is_sampled};
+use crate::cpu::{CpuEngine, Row, Straight, Turns, in_lanes, straight};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::method::{Form, Interpolation};
+use crate::joints::{Joints, TrackJoints};
+use crate::method::Interpolation;
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
 use crate::rotations::Layout;
 use crate::segment::shader::HELD;
-use crate::segment::{Rows, Sample};
+use crate::segment::{Joint, Rows, Sample};
 use crate::tracks::TrackSet;
 
 /// Rows of one piece: workgroups along y.
@@ -30,6 +31,8 @@ pub(crate) struct KeyJob<'a> {
     tracks: Range<usize>,
     interpolation: &'a Interpolation,
     timeline: &'a Timeline,
+    /// Those of cubics; arcs have none.
+    joints: Option<Joints>,
 }
 
 impl<'a> KeyJob<'a> {
@@ -44,16 +47,40 @@ impl<'a> KeyJob<'a> {
         most: usize,
     ) -> Option<Self> {
         let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
-        let is_arcs = interpolation.form() == Form::Arc;
+        let joints = match straight(set, interpolation, timeline)? {
+            Straight::Arcs => None,
+            Straight::Cubics(joints) => Some(joints),
+            Straight::Pairs => return None,
+        };
         // Where samples are explicit times, a track is not cut.
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
-        let suits = is_row && is_arcs && by_pieces && is_sampled(set, interpolation, timeline);
+        let suits = is_row && by_pieces;
         suits.then_some(Self {
             set,
             tracks,
             interpolation,
             timeline,
+            joints,
+        })
+    }
+
+    /// Whether its curves are cubics, not arcs.
+    pub(crate) fn is_cubic(&self) -> bool {
+        self.joints.is_some()
+    }
+
+    /// Works out on the CPU what the device left 0, because it turns too much.
+    pub(crate) fn mend(&self, output: &mut [[f32; 4]]) -> Result<(), Error> {
+        let left_out = |some: &[[f32; 4]]| some.contains(&[0.0; 4]);
+        if !self.is_cubic() || !output.par_chunks(TASK_KEYS).any(left_out) {
+            return Ok(());
+        }
+        let engine = CpuEngine::widest();
+        let rows = output.par_chunks_mut(self.timeline.len());
+        (rows.zip(self.tracks.clone())).try_for_each(|(row, index)| {
+            let whole = Row::whole(self.set, index, self.interpolation, self.timeline);
+            engine.mend(whole, row)
         })
     }
 
@@ -189,16 +216,17 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         };
         let end = end.clamp(long.sample, samples);
         let sample = end.min(long.sample + most);
-        let stretch = Stretch {
-            times: &times[long.key..=last_key],
-            keys: &keys[long.key..=last_key],
+        let stretch = |first_key: usize, last_key: usize| Stretch {
+            times: &times[first_key..=last_key],
+            keys: &keys[first_key..=last_key],
             index: long.track,
-            first_key: long.key,
+            first_key,
+            all: last + 1,
         };
         self.long = if sample < end {
             Some(Long { sample, ..long })
         } else if sample < samples {
-            let sign = turned(&stretch, long.sign, |_| {});
+            let sign = turned(&stretch(long.key, last_key), long.sign, |_| {});
             Some(Long {
                 key: last_key,
                 sign,
@@ -208,10 +236,14 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         } else {
             None
         };
+        // Cubics look at the keys beside their own too.
+        let beside = usize::from(self.job.is_cubic());
+        let first = long.key.saturating_sub(beside);
+        let before = stretch(first, long.key);
         Part {
-            stretch,
+            stretch: stretch(first, (last_key + beside).min(last)),
             window: long.sample..sample,
-            sign: long.sign,
+            sign: long.sign * turned(&before, 1.0, |_| {}),
         }
     }
 }
@@ -251,6 +283,7 @@ impl<'a> KeyJob<'a> {
                 keys,
                 index,
                 first_key: 0,
+                all: keys.len(),
             },
             window: 0..self.timeline.len(),
             sign: 1.0,
@@ -284,13 +317,18 @@ impl KeyPiece<'_, '_> {
         self.samples * self.rows
     }
 
-    /// Bytes of its keys, their signs, the samples and the rotations.
-    pub(crate) fn bytes(&self) -> [usize; 4] {
+    /// Bytes of its keys, their signs, the samples, the rotations and the joints.
+    pub(crate) fn bytes(&self) -> [usize; 5] {
+        let joints = match self.job.joints {
+            Some(_) => self.keys / self.rows,
+            None => 0,
+        };
         [
             self.keys * size_of::<Quat>(),
             self.keys.div_ceil(32) * size_of::<u32>(),
             self.samples * size_of::<Sample>(),
             self.rotation_count() * size_of::<Quat>(),
+            joints * size_of::<Joint>(),
         ]
     }
 
@@ -300,35 +338,46 @@ impl KeyPiece<'_, '_> {
         mut keys: &mut [[f32; 4]],
         signs: &mut [u32],
         mut samples: &mut [Sample],
+        mut joints: &mut [Joint],
     ) -> Result<(), FramesError> {
         let mut first_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
             // Where all rows are alike only the first one's are told.
-            let own = match self.rows {
-                1 => task.samples,
-                _ => samples.len(),
+            let (told, joined) = match self.rows {
+                1 => (task.samples, task.keys.min(joints.len())),
+                _ => (samples.len(), joints.len()),
             };
             let (own_keys, other_keys) = keys.split_at_mut(task.keys);
-            let (own_samples, other_samples) = samples.split_at_mut(own);
-            (keys, samples) = (other_keys, other_samples);
-            places.push((task, first_key, own_keys, own_samples));
+            let (own_samples, other_samples) = samples.split_at_mut(told);
+            let (own_joints, other_joints) = joints.split_at_mut(joined);
+            (keys, samples, joints) = (other_keys, other_samples, other_joints);
+            let written = Written {
+                keys: own_keys,
+                samples: own_samples,
+                joints: own_joints,
+                next_key: first_key,
+                turned: Vec::new(),
+            };
+            places.push((task, written));
             first_key += task.keys;
         }
+        let ends = self.job.interpolation.ends;
+        let rule = self.job.joints;
+        let new = || {
+            (
+                FramePlan::new(),
+                rule.map(|rule| TrackJoints::new(rule, ends)),
+            )
+        };
         let turned: Vec<Vec<usize>> = places
             .into_par_iter()
-            .map_init(FramePlan::new, |plan, (task, first_key, keys, samples)| {
-                let mut written = Written {
-                    keys,
-                    samples,
-                    next_key: first_key,
-                    turned: Vec::new(),
-                };
+            .map_init(new, |known, (task, mut written)| {
                 match &task.what {
-                    What::Part(part) => self.write_part(part, plan, &mut written)?,
+                    What::Part(part) => self.write_part(part, known, &mut written)?,
                     What::Tracks(tracks) => {
                         for index in tracks.clone() {
-                            self.write_part(&self.job.track(index), plan, &mut written)?;
+                            self.write_part(&self.job.track(index), known, &mut written)?;
                         }
                     }
                 }
@@ -345,7 +394,7 @@ impl KeyPiece<'_, '_> {
     fn write_part<'p>(
         &self,
         part: &Part<'p>,
-        plan: &mut FramePlan<'p>,
+        (plan, joints): &mut (FramePlan<'p>, Option<TrackJoints<'p>>),
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
         let first_key = written.next_key;
@@ -360,6 +409,18 @@ impl KeyPiece<'_, '_> {
             let (own, others) = all.split_at_mut(part.window.len());
             self.write_samples(part, first_key as u32, own, plan)?;
             written.samples = others;
+        }
+        if let (Some(joints), false) = (joints, written.joints.is_empty()) {
+            let all = std::mem::take(&mut written.joints);
+            let (own, others) = all.split_at_mut(keys.len());
+            let Stretch {
+                times,
+                first_key,
+                all,
+                ..
+            } = part.stretch;
+            own.copy_from_slice(joints.of(times, first_key, all));
+            written.joints = others;
         }
         written.next_key += keys.len();
         Ok(())
@@ -407,6 +468,7 @@ impl KeyPiece<'_, '_> {
 struct Written<'w> {
     keys: &'w mut [[f32; 4]],
     samples: &'w mut [Sample],
+    joints: &'w mut [Joint],
     /// The place of the next key among the piece's.
     next_key: usize,
     /// Keys whose sign is turned.

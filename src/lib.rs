@@ -61,6 +61,7 @@ mod frame_clock;
 mod frame_rate;
 pub mod generate;
 mod gpu;
+mod joints;
 mod key_pieces;
 pub mod method;
 mod numeric;

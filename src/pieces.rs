@@ -8,7 +8,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::clock::{FramesError, Timeline};
-use crate::cpu::{first_sample, is_in_stretches, is_sampled};
+use crate::cpu::{first_sample, is_in_stretches, straight};
 use crate::engine::{Backend, Engine, Error};
 use crate::key_pieces::KeyJob;
 use crate::method::Interpolation;
@@ -55,12 +55,12 @@ impl Engine {
             return engine.evaluate_set(set, tracks, &interpolation, timeline, output);
         }
         if let (Backend::Cpu(engine), Layout::TrackMajor) = (&*self.backend, layout)
-            && is_sampled(set, &interpolation, timeline)
+            && let Some(straight) = straight(set, &interpolation, timeline)
             && samples > 0
         {
             let mut rows = tracks.zip(output.chunks_mut(samples));
             return rows.try_for_each(|(track, row)| {
-                engine.sampled_track(set, track, &interpolation, timeline, row)
+                engine.sampled_track(set, track, (&interpolation, straight), timeline, row)
             });
         }
         if let (Backend::Cpu(engine), true) = (
@@ -76,7 +76,8 @@ impl Engine {
             && let Some(job) = self.key_job(set, tracks.clone(), &interpolation, timeline, layout)
         {
             let output = bytemuck::cast_slice_mut(output);
-            return opened.attempt_smaller(|engine| engine.evaluate_keys(&job, output));
+            opened.attempt_smaller(|engine| engine.evaluate_keys(&job, output))?;
+            return job.mend(output);
         }
         let pieces = self.pieces(set, tracks.clone(), &interpolation, timeline, layout);
         let mut pieces = VecDeque::from(pieces);

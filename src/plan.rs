@@ -27,6 +27,8 @@ pub(crate) struct Stretch<'a> {
     pub(crate) index: usize,
     /// The first of their keys.
     pub(crate) first_key: usize,
+    /// Keys of the whole track.
+    pub(crate) all: usize,
 }
 
 /// Where the frames of a window lie; what it needs to find out is kept.

@@ -67,6 +67,16 @@ pub(crate) struct Sample {
     pub(crate) parameter: f32,
 }
 
+/// `Joint` of `gentle.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Joint {
+    pub(crate) before: f32,
+    pub(crate) after: f32,
+    pub(crate) outgoing: f32,
+    pub(crate) kind: f32,
+}
+
 /// `Rows` of `sampled_arcs.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -155,6 +165,14 @@ assert_layout!(
     SAMPLE_SIZE,
     key = SAMPLE_KEY,
     parameter = SAMPLE_PARAMETER
+);
+assert_layout!(
+    Joint,
+    JOINT_SIZE,
+    before = JOINT_BEFORE,
+    after = JOINT_AFTER,
+    outgoing = JOINT_OUTGOING,
+    kind = JOINT_KIND
 );
 assert_layout!(Rows, ROWS_SIZE, samples = ROWS_SAMPLES, keys = ROWS_KEYS);
 assert_layout!(

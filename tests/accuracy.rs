@@ -131,6 +131,26 @@ fn every_method_is_within_its_bounds_for_steps_up_to_half_a_turn() {
     }
 }
 
+/// Keys as dense as those of motion capture, whose curves are prepared without being
+/// fitted, and some that are just too far apart for that; evenly timed and not.
+#[test]
+fn every_method_is_within_its_bounds_for_keys_near_each_other() {
+    for (seed, step) in [(12, 0.02), (13, 0.1), (14, 0.25)] {
+        let uneven = smooth_set(seed, 0.0, step);
+        let mut even = TrackSet::new();
+        for track in uneven.tracks() {
+            let times: Vec<f64> = (0..track.keys.len()).map(|i| i as f64 / 120.0).collect();
+            even.push("", &times, track.keys).unwrap();
+        }
+        give_key_data(&mut even, seed);
+        for method in METHODS {
+            let frames = Frames::rate(rate("999"));
+            assert_within_bounds(&even, method.into(), &frames, "near and even");
+            assert_within_bounds(&uneven, method.into(), &Frames::fps(60), "near");
+        }
+    }
+}
+
 /// Catches a time kept in f32: at 24 hours its unit is 8 ms.
 #[test]
 fn accuracy_does_not_decay_by_hour_24() {

@@ -424,6 +424,119 @@ fn few_samples_of_many_keys_have_the_same_bits() {
     }
 }
 
+/// Keys near each other, as motion capture has them, among some that are not: signs at
+/// random, times even, uneven, a hair and a day apart.
+fn near_keys(random: &mut Random, count: usize, time: f64, step: f64) -> (Vec<f64>, Vec<Quat>) {
+    let even = random.next().is_multiple_of(2);
+    let (mut times, mut keys) = (Vec::new(), Vec::new());
+    let (mut time, mut key) = (time, random.rotation());
+    for _ in 0..count {
+        times.push(time);
+        let sign = random.pick(&[1.0, 1.0, 1.0, 1.0, 1.0, -1.0]);
+        keys.push(key.as_quat() * sign);
+        let step = match random.next() % 64 {
+            0 => 3.0,
+            1 => 20.0 * step,
+            2 => 0.0,
+            _ => step,
+        };
+        key *= DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+        key = key.normalize();
+        time += match random.next() % 64 {
+            _ if even => 1.0 / 120.0,
+            0 => 1e-9,
+            1 => 40.0,
+            2 => 86_400.0,
+            _ => random.between(0.004, 0.012),
+        };
+    }
+    (times, keys)
+}
+
+/// Curves that turn little are made straight from four keys, by every device, and those
+/// beside them that turn more are not: the same bits as by segments, at any ends, for frames
+/// and for times.
+#[test]
+fn few_samples_of_keys_near_each_other_have_the_same_bits() {
+    let mut random = Random(82);
+    let mut set = TrackSet::new();
+    for track in 0..48 {
+        let count = [3, 4, 5, 64, 65, 66, 1, 2, 128, 700][track % 10];
+        let start = random.between(-3.0, 3.0);
+        let (times, mut keys) = near_keys(&mut random, count, start, 0.08);
+        let last = keys.len() - 1;
+        keys[last] = -keys[0]; // the same rotation: a loop
+        set.push("", &times, &keys).unwrap();
+    }
+    let mut any =
+        |count: usize| -> Vec<f64> { (0..count).map(|_| random.between(-4.0, 9.0)).collect() };
+    let requests = [
+        Frames::fps(25).between(-1.0, 2.0),
+        Frames::fps(120).between(-1.0, -0.5),
+        Frames::rate("1/31".parse().unwrap()).between(0.0, 2000.0),
+        Frames::at(any(90)),
+        Frames::at(set.track(9).times.iter().copied().step_by(9).collect()),
+        Frames::at_each(any(48 * 7)),
+    ];
+    let spin = glam::DVec3::new(0.3, -2.0, 1.0);
+    let clamped = Ends::Clamped {
+        start: spin,
+        end: -spin,
+    };
+    for method in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER] {
+        for ends in [
+            Ends::Parabolic,
+            Ends::Natural,
+            Ends::Secant,
+            Ends::Loop,
+            Ends::Frozen,
+            clamped,
+        ] {
+            let interpolation = Interpolation {
+                ends,
+                ..method.into()
+            };
+            let clip = cpu().upload(&set, interpolation).unwrap();
+            for frames in &requests {
+                let expected = clip.evaluate(frames).unwrap();
+                assert!(expected.as_quats().len() < set.key_count(), "few samples");
+                assert_everywhere(&expected, &set, interpolation, frames);
+            }
+        }
+    }
+}
+
+/// The same of one long track, which the threads share and devices get in stretches, and of
+/// one most of whose keys are far apart.
+#[test]
+fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
+    let mut random = Random(83);
+    for (count, step) in [(90_000, 0.06), (20_000, 0.14)] {
+        let (_, keys) = near_keys(&mut random, count, 0.0, step);
+        let uneven = |i: usize| 3.0 + 0.01 * (i as f64 + random.between(0.0, 0.9));
+        let times: Vec<f64> = (0..count).map(uneven).collect();
+        let mut set = TrackSet::new();
+        set.push("", &times, &keys).unwrap();
+        for method in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER] {
+            let clip = cpu().upload(&set, method).unwrap();
+            for frames in [
+                Frames::fps(53),
+                Frames::fps(60).between(100.0, 400.0),
+                Frames::at(times.iter().map(|time| time + 0.001).step_by(13).collect()),
+            ] {
+                let expected = clip.evaluate(&frames).unwrap();
+                assert!(expected.as_quats().len() < set.key_count(), "few samples");
+                assert_everywhere(&expected, &set, method.into(), &frames);
+                for device in vulkan_devices() {
+                    let engine = engine(&device, |options| options.memory = Some(1 << 20));
+                    let found = engine.evaluate(&set, method, &frames).unwrap();
+                    assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+                }
+            }
+        }
+    }
+}
+
 /// The same of one long track, which the threads share.
 #[test]
 fn few_samples_of_a_long_track_have_the_same_bits() {

@@ -6,12 +6,13 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
-use super::sampled::SampledArcs;
+use super::mend::Row;
+use super::sampled::{Sampled, Straight, straight};
 use crate::clock::{FramesError, Timeline};
-use crate::cycle::{Cycle, Sides};
+use crate::cycle::Cycle;
 use crate::encoding::Encoding;
 use crate::engine::Error;
-use crate::method::{Form, Interpolation};
+use crate::method::Interpolation;
 use crate::prepare::{ClipData, PartRef, Preparation, Prepared, Wanted};
 use crate::rotations::Layout;
 use crate::segment::Segments;
@@ -50,6 +51,14 @@ impl CpuEngine {
             kernels: Kernels::new(width),
             pool,
         })
+    }
+
+    /// As wide as it gets, on the process's threads.
+    pub(crate) fn widest() -> Self {
+        Self {
+            kernels: Kernels::new(VectorWidth::widest()),
+            pool: None,
+        }
     }
 
     /// Fills `output` with a window of the clip's result.
@@ -235,8 +244,8 @@ impl CpuEngine {
             return Ok(ClipData::new(set, *interpolation, wanted).map(drop)?);
         }
         let samples = timeline.len();
-        if is_sampled(set, interpolation, timeline) {
-            return self.sampled_arcs(set, tracks, interpolation, timeline, output);
+        if let Some(straight) = straight(set, interpolation, timeline) {
+            return self.sampled(set, tracks, (interpolation, straight), timeline, output);
         }
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
@@ -277,12 +286,12 @@ impl CpuEngine {
         self.on_threads(work)
     }
 
-    /// As [`CpuEngine::evaluate_set`], for arcs with fewer samples than keys.
-    pub(super) fn sampled_arcs(
+    /// As [`CpuEngine::evaluate_set`], straight from keys.
+    pub(super) fn sampled(
         &self,
         set: &TrackSet,
         tracks: Range<usize>,
-        interpolation: &Interpolation,
+        (interpolation, straight): (&Interpolation, Straight),
         timeline: &Timeline,
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
@@ -291,7 +300,15 @@ impl CpuEngine {
         let task = |(i, rows): (usize, &mut [[f32; 4]])| {
             let first = tracks.start + i * each;
             let own = first..first + rows.len() / samples;
-            SampledArcs::new(interpolation).tracks(set, own, timeline, rows)
+            let mut sampled = Sampled::new(interpolation, straight);
+            if !sampled.tracks(set, own, timeline, rows)? {
+                return Ok(());
+            }
+            for (index, row) in (first..).zip(rows.chunks_mut(samples)) {
+                let whole = Row::whole(set, index, interpolation, timeline);
+                self.mend(whole, row)?;
+            }
+            Ok(())
         };
         if output.len() <= TASK {
             return task((0, output));
@@ -301,21 +318,6 @@ impl CpuEngine {
             rows.try_for_each(task)
         })
     }
-}
-
-/// Whether every sample is worked out from its keys, on the CPU: where there are fewer
-/// samples than keys, and nothing but arcs between these.
-pub(crate) fn is_sampled(
-    set: &TrackSet,
-    interpolation: &Interpolation,
-    timeline: &Timeline,
-) -> bool {
-    let arcs = match interpolation.form() {
-        Form::Arc => true,
-        Form::Polynomial => set.longest() <= 2 && interpolation.is_steady_alone(),
-    };
-    let few = timeline.len() * set.track_count() < set.key_count();
-    arcs && interpolation.sides() == Sides::default() && few
 }
 
 /// A window of frames cut into tasks, each some frames of some tracks, with their places.

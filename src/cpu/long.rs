@@ -7,14 +7,15 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::engine::CpuEngine;
-use super::sampled::SampledArcs;
+use super::mend::Row;
+use super::sampled::{Sampled, Straight};
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::{Cycle, Sides};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::method::{Interpolation, Speed};
 use crate::plan::Stretch;
-use crate::prepare::{BATCH, PartRef, Preparation, Prepared};
+use crate::prepare::{BATCH, PartRef, Preparation, Prepared, flip};
 use crate::tracks::TrackSet;
 
 /// Intervals that one task takes, where nothing is prepared.
@@ -49,59 +50,75 @@ struct Piece<'o> {
 }
 
 impl CpuEngine {
-    /// As [`CpuEngine::sampled_arcs`], for one track that all threads share: stretches
+    /// As [`CpuEngine::sampled`], for one track that all threads share: stretches
     /// of its intervals, once for the signs of their keys and once for their samples.
     pub(crate) fn sampled_track(
         &self,
         set: &TrackSet,
         index: usize,
-        interpolation: &Interpolation,
+        (interpolation, straight): (&Interpolation, Straight),
         timeline: &Timeline,
         output: &mut [Quat],
     ) -> Result<(), Error> {
         let mut output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let track = set.track(index);
         let (Ticks::Frames { rate, start }, 1..) = (&timeline.ticks, track.keys.len() - 1) else {
-            return self.sampled_arcs(set, index..index + 1, interpolation, timeline, output);
+            let own = index..index + 1;
+            return self.sampled(set, own, (interpolation, straight), timeline, output);
         };
         interpolation.ends.check(track.keys, index)?;
         let last = track.keys.len() - 1;
         let clock = FrameClock::new(*rate, *start, track.times[last]);
-        let stretches: Vec<Stretch<'_>> = (0..last)
-            .step_by(STRETCH)
-            .map(|first_key| {
-                let last_key = (first_key + STRETCH).min(last);
-                Stretch {
-                    times: &track.times[first_key..=last_key],
-                    keys: &track.keys[first_key..=last_key],
-                    index,
-                    first_key,
-                }
-            })
-            .collect();
-        let new = || SampledArcs::new(interpolation);
+        let all = track.keys.len();
+        let stretch = |first_key: usize, last_key: usize| Stretch {
+            times: &track.times[first_key..=last_key],
+            keys: &track.keys[first_key..=last_key],
+            index,
+            first_key,
+            all,
+        };
+        let firsts: Vec<usize> = (0..last).step_by(STRETCH).collect();
+        let last_of = |first: usize| (first + STRETCH).min(last);
+        let new = || Sampled::new(interpolation, straight);
         let flips: Vec<f32> = self.on_threads(|| {
-            let stretches = stretches.par_iter();
-            stretches
-                .map_init(new, |arcs, &stretch| arcs.align(stretch, 1.0))
-                .collect()
+            let align = |sampled: &mut Sampled<'_>, &first: &usize| {
+                sampled.align(stretch(first, last_of(first)), 1.0)
+            };
+            firsts.par_iter().map_init(new, align).collect()
         });
         let (mut sign, mut from) = (1.0, 0);
         let mut work = Vec::new();
-        for (i, (&stretch, flip)) in stretches.iter().zip(flips).enumerate() {
-            let to = match stretches.get(i + 1) {
-                Some(next) => (clock.first_frame(next.times[0]) as usize).min(timeline.len()),
+        for (i, (&first, flip)) in firsts.iter().zip(flips).enumerate() {
+            let to = match firsts.get(i + 1) {
+                Some(&next) => (clock.first_frame(track.times[next]) as usize).min(timeline.len()),
                 None => timeline.len(),
             };
             let (own, others) = output.split_at_mut(to.max(from) - from);
-            work.push((stretch, sign, from..to.max(from), own));
+            work.push((first, sign, from..to.max(from), own));
             (output, sign, from) = (others, sign * flip, to.max(from));
         }
+        let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
         self.on_threads(|| {
-            work.into_par_iter()
-                .try_for_each_init(new, |arcs, (stretch, sign, window, own)| {
-                    arcs.stretch(stretch, sign, clock, &window, own)
-                })
+            let all = work.into_par_iter();
+            all.try_for_each_init(new, |sampled, (first, sign, window, own)| {
+                // Cubics look at the keys beside their own too.
+                let start = first.saturating_sub(1);
+                let before = match start < first {
+                    true => sign * flip(keys[start], keys[first]),
+                    false => sign,
+                };
+                let stretch = stretch(start, (last_of(first) + 1).min(last));
+                if sampled.stretch(stretch, before, clock, &window, own)? {
+                    let row = Row {
+                        first: window.start,
+                        key: first,
+                        sign,
+                        ..Row::whole(set, index, interpolation, timeline)
+                    };
+                    self.mend(row, own)?;
+                }
+                Ok(())
+            })
         })
     }
 

@@ -1,53 +1,120 @@
-//! Arcs with fewer samples than keys: a sample to a lane, straight from the two keys
-//! beside it. No segment is kept, and none is made where no sample falls. The same
-//! operations as by way of segments, and so the same bits.
+//! Fewer samples than keys: a sample to a lane, straight from the keys beside it. No
+//! segment is kept, and none is made where no sample falls. The same operations as by way
+//! of segments, and so the same bits. Cubics that turn too much for it stay 0.
 
 use std::ops::Range;
 
 use glam::Quat;
 
+use super::cubic_lanes::CubicBlock;
 use super::dispatch::in_lanes;
 use super::sample_lanes::{LANES, SampleBlock, Turns};
 use crate::clock::{Ticks, Timeline};
+use crate::cycle::Sides;
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::method::Interpolation;
+use crate::joints::{Joints, TrackJoints};
+use crate::method::{Form, Interpolation};
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
-use crate::segment::Sample;
-use crate::segment::shader::HELD;
+use crate::segment::shader::{HELD, INNER, LONGEST_STEP};
+use crate::segment::{Joint, Sample};
 use crate::tracks::TrackSet;
 
+/// What samples are made of, straight from keys.
+#[derive(Clone, Copy)]
+pub(crate) enum Straight {
+    /// Arcs between two keys.
+    Arcs,
+    /// Two keys alone by a smooth method.
+    Pairs,
+    /// Cubics by four keys.
+    Cubics(Joints),
+}
+
+/// What every sample is made of where it is worked out straight from its keys: where there
+/// are fewer samples than keys, and nothing but arcs between these, or cubics most of which
+/// turn little.
+pub(crate) fn straight(
+    set: &TrackSet,
+    interpolation: &Interpolation,
+    timeline: &Timeline,
+) -> Option<Straight> {
+    let few = timeline.len() * set.track_count() < set.key_count();
+    if !few || interpolation.sides() != Sides::default() {
+        return None;
+    }
+    match interpolation.form() {
+        Form::Arc => Some(Straight::Arcs),
+        Form::Polynomial if set.longest() <= 2 => {
+            interpolation.is_steady_alone().then_some(Straight::Pairs)
+        }
+        Form::Polynomial => {
+            let joints = interpolation.gentle_joints()?;
+            turns_little(set).then_some(Straight::Cubics(joints))
+        }
+    }
+}
+
+/// Whether most of some keys looked at are near those before them. Nothing but the time
+/// that it takes depends on it.
+fn turns_little(set: &TrackSet) -> bool {
+    const LOOKS: usize = 64;
+    let (mut near, mut looks) = (0, 0);
+    for look in 0..LOOKS {
+        let (_, keys) = set.times_and_keys(look * set.track_count() / LOOKS);
+        let place = keys.len() * look / LOOKS;
+        if let [from, to, ..] = keys[place..] {
+            looks += 1;
+            near += usize::from(1.0 - from.dot(to).abs() <= 0.5 * LONGEST_STEP);
+        }
+    }
+    2 * near > looks
+}
+
 /// Evaluates tracks; what it needs for that is kept.
-pub(super) struct SampledArcs<'a> {
+pub(super) struct Sampled<'a> {
     interpolation: &'a Interpolation,
-    block: Box<SampleBlock>,
+    block: Block<'a>,
     plan: FramePlan<'a>,
     /// The sign of the track's first key.
     sign: f32,
-    /// For each interval, the sign of its first key, where any of them differ.
+    /// The sign of every key, where any of them differ.
     signs: Vec<f32>,
 }
 
-impl<'a> SampledArcs<'a> {
-    pub(super) fn new(interpolation: &'a Interpolation) -> Self {
+enum Block<'a> {
+    ByTwo(Box<SampleBlock>),
+    ByFour(Box<CubicBlock>, TrackJoints<'a>),
+}
+
+impl<'a> Sampled<'a> {
+    pub(super) fn new(interpolation: &'a Interpolation, straight: Straight) -> Self {
+        let block = match straight {
+            Straight::Arcs => Block::ByTwo(Box::new(SampleBlock::new(Form::Arc))),
+            Straight::Pairs => Block::ByTwo(Box::new(SampleBlock::new(Form::Polynomial))),
+            Straight::Cubics(joints) => {
+                let joints = TrackJoints::new(joints, interpolation.ends);
+                Block::ByFour(Box::new(CubicBlock::new()), joints)
+            }
+        };
         Self {
             interpolation,
-            block: Box::new(SampleBlock::new(interpolation.form())),
+            block,
             plan: FramePlan::new(),
             sign: 1.0,
             signs: Vec::new(),
         }
     }
 
-    /// Every sample of some tracks, `[track][sample]`.
+    /// Every sample of some tracks, `[track][sample]`; whether any was left out.
     pub(super) fn tracks(
         &mut self,
         set: &'a TrackSet,
         tracks: Range<usize>,
         timeline: &Timeline,
         output: &mut [[f32; 4]],
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let samples = timeline.len();
         let mut output = output.iter_mut();
         for index in tracks {
@@ -58,6 +125,7 @@ impl<'a> SampledArcs<'a> {
                 keys,
                 index,
                 first_key: 0,
+                all: keys.len(),
             };
             self.align(stretch, 1.0);
             match &timeline.ticks {
@@ -75,12 +143,11 @@ impl<'a> SampledArcs<'a> {
                 }
             }
         }
-        self.block.flush(&mut output);
-        Ok(())
+        Ok(self.block.flush(&mut output))
     }
 
     /// The samples of some intervals of a track, `window`, whose first key counts with
-    /// `sign`.
+    /// `sign`; whether any was left out.
     pub(super) fn stretch(
         &mut self,
         stretch: Stretch<'a>,
@@ -88,16 +155,14 @@ impl<'a> SampledArcs<'a> {
         clock: FrameClock,
         window: &Range<usize>,
         output: &mut [[f32; 4]],
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let mut output = output.iter_mut();
         self.align(stretch, sign);
         self.frames(stretch, clock, window, &mut output)?;
-        self.block.flush(&mut output);
-        Ok(())
+        Ok(self.block.flush(&mut output))
     }
 
-    /// The sign of every interval's first key, where the first one's is given; what it
-    /// is behind the last.
+    /// The sign of every key, where the first one's is given; what it is of the last.
     pub(super) fn align(&mut self, stretch: Stretch<'_>, mut sign: f32) -> f32 {
         let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
         self.signs.clear();
@@ -114,6 +179,7 @@ impl<'a> SampledArcs<'a> {
                 self.signs.push(sign);
                 sign *= flip(pair[0], pair[1]);
             }
+            self.signs.push(sign);
         }
         sign
     }
@@ -132,31 +198,90 @@ impl<'a> SampledArcs<'a> {
             all: self.sign,
             each: &self.signs,
         };
-        for &sample in samples {
-            self.block.push(stretch.keys, sample, &signs, output);
+        match &mut self.block {
+            Block::ByTwo(block) => {
+                for &sample in samples {
+                    block.push(stretch.keys, sample, &signs, output);
+                }
+            }
+            Block::ByFour(block, joints) => {
+                let keys = CubicKeys::new(stretch, joints, &signs);
+                for &sample in samples {
+                    block.push(&keys, sample, output);
+                }
+            }
         }
         Ok(())
     }
 
-    fn times(&mut self, stretch: Stretch<'_>, times: &[f64], output: &mut Output<'_>) {
+    fn times(&mut self, stretch: Stretch<'a>, times: &[f64], output: &mut Output<'_>) {
         let signs = Signs {
             all: self.sign,
             each: &self.signs,
         };
         let mut near = 0;
-        for &time in times {
+        let mut next = |time: f64| {
             let sample = time_sample(stretch.times, time, near);
             near = (sample.key & !HELD) as usize;
-            self.block.push(stretch.keys, sample, &signs, output);
+            sample
+        };
+        match &mut self.block {
+            Block::ByTwo(block) => {
+                for &time in times {
+                    block.push(stretch.keys, next(time), &signs, output);
+                }
+            }
+            Block::ByFour(block, joints) => {
+                let keys = CubicKeys::new(stretch, joints, &signs);
+                for &time in times {
+                    block.push(&keys, next(time), output);
+                }
+            }
         }
     }
 }
 
-/// The signs of intervals' first keys.
+impl Block<'_> {
+    /// Works out what waits; whether anything was left out since the last time.
+    fn flush(&mut self, output: &mut Output<'_>) -> bool {
+        match self {
+            Block::ByTwo(block) => {
+                block.flush(output);
+                false
+            }
+            Block::ByFour(block, _) => {
+                block.flush(output);
+                std::mem::take(&mut block.wild) > 0
+            }
+        }
+    }
+}
+
+/// The signs of keys.
 struct Signs<'a> {
     all: f32,
     /// Where any of them differ.
     each: &'a [f32],
+}
+
+/// The keys of a track, and their joints.
+struct CubicKeys<'a> {
+    keys: &'a [[f32; 4]],
+    joints: &'a [Joint],
+    signs: &'a Signs<'a>,
+}
+
+impl<'a> CubicKeys<'a> {
+    fn new<'t>(stretch: Stretch<'t>, joints: &'a mut TrackJoints<'t>, signs: &'a Signs<'a>) -> Self
+    where
+        't: 'a,
+    {
+        Self {
+            keys: bytemuck::cast_slice(stretch.keys),
+            joints: joints.of(stretch.times, stretch.first_key, stretch.all),
+            signs,
+        }
+    }
 }
 
 /// What is still to be written.
@@ -188,6 +313,57 @@ impl SampleBlock {
     fn flush(&mut self, output: &mut Output<'_>) {
         in_lanes(self);
         // The output second, or one of it would be taken and not written.
+        for (&rotation, place) in self.rotations[..self.count].iter().zip(output) {
+            *place = rotation;
+        }
+        self.count = 0;
+    }
+}
+
+impl CubicBlock {
+    /// As [`SampleBlock::push`].
+    #[inline(always)]
+    fn push(&mut self, from: &CubicKeys<'_>, sample: Sample, output: &mut Output<'_>) {
+        let lane = self.count;
+        let CubicKeys {
+            keys,
+            joints,
+            signs,
+        } = *from;
+        let key = (sample.key & !HELD) as usize;
+        if sample.key & HELD == 0 {
+            let (first, last) = (joints[key], joints[key + 1]);
+            let before = key - usize::from(first.kind == INNER);
+            let after = key + 1 + usize::from(last.kind == INNER);
+            self.joints[0][lane] = first;
+            self.joints[1][lane] = last;
+            for (place, key) in [before, key, key + 1, after].into_iter().enumerate() {
+                self.keys[place][lane] = keys[key];
+                if let Some(&sign) = signs.each.get(key) {
+                    self.keys[place][lane] = keys[key].map(|c| c * sign);
+                }
+            }
+            self.signs[lane] = if signs.each.is_empty() {
+                signs.all
+            } else {
+                1.0
+            };
+            self.held[lane] = 0.0;
+        } else {
+            self.keys[1][lane] = keys[key];
+            self.held[lane] = 1.0;
+        }
+        self.parameters[lane] = sample.parameter;
+        self.count += 1;
+        if self.count == LANES {
+            self.flush(output);
+        }
+    }
+
+    fn flush(&mut self, output: &mut Output<'_>) {
+        // Lanes behind the last are worked out too.
+        self.held[self.count..].fill(1.0);
+        in_lanes(self);
         for (&rotation, place) in self.rotations[..self.count].iter().zip(output) {
             *place = rotation;
         }

@@ -10,7 +10,7 @@ use super::device::LogicalDevice;
 use super::error::VulkanError;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
-use super::pipeline::{KERNELS, POSES, Pipeline};
+use super::pipeline::{KERNELS, POSES, Pipeline, SAMPLED};
 use super::sampled::KeySlot;
 use super::slot::{External, Slot, Target};
 use super::submission::{Access, Submission};
@@ -39,7 +39,7 @@ pub(crate) struct VulkanEngine {
     pub(super) pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS]>,
     pub(super) pose_pipelines: Mutex<[Option<Arc<Pipeline>>; POSES]>,
     pub(super) slots: Mutex<Vec<Slot>>,
-    pub(super) key_pipeline: Mutex<Option<Arc<Pipeline>>>,
+    pub(super) key_pipelines: Mutex<[Option<Arc<Pipeline>>; SAMPLED]>,
     pub(super) key_slots: Mutex<Vec<KeySlot>>,
     /// Results are written in place, or copied out of the device's own memory.
     pub(super) in_place: bool,
@@ -128,7 +128,7 @@ impl VulkanEngine {
             pipelines: Mutex::default(),
             pose_pipelines: Mutex::default(),
             slots: Mutex::default(),
-            key_pipeline: Mutex::default(),
+            key_pipelines: Mutex::default(),
             key_slots: Mutex::default(),
             in_place,
             window: AtomicUsize::new(window),

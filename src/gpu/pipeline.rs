@@ -38,7 +38,7 @@ pub(super) enum Clock {
 
 /// Kernels that there are.
 pub(super) const KERNELS: usize = 32;
-const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES + 1);
+const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES + SAMPLED);
 
 /// Kernels over poses that are already there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,9 +56,28 @@ pub(super) fn pose_shader(kernel: PoseKernel) -> Shader {
     SHADERS[1 + KERNELS + kernel as usize]
 }
 
-/// Arcs with fewer samples than keys.
-pub(super) fn sampled_arcs() -> Shader {
-    SHADERS[1 + KERNELS + POSES]
+/// Kernels from keys to samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SampledKernel {
+    Arcs,
+    Cubics,
+}
+
+/// How many of them there are.
+pub(super) const SAMPLED: usize = 2;
+
+impl SampledKernel {
+    pub(super) fn shader(self) -> Shader {
+        SHADERS[1 + KERNELS + POSES + self as usize]
+    }
+
+    /// Number of storage buffers that it binds.
+    pub(super) fn bindings(self) -> u32 {
+        match self {
+            Self::Arcs => 4,
+            Self::Cubics => 5,
+        }
+    }
 }
 
 /// A kernel, and its place among all.
@@ -89,8 +108,6 @@ pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, u
 pub(super) const KERNEL_BINDINGS: u32 = 5;
 /// Number of storage buffers that a `pose_*.wgsl` binds: three inputs and the output.
 pub(super) const POSE_BINDINGS: u32 = 4;
-/// Number of storage buffers that `sampled_arcs.wgsl` binds.
-pub(super) const SAMPLED_BINDINGS: u32 = 4;
 /// Number of storage buffers that `canary.wgsl` binds.
 pub(super) const CANARY_BINDINGS: u32 = 2;
 

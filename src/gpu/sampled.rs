@@ -1,4 +1,4 @@
-//! Arcs with fewer samples than keys, straight from keys: two pieces are in flight, the
+//! Fewer samples than keys, straight from keys: two pieces are in flight, the
 //! host brings the keys of one while the device works on the other.
 
 use std::ops::Range;
@@ -10,7 +10,7 @@ use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::engine::{SLOTS, VulkanEngine};
 use super::error::VulkanError;
-use super::pipeline::{Exactness, Pipeline, SAMPLED_BINDINGS, sampled_arcs};
+use super::pipeline::{Exactness, Pipeline, SampledKernel};
 use super::slot::{Slot, Stopwatch, copy};
 use super::submission::{Access, Binding, Submission};
 use crate::engine::Error;
@@ -25,6 +25,7 @@ pub(super) struct KeySlot {
     signs: Option<Buffer>,
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
+    joints: Option<Buffer>,
     /// Where the result of the piece in flight goes.
     output: Range<usize>,
     /// As [`Slot::compiled`].
@@ -71,7 +72,11 @@ impl VulkanEngine {
         output: &mut [[f32; 4]],
         stopwatch: &mut Stopwatch,
     ) -> Result<(), Error> {
-        let pipeline = self.key_pipeline()?;
+        let kernel = match job.is_cubic() {
+            false => SampledKernel::Arcs,
+            true => SampledKernel::Cubics,
+        };
+        let pipeline = self.key_pipeline(kernel)?;
         let mut pieces = job.pieces();
         let mut start = 0;
         loop {
@@ -92,14 +97,16 @@ impl VulkanEngine {
         }
     }
 
-    /// The kernel, made when it is first needed.
-    fn key_pipeline(&self) -> Result<Arc<Pipeline>, VulkanError> {
-        let mut kept = (self.key_pipeline.lock()).unwrap_or_else(PoisonError::into_inner);
-        if let Some(pipeline) = &*kept {
+    /// A kernel, made when it is first needed.
+    fn key_pipeline(&self, kernel: SampledKernel) -> Result<Arc<Pipeline>, VulkanError> {
+        let mut all = (self.key_pipelines.lock()).unwrap_or_else(PoisonError::into_inner);
+        let kept = &mut all[kernel as usize];
+        if let Some(pipeline) = kept {
             return Ok(Arc::clone(pipeline));
         }
         let exactness = Exactness::Demanded;
-        let pipeline = Pipeline::new(&self.device, sampled_arcs(), SAMPLED_BINDINGS, exactness)?;
+        let (shader, bindings) = (kernel.shader(), kernel.bindings());
+        let pipeline = Pipeline::new(&self.device, shader, bindings, exactness)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
     }
 }
@@ -112,6 +119,7 @@ impl KeySlot {
             signs: None,
             samples: None,
             rotations: None,
+            joints: None,
             output: 0..0,
             compiled: false,
         })
@@ -124,7 +132,13 @@ impl KeySlot {
         pipeline: &Pipeline,
         piece: &KeyPiece<'_, '_>,
     ) -> Result<(), Error> {
-        let [key_bytes, sign_bytes, sample_bytes, rotation_bytes] = piece.bytes();
+        let [
+            key_bytes,
+            sign_bytes,
+            sample_bytes,
+            rotation_bytes,
+            joint_bytes,
+        ] = piece.bytes();
         let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
             Slot::grow(device, buffer, bytes as u64, residence)
         };
@@ -132,11 +146,13 @@ impl KeySlot {
         room(&mut self.signs, sign_bytes, Residence::Upload)?;
         room(&mut self.samples, sample_bytes, Residence::Upload)?;
         room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
-        let (Some(keys), Some(signs), Some(samples), Some(rotations)) = (
+        room(&mut self.joints, joint_bytes.max(1), Residence::Upload)?;
+        let (Some(keys), Some(signs), Some(samples), Some(rotations), Some(joints)) = (
             &mut self.keys,
             &mut self.signs,
             &mut self.samples,
             &self.rotations,
+            &mut self.joints,
         ) else {
             unreachable!("grown above");
         };
@@ -144,13 +160,16 @@ impl KeySlot {
             bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes)),
             bytemuck::cast_slice_mut(signs.bytes_mut(0..sign_bytes)),
             bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
+            bytemuck::cast_slice_mut(joints.bytes_mut(0..joint_bytes)),
         )?;
         let bindings = [
             Binding::whole(keys),
             Binding::whole(signs),
             Binding::whole(samples),
             Binding::whole(rotations),
+            Binding::whole(joints),
         ];
+        let bindings = &bindings[..pipeline.bindings as usize];
         let rows = piece.rows();
         let groups = [
             rows.samples.div_ceil(ROWS_WORKGROUP),
@@ -159,7 +178,7 @@ impl KeySlot {
         self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         self.submission.begin(1)?;
         self.submission
-            .dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
+            .dispatch(pipeline, bindings, bytemuck::bytes_of(&rows), groups)?;
         self.submission.barrier(Access::Kernel, Access::Host);
         self.submission.submit()?;
         Ok(())

@@ -3,6 +3,7 @@
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, ratio, scaled, sum};
+use crate::joints::Joints;
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -27,7 +28,11 @@ pub const BESSEL_OVERHAUSER: Method = Method {
         rotation: 2.3,
     },
     reference: reference::Kind::BesselOverhauser,
-    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).steady_alone()),
+    curves: Curves::Smooth(
+        Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
+            .steady_alone()
+            .gentle(Joints::ByTime),
+    ),
 };
 
 struct Rule;

@@ -2,6 +2,7 @@
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
 use crate::branchless::{Algebra, product, scaled, sum};
+use crate::joints::Joints;
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -27,7 +28,11 @@ pub const CATMULL_ROM: Method = Method {
         rotation: 2.3,
     },
     reference: reference::Kind::CatmullRom,
-    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).steady_alone()),
+    curves: Curves::Smooth(
+        Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
+            .steady_alone()
+            .gentle(Joints::Alike),
+    ),
 };
 
 struct Rule;

@@ -5,6 +5,7 @@ use glam::Quat;
 use super::{Curves, Form, Method};
 use crate::branchless::{self, length, log, unit};
 use crate::cycle::{Outside, Sides};
+use crate::joints::Joints;
 use crate::tracks::Tcb;
 
 /// A method with its options: what [`Engine::upload`](crate::Engine::upload)
@@ -48,6 +49,18 @@ impl Interpolation {
             && self.path == Path::Shortest
             && self.quantity == Quantity::Rotation
             && self.speed == Speed::AsKeyed
+    }
+
+    /// How curves that turn little follow from keys alone, where every key counts with the
+    /// sign nearer to its predecessor's.
+    pub(crate) fn gentle_joints(&self) -> Option<Joints> {
+        let Curves::Smooth(smooth) = self.method.curves else {
+            return None;
+        };
+        let suits = self.path == Path::Shortest
+            && self.quantity == Quantity::Rotation
+            && self.speed == Speed::AsKeyed;
+        smooth.gentle.filter(|_| suits)
     }
 
     /// Whether arcs too are curves with a formula: for what follows from derivatives, and

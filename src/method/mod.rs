@@ -44,6 +44,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use crate::branchless::Vector;
+use crate::joints::Joints;
 use crate::prepare::{Intervals, Shape, Stretch};
 use crate::reference;
 use crate::tracks::Track;
@@ -134,6 +135,8 @@ pub(crate) struct Smooth {
     pub(crate) given: Given,
     /// Two keys that are alone are joined at constant velocity, whatever the ends.
     pub(crate) steady_alone: bool,
+    /// How curves that turn little follow from keys alone, in f32.
+    pub(crate) gentle: Option<Joints>,
 }
 
 /// What a method knows of an interval beside its two keys.
@@ -154,6 +157,14 @@ impl Smooth {
             curves,
             given: Given::Nothing,
             steady_alone: false,
+            gentle: None,
+        }
+    }
+
+    const fn gentle(self, joints: Joints) -> Self {
+        Self {
+            gentle: Some(joints),
+            ..self
         }
     }
 

@@ -93,10 +93,7 @@ impl Fitting {
             self.intervals.push(Fitted { place, source });
             return;
         };
-        let segments = polynomials(prepared);
-        let source = CurveSource::Segment(segments.len() as u32);
-        segments.push(PolynomialSegment::zeroed());
-        self.intervals.push(Fitted { place, source });
+        self.push_segment(prepared, place);
         let queue = match tier {
             Tier::Gentle => &mut self.gentle,
             Tier::Full => &mut self.full,
@@ -108,6 +105,20 @@ impl Fitting {
         if block.is_full() {
             self.run(tier, prepared);
         }
+    }
+
+    /// Adds an interval with a segment, which is zero.
+    pub(super) fn push_segment<'p>(
+        &mut self,
+        prepared: &'p mut Prepared,
+        place: Place,
+    ) -> &'p mut PolynomialSegment {
+        let segments = polynomials(prepared);
+        let segment = segments.len();
+        let source = CurveSource::Segment(segment as u32);
+        self.intervals.push(Fitted { place, source });
+        segments.push(PolynomialSegment::zeroed());
+        &mut segments[segment]
     }
 
     /// Adds two keys that are alone.

@@ -238,6 +238,12 @@ impl Intervals {
     pub(super) fn whole(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
     }
+
+    /// As [`Intervals::whole`], in f32.
+    #[inline(always)]
+    pub(super) fn whole32(&self) -> usize {
+        self.count.next_multiple_of(16).min(LANES)
+    }
 }
 
 #[inline(always)]

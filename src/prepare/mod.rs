@@ -9,6 +9,7 @@ mod curve;
 mod cut;
 mod fit;
 mod fitting;
+mod gentle_lanes;
 mod intervals;
 mod motion;
 mod nodes;

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::Quat;
 
 use super::fitting::{Fitting, Place};
+use super::gentle_lanes::GentleLanes;
 use super::intervals::{Intervals, LANES, Stretch};
 use super::passes::{FramesHeld, Steps};
 use super::retime::Waiting;
@@ -37,6 +38,8 @@ pub(crate) struct SmoothPreparation {
     intervals: Intervals,
     stretches: Vec<Stretch>,
     fitting: Fitting,
+    /// Where the method has such curves.
+    gentle: Option<Box<GentleLanes>>,
     /// Curves that are to be run through at constant speed.
     waiting: Waiting,
     /// What the signs of the keys so far make of the next.
@@ -48,7 +51,11 @@ pub(crate) struct SmoothPreparation {
 impl SmoothPreparation {
     pub(crate) fn new(interpolation: &Interpolation, smooth: Smooth) -> Self {
         let path = interpolation.method.path.unwrap_or(interpolation.path);
+        let suits =
+            interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
+        let gentle = smooth.gentle.filter(|_| suits);
         Self {
+            gentle: gentle.map(|rule| Box::new(GentleLanes::new(rule, interpolation.ends, path))),
             interpolation: Interpolation {
                 path,
                 ..*interpolation
@@ -188,30 +195,7 @@ impl SmoothPreparation {
 
     /// Makes the intervals that wait into curves, and has them fitted.
     fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
-        in_lanes(&mut Steps(&mut self.intervals));
-        for stretch in &self.stretches {
-            if stretch.intervals.start == 0 {
-                self.sign = 1.0;
-            }
-            for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
-                let dot = self.intervals.dots[lane];
-                // A method that takes its own path has its own way between opposites.
-                let refuses = self.interpolation.method.path.is_none();
-                if refuses && self.interpolation.path.refuses(dot) {
-                    let track = stretch.track;
-                    return Err(InterpolationError::Antipodal { track, key });
-                }
-                self.intervals.signs[lane] = self.sign;
-                if dot < self.intervals.noise {
-                    self.sign = -self.sign;
-                }
-            }
-        }
-        (self.smooth.curves)(
-            &mut self.intervals,
-            &self.stretches,
-            self.interpolation.ends,
-        );
+        self.curves()?;
         for stretch in std::mem::take(&mut self.stretches) {
             self.end_values(prepared, &stretch);
             self.beyond(prepared, &stretch);
@@ -249,6 +233,9 @@ impl SmoothPreparation {
                 } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
                     let keys = self.intervals.keys(lane);
                     self.fitting.push_steady(prepared, place, keys);
+                } else if let Some(gentle) = self.gentle.as_ref().filter(|all| all.holds(lane)) {
+                    let segment = self.fitting.push_segment(prepared, place);
+                    gentle.write(lane, segment);
                 } else if !self.holds(&stretch, lane) {
                     self.fitting.push(prepared, place, &self.intervals, lane);
                 } else if key == NONE {
@@ -264,6 +251,66 @@ impl SmoothPreparation {
             }
         }
         self.intervals.count = 0;
+        Ok(())
+    }
+
+    /// Makes the intervals that wait into curves, in f64 only where there are others than
+    /// those that turn little.
+    fn curves(&mut self) -> Result<(), InterpolationError> {
+        let (mut any, mut all) = (false, false);
+        if let Some(gentle) = &mut self.gentle {
+            (any, all) = gentle.look(&self.intervals, &self.stretches);
+        }
+        let of_formula = |outside| self.goes_on(outside);
+        let sides = [self.interpolation.before, self.interpolation.after];
+        all &= !sides.into_iter().any(of_formula) && !self.is_frozen();
+        if !all {
+            in_lanes(&mut Steps(&mut self.intervals));
+        }
+        self.align(!all)?;
+        if let Some(gentle) = self.gentle.as_mut().filter(|_| any) {
+            gentle.prepare(&self.intervals, &self.stretches);
+            let mut lanes = self.stretches.iter().flat_map(Stretch::lanes);
+            if all && lanes.all(|lane| gentle.holds(lane)) {
+                return Ok(());
+            }
+        }
+        if all {
+            in_lanes(&mut Steps(&mut self.intervals));
+        }
+        (self.smooth.curves)(
+            &mut self.intervals,
+            &self.stretches,
+            self.interpolation.ends,
+        );
+        Ok(())
+    }
+
+    /// The signs of the intervals' first keys; by the steps between them, or where all are
+    /// short without.
+    fn align(&mut self, by_steps: bool) -> Result<(), InterpolationError> {
+        for stretch in &self.stretches {
+            if stretch.intervals.start == 0 {
+                self.sign = 1.0;
+            }
+            for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
+                self.intervals.signs[lane] = self.sign;
+                if let (false, Some(gentle)) = (by_steps, &self.gentle) {
+                    self.sign *= f64::from(gentle.flips[lane]);
+                    continue;
+                }
+                let dot = self.intervals.dots[lane];
+                // A method that takes its own path has its own way between opposites.
+                let refuses = self.interpolation.method.path.is_none();
+                if refuses && self.interpolation.path.refuses(dot) {
+                    let track = stretch.track;
+                    return Err(InterpolationError::Antipodal { track, key });
+                }
+                if dot < self.intervals.noise {
+                    self.sign = -self.sign;
+                }
+            }
+        }
         Ok(())
     }
 

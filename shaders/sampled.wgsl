@@ -1,0 +1,49 @@
+// Fewer samples than keys: an invocation for each sample, straight from the keys beside
+// it. Joined with `sampled_arcs` or `sampled_cubics`, which has `between`.
+// Twin: src/cpu/sample_lanes.rs.
+
+// Where a sample lies among the keys of its row.
+struct Sample {
+    // The key before it; the rotation itself, where this carries HELD.
+    key: u32,
+    // From there on, as `evaluate` takes it.
+    parameter: f32,
+}
+
+// Tracks whose samples lie alike among their keys; or all of any tracks as one row.
+struct Rows {
+    // Samples, and keys, of each row.
+    samples: u32,
+    keys: u32,
+}
+
+const ROWS_WORKGROUP: u32 = 64;
+const HELD: u32 = 0x80000000;
+
+@group(0) @binding(0) var<storage, read> keys: array<vec4f>;
+// A bit for each key: whether those before it turn its sign.
+@group(0) @binding(1) var<storage, read> signs: array<u32>;
+@group(0) @binding(2) var<storage, read> samples: array<Sample>;
+@group(0) @binding(3) var<storage, read_write> rotations: array<vec4f>;
+
+var<immediate> rows: Rows;
+
+@compute @workgroup_size(ROWS_WORKGROUP)
+fn main(@builtin(global_invocation_id) invocation: vec3u) {
+    if invocation.x >= rows.samples {
+        return;
+    }
+    let sample = samples[invocation.x];
+    let key = invocation.y * rows.keys + (sample.key & ~HELD);
+    let place = invocation.y * rows.samples + invocation.x;
+    if (sample.key & HELD) != 0u {
+        rotations[place] = keys[key];
+        return;
+    }
+    rotations[place] = canonical(between(key, sample));
+}
+
+fn signed(key: u32) -> vec4f {
+    let sign = (signs[key / 32u] >> (key % 32u)) << 31u;
+    return bitcast<vec4f>(bitcast<vec4u>(keys[key]) ^ vec4u(sign));
+}

@@ -1,0 +1,20 @@
+// Cubics for `sampled`. Joined with `gentle` and `canonical`.
+
+// Of the keys of a row.
+@group(0) @binding(4) var<storage, read> joints: array<Joint>;
+
+// No rotation, 0, where the curve turns too much for `gentle`.
+fn between(key: u32, sample: Sample) -> vec4f {
+    let first = joints[sample.key];
+    let last = joints[sample.key + 1u];
+    let before = select(key, key - 1u, first.kind == INNER);
+    let after = select(key + 1u, key + 2u, last.kind == INNER);
+    let curve = gentle(signed(before), signed(key), signed(key + 1u), signed(after), first, last);
+    // As `evaluate_polynomial`, whose other powers are 0.
+    let s = sample.parameter;
+    let z = s * s;
+    let even = ((curve.powers[6] * z + curve.powers[4]) * z + curve.powers[2]) * z
+        + curve.powers[0];
+    let odd = (curve.powers[5] * z + curve.powers[3]) * z + curve.powers[1];
+    return select(vec4f(0.0), odd * s + even, curve.holds);
+}

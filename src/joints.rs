@@ -1,0 +1,127 @@
+//! What the tangent at a key is made of, where curves are prepared in f32 straight from
+//! keys: all that depends on times is here, in f64.
+
+use crate::method::Ends;
+use crate::segment::Joint;
+use crate::segment::shader::{END, INNER, OUTSIDE};
+
+/// How the steps on both sides of a key count in its tangent.
+#[derive(Clone, Copy)]
+pub(crate) enum Joints {
+    /// Alike: Catmull-Rom.
+    Alike,
+    /// By how long the other one takes: Bessel-Overhauser.
+    ByTime,
+}
+
+/// How much longer one interval may be than its neighbour.
+const MOST_UNEVEN: f64 = 16.0;
+
+/// A key with no neighbour on one side, as nothing is known of what it does there.
+pub(crate) const UNKNOWN: Joint = Joint {
+    before: 0.0,
+    after: 0.0,
+    outgoing: 0.0,
+    kind: OUTSIDE,
+};
+
+impl Joints {
+    /// Of a key between intervals of so many seconds.
+    #[inline(always)]
+    pub(crate) fn between(self, before: f64, after: f64) -> Joint {
+        let by_time = matches!(self, Self::ByTime);
+        let (left, right) = (after / before, before / after);
+        let outgoing = after / (3.0 * (before + after));
+        // Written so that NaN is no known joint.
+        let is_even = (left <= MOST_UNEVEN) & (right <= MOST_UNEVEN);
+        Joint {
+            before: if by_time { left as f32 } else { 1.0 },
+            after: if by_time { right as f32 } else { 1.0 },
+            outgoing: if by_time { outgoing as f32 } else { SIXTH },
+            kind: if is_even | !by_time { INNER } else { OUTSIDE },
+        }
+    }
+
+    /// Of the first or the last of at least three keys.
+    pub(crate) fn end(ends: Ends) -> Joint {
+        match ends {
+            Ends::Parabolic => Joint {
+                kind: END,
+                ..UNKNOWN
+            },
+            _ => UNKNOWN,
+        }
+    }
+}
+
+const SIXTH: f32 = 1.0 / 6.0;
+
+/// The joints of a track's keys, of those that are asked for; kept for the next track
+/// with the same times.
+pub(crate) struct TrackJoints<'a> {
+    rule: Joints,
+    ends: Ends,
+    times: &'a [f64],
+    whole: (usize, usize),
+    joints: Vec<Joint>,
+}
+
+impl<'a> TrackJoints<'a> {
+    pub(crate) fn new(rule: Joints, ends: Ends) -> Self {
+        Self {
+            rule,
+            ends,
+            times: &[],
+            whole: (0, 0),
+            joints: Vec::new(),
+        }
+    }
+
+    /// Of keys that follow one another: the first of them is the `first`th of `all`.
+    pub(crate) fn of(&mut self, times: &'a [f64], first: usize, all: usize) -> &[Joint] {
+        if std::ptr::eq(self.times, times) && self.whole == (first, all) {
+            return &self.joints;
+        }
+        (self.times, self.whole) = (times, (first, all));
+        self.joints.clear();
+        self.joints.resize(times.len(), UNKNOWN);
+        let mut work = Between {
+            rule: self.rule,
+            times,
+            joints: &mut self.joints,
+        };
+        crate::cpu::in_lanes(&mut work);
+        let is_curve = all > 2;
+        if first == 0 && is_curve {
+            self.joints[0] = Joints::end(self.ends);
+        }
+        if first + times.len() == all && is_curve {
+            self.joints[times.len() - 1] = Joints::end(self.ends);
+        }
+        &self.joints
+    }
+}
+
+/// Joints of all keys but the first and the last of some.
+struct Between<'a> {
+    rule: Joints,
+    times: &'a [f64],
+    joints: &'a mut [Joint],
+}
+
+impl crate::cpu::InLanes for Between<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let inner = self.times.len().saturating_sub(2);
+        let (before, own, after) = (
+            &self.times[..inner],
+            &self.times[self.times.len().min(1)..][..inner],
+            &self.times[self.times.len() - inner..],
+        );
+        let start = self.joints.len().min(1);
+        let joints = &mut self.joints[start..][..inner];
+        for j in 0..inner {
+            joints[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
+        }
+    }
+}

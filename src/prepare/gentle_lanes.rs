@@ -1,0 +1,197 @@
+//! Curves that turn little, in vector lanes of f32: what the kernels evaluate comes
+//! straight from the keys, with nothing sampled and nothing fitted.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
+
+use super::intervals::{Intervals, LANES, ROOM, Stretch};
+use crate::cpu::{InLanes, gentle, in_lanes};
+use crate::joints::Joints;
+use crate::method::{Ends, Path};
+use crate::segment::shader::{INNER, LONGEST_STEP};
+use crate::segment::{Joint, PolynomialSegment};
+
+/// The curves of a block's intervals.
+pub(super) struct GentleLanes {
+    rule: Joints,
+    /// At a track's ends.
+    end: Joint,
+    is_loop: bool,
+    may_flip: bool,
+    /// -1 where the sign of an interval's second key is turned.
+    pub(super) flips: [f32; ROOM],
+    /// Whether both keys are near each other.
+    near: [bool; ROOM],
+    /// Of the key that an interval starts with.
+    joints: [Joint; ROOM],
+    powers: [[[f32; 4]; ROOM]; 7],
+    holds: [bool; ROOM],
+}
+
+impl GentleLanes {
+    pub(super) fn new(rule: Joints, ends: Ends, path: Path) -> Self {
+        let end = Joints::end(ends);
+        Self {
+            rule,
+            end,
+            is_loop: ends == Ends::Loop,
+            may_flip: path == Path::Shortest,
+            flips: [1.0; ROOM],
+            near: [false; ROOM],
+            joints: [end; ROOM],
+            powers: [[[0.0; 4]; ROOM]; 7],
+            holds: [false; ROOM],
+        }
+    }
+
+    /// Finds out which keys are near each other; whether any curve may turn little, and
+    /// whether all do.
+    pub(super) fn look(&mut self, intervals: &Intervals, stretches: &[Stretch]) -> (bool, bool) {
+        self.holds = [false; ROOM];
+        in_lanes(&mut Chords {
+            lanes: self,
+            intervals,
+        });
+        let lanes = || stretches.iter().flat_map(Stretch::lanes);
+        let may = |lane: usize| lane > 0 && (lane - 1..=lane + 1).all(|near| self.near[near]);
+        (lanes().any(may), lanes().all(may))
+    }
+
+    /// Prepares them; the signs of the intervals' first keys are known.
+    pub(super) fn prepare(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
+        in_lanes(&mut JointLanes {
+            lanes: self,
+            intervals,
+        });
+        for stretch in stretches.iter().filter(|_| !self.is_loop) {
+            let end = match stretch.all {
+                1 => crate::joints::UNKNOWN,
+                _ => self.end,
+            };
+            if let Some(lane) = stretch.first() {
+                self.joints[lane] = end;
+            }
+            if let Some(lane) = stretch.last() {
+                self.joints[lane + 1] = end;
+            }
+        }
+        in_lanes(&mut Curves {
+            lanes: self,
+            intervals,
+        });
+    }
+
+    /// Whether a lane has its curve.
+    pub(super) fn holds(&self, lane: usize) -> bool {
+        self.holds[lane]
+    }
+
+    /// Writes it.
+    #[inline]
+    pub(super) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
+        for (own, power) in segment.coefficients.iter_mut().zip(&self.powers) {
+            *own = power[lane];
+        }
+    }
+}
+
+struct Chords<'a> {
+    lanes: &'a mut GentleLanes,
+    intervals: &'a Intervals,
+}
+
+impl InLanes for Chords<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let (mut flips, mut near) = ([1.0; ROOM], [false; ROOM]);
+        let Intervals { from, to, .. } = self.intervals;
+        let turned = if self.lanes.may_flip { -1.0 } else { 1.0 };
+        for j in 0..self.intervals.whole32() {
+            let ([ax, ay, az, aw], [bx, by, bz, bw]) = (from[j], to[j]);
+            let dot = ax * bx + ay * by + az * bz + aw * bw;
+            let flip = if dot < 0.0 { turned } else { 1.0 };
+            let (x, y) = (bx * flip - ax, by * flip - ay);
+            let (z, w) = (bz * flip - az, bw * flip - aw);
+            flips[j] = flip;
+            near[j] = x * x + y * y + z * z + w * w <= LONGEST_STEP;
+        }
+        (self.lanes.flips, self.lanes.near) = (flips, near);
+    }
+}
+
+struct JointLanes<'a> {
+    lanes: &'a mut GentleLanes,
+    intervals: &'a Intervals,
+}
+
+impl InLanes for JointLanes<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let mut joints = self.lanes.joints;
+        let durations = &self.intervals.durations;
+        for j in 0..LANES {
+            joints[j + 1] = self.lanes.rule.between(durations[j], durations[j + 1]);
+        }
+        self.lanes.joints = joints;
+    }
+}
+
+struct Curves<'a> {
+    lanes: &'a mut GentleLanes,
+    intervals: &'a Intervals,
+}
+
+impl InLanes for Curves<'_> {
+    #[inline(always)]
+    fn run(&mut self) {
+        let mut powers = [[[0.0; ROOM]; 4]; 7];
+        let mut holds = [false; ROOM];
+        let GentleLanes { flips, joints, .. } = &*self.lanes;
+        let Intervals {
+            from, to, signs, ..
+        } = self.intervals;
+        // The lane before each is context, at least.
+        for j in 0..self.intervals.whole32() {
+            let own = signs[j + 1] as f32;
+            let sign_before = own * flips[j];
+            let sign_end = own * flips[j + 1];
+            let sign_after = sign_end * flips[j + 2];
+            let (first, last) = (joints[j + 1], joints[j + 2]);
+            let start = scaled(from[j + 1], own);
+            let end = scaled(to[j + 1], sign_end);
+            let before = scaled(from[j], sign_before);
+            let after = scaled(to[j + 2], sign_after);
+            // Where there is no neighbour, the key again.
+            let before = either(first.kind == INNER, before, start);
+            let after = either(last.kind == INNER, after, end);
+            let curve = gentle([before, start, end, after], first, last);
+            for power in 0..7 {
+                for c in 0..4 {
+                    powers[power][c][j + 1] = curve.powers[power][c];
+                }
+            }
+            holds[j + 1] = curve.holds;
+        }
+        self.lanes.holds = holds;
+        for power in 0..7 {
+            let [x, y, z, w] = &powers[power];
+            for j in 0..ROOM {
+                self.lanes.powers[power][j] = [x[j], y[j], z[j], w[j]];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn either(first: bool, a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        if first { a[0] } else { b[0] },
+        if first { a[1] } else { b[1] },
+        if first { a[2] } else { b[2] },
+        if first { a[3] } else { b[3] },
+    ]
+}
+
+#[inline(always)]
+fn scaled([x, y, z, w]: [f32; 4], k: f32) -> [f32; 4] {
+    [x * k, y * k, z * k, w * k]
+}
