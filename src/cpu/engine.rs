@@ -6,6 +6,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
+use super::memory::{Memories, Memory};
 use super::mend::Row;
 use super::sampled::{Sampled, Straight, straight};
 use crate::clock::{FramesError, Timeline};
@@ -13,7 +14,7 @@ use crate::cycle::Cycle;
 use crate::encoding::Encoding;
 use crate::engine::Error;
 use crate::method::Interpolation;
-use crate::prepare::{ClipData, PartRef, Preparation, Prepared, Wanted};
+use crate::prepare::{ClipData, PartRef, Wanted};
 use crate::rotations::Layout;
 use crate::segment::Segments;
 use crate::tracks::TrackSet;
@@ -36,6 +37,7 @@ pub(crate) const TASK_KEYS: usize = 1024;
 pub(crate) struct CpuEngine {
     kernels: Kernels,
     pool: Option<rayon::ThreadPool>,
+    pub(super) memories: Memories,
 }
 
 impl CpuEngine {
@@ -50,6 +52,7 @@ impl CpuEngine {
         Ok(Self {
             kernels: Kernels::new(width),
             pool,
+            memories: Memories::default(),
         })
     }
 
@@ -58,6 +61,7 @@ impl CpuEngine {
         Self {
             kernels: Kernels::new(VectorWidth::widest()),
             pool: None,
+            memories: Memories::default(),
         }
     }
 
@@ -249,29 +253,30 @@ impl CpuEngine {
         }
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
-        let new = || {
-            let mut preparation = Preparation::new(interpolation);
-            preparation.only_for(timeline, set);
-            (Prepared::new(interpolation), preparation)
-        };
-        let task =
-            |(prepared, preparation): &mut (Prepared, Preparation), first, rows: &mut [_]| {
-                for (rows, first) in rows
-                    .chunks_mut(samples * tracks_each)
-                    .zip((first..).step_by(tracks_each))
-                {
-                    prepared.clear();
-                    let tracks = first..first + rows.len() / samples;
-                    preparation.push(prepared, set, tracks)?;
-                    for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
-                        let part = PartRef { prepared, part };
-                        self.part(part, timeline, &Cycle::own(0..samples), row)?;
-                    }
+        let task = |first, rows: &mut [_]| -> Result<(), Error> {
+            let mut memory = self.memories.take(interpolation, timeline, set);
+            let Memory {
+                prepared,
+                preparation,
+                ..
+            } = &mut memory;
+            for (rows, first) in rows
+                .chunks_mut(samples * tracks_each)
+                .zip((first..).step_by(tracks_each))
+            {
+                prepared.clear();
+                let tracks = first..first + rows.len() / samples;
+                preparation.push(prepared, set, tracks)?;
+                for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
+                    let part = PartRef { prepared, part };
+                    self.part(part, timeline, &Cycle::own(0..samples), row)?;
                 }
-                Ok(())
-            };
+            }
+            self.memories.give_back(memory);
+            Ok(())
+        };
         if output.len() <= TASK && keys_each * tracks.len() <= TASK_KEYS {
-            return task(&mut new(), tracks.start, output);
+            return task(tracks.start, output);
         }
         let work = || {
             // Several turns for each task, whose memory serves them all.
@@ -281,7 +286,7 @@ impl CpuEngine {
             output
                 .par_chunks_mut(samples * each)
                 .enumerate()
-                .try_for_each(|(i, rows)| task(&mut new(), tracks.start + i * each, rows))
+                .try_for_each(|(i, rows)| task(tracks.start + i * each, rows))
         };
         self.on_threads(work)
     }

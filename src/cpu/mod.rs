@@ -13,6 +13,7 @@ mod evaluate_polynomial;
 mod gentle;
 mod long;
 mod matrix;
+mod memory;
 mod mend;
 mod pose_add;
 mod pose_blend;

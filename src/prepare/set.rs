@@ -176,8 +176,8 @@ pub(super) trait Prepare: Send {
     /// added will have.
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError>;
 
-    /// From now on only intervals that hold a frame need segments.
-    fn only_frames(&mut self, _rate: FrameRate, _start: f64) {}
+    /// From now on only intervals that hold a frame need segments; or all.
+    fn only_frames(&mut self, _frames: Option<(FrameRate, f64)>) {}
 }
 
 /// Prepares whole tracks, with memory that serves many.
@@ -199,11 +199,10 @@ impl Preparation {
     /// if that saves anything. What is prepared then serves no other.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        if let Ticks::Frames { rate, start } = timeline.ticks
-            && timeline.len() < keys
-        {
-            self.0.only_frames(rate, start);
-        }
+        self.0.only_frames(match timeline.ticks {
+            Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
+            _ => None,
+        });
     }
 
     /// Prepares some tracks of a set, one part for each.
@@ -221,8 +220,6 @@ impl Preparation {
         self.0.finish(prepared).map(drop)
     }
 
-    /// Prepares some intervals of one track as a part, its first key as it is
-    /// stored; what the sign of the key after the last interval is then.
     /// Prepares some intervals of a track, the `index`th of its set, as if the first of their
     /// keys had the sign it is stored with; what it would make of the sign of the last.
     pub(crate) fn push_piece(

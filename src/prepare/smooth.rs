@@ -72,8 +72,8 @@ impl SmoothPreparation {
 }
 
 impl Prepare for SmoothPreparation {
-    fn only_frames(&mut self, rate: FrameRate, start: f64) {
-        self.frames = Some((rate, start));
+    fn only_frames(&mut self, frames: Option<(FrameRate, f64)>) {
+        self.frames = frames;
     }
 
     fn add(
