@@ -4,7 +4,7 @@
 mod support;
 
 use glam::{DQuat, DVec3, Quat};
-use support::{Random, first_difference, hostile_set, vulkan_devices};
+use support::{Random, first_difference, give_key_data, hostile_set, vulkan_devices};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, Rotations,
@@ -478,7 +478,7 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
         Frames::at(set.track(9).times.iter().copied().step_by(9).collect()),
         Frames::at_each(any(48 * 7)),
     ];
-    let spin = glam::DVec3::new(0.3, -2.0, 1.0);
+    let spin = DVec3::new(0.3, -2.0, 1.0);
     let clamped = Ends::Clamped {
         start: spin,
         end: -spin,
@@ -684,6 +684,54 @@ fn crowds_of_two_keys_have_the_same_bits() {
                     error < 1e-6,
                     "{method}, {path:?}, track {track}: {error:.1e} rad"
                 );
+            }
+        }
+    }
+}
+
+/// A few times of each track are looked up one by one: the same bits as in a run, between
+/// keys, on them and beside them, in tracks of any length.
+#[test]
+fn few_times_of_each_track_have_the_bits_of_many() {
+    let mut random = Random(84);
+    let mut set = TrackSet::new();
+    let mut asked: Vec<Vec<f64>> = Vec::new();
+    for track in 0..120 {
+        let count = if track == 77 {
+            9000
+        } else {
+            [1, 2, 3, 9, 40][track % 5]
+        };
+        let step = [0.05, 1.0, 3.0][track % 3];
+        let start = random.between(-3.0, 3.0);
+        let (times, keys) = near_keys(&mut random, count, start, step);
+        let place = |random: &mut Random| times[random.next() as usize % count];
+        let on_key = place(&mut random);
+        let between = place(&mut random) + random.between(0.0, 0.01);
+        let anywhere = random.between(-4.0, 4.0);
+        asked.push(match track % 4 {
+            0 => vec![on_key, between, anywhere],
+            1 => vec![between, anywhere, between],
+            _ => vec![anywhere, between, on_key],
+        });
+        set.push("", &times, &keys).unwrap();
+    }
+    give_key_data(&mut set, 84);
+    for method in METHODS {
+        for count in 1..=3 {
+            let some = |copies: usize| -> Vec<f64> {
+                let of = |times: &Vec<f64>| times[..count].repeat(copies);
+                asked.iter().flat_map(of).collect()
+            };
+            let many = cpu().upload(&set, method).unwrap();
+            let many = many.evaluate(&Frames::at_each(some(4))).unwrap();
+            let of_track = |row: &[Quat]| row[..count].to_vec();
+            let rows = many.as_quats().chunks(4 * count);
+            let expected: Vec<Quat> = rows.flat_map(of_track).collect();
+            for device in vulkan_devices().into_iter().chain([Device::Cpu]) {
+                let clip = Engine::new(device).unwrap().upload(&set, method).unwrap();
+                let found = clip.evaluate(&Frames::at_each(some(1))).unwrap();
+                assert_same_bits(&expected, found.as_quats(), method.name);
             }
         }
     }

@@ -131,6 +131,7 @@ impl<S> Kernel<S> {
 /// The twins, compiled for the chosen width.
 #[derive(Clone, Copy)]
 pub(crate) struct Kernels {
+    width: VectorWidth,
     pub(crate) arc: Kernel<ArcSegment>,
     pub(crate) polynomial: Kernel<PolynomialSegment>,
 }
@@ -138,22 +139,31 @@ pub(crate) struct Kernels {
 impl Kernels {
     /// The kernels of a width; narrower ones where the processor does not have it.
     pub(crate) fn new(width: VectorWidth) -> Self {
-        match width.narrowed() {
+        let width = width.narrowed();
+        match width {
             #[cfg(target_arch = "x86_64")]
             VectorWidth::Avx512 => Self {
+                width,
                 arc: avx512::kernel(),
                 polynomial: avx512::kernel(),
             },
             #[cfg(target_arch = "x86_64")]
             VectorWidth::Avx2 => Self {
+                width,
                 arc: avx2::kernel(),
                 polynomial: avx2::kernel(),
             },
             _ => Self {
+                width,
                 arc: baseline(),
                 polynomial: baseline(),
             },
         }
+    }
+
+    /// Does work over lanes with vectors of this width.
+    pub(crate) fn in_lanes<W: InLanes>(&self, work: &mut W) {
+        lanes_of(self.width, work);
     }
 }
 
@@ -165,15 +175,20 @@ pub(crate) trait InLanes {
 
 /// Does work over lanes with the widest vectors there are.
 pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
-    let run: unsafe fn(&mut W) = match VectorWidth::widest() {
+    lanes_of(VectorWidth::widest(), work);
+}
+
+/// `width` is one that the processor has.
+fn lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
+    let run: unsafe fn(&mut W) = match width {
         #[cfg(target_arch = "x86_64")]
         VectorWidth::Avx512 => avx512::in_lanes::<W>,
         #[cfg(target_arch = "x86_64")]
         VectorWidth::Avx2 => avx2::in_lanes::<W>,
         _ => W::run,
     };
-    // SAFETY: the processor has the vectors of the widest width; the last is a safe
-    // function.
+    // SAFETY: the processor has the vectors of that width, which is the widest or a
+    // narrowed one; the last is a safe function.
     unsafe { run(work) }
 }
 

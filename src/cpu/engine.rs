@@ -6,10 +6,12 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use super::dispatch::{Kernels, VectorWidth};
+use super::evaluate::FEW;
+use super::few::FewTimes;
 use super::memory::{Memories, Memory};
 use super::mend::Row;
 use super::sampled::{Sampled, Straight, straight};
-use crate::clock::{FramesError, Timeline};
+use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::encoding::Encoding;
 use crate::engine::Error;
@@ -144,6 +146,27 @@ impl CpuEngine {
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let in_rows = window.layout == Layout::TrackMajor || samples == 1;
+        if let Ticks::Times { times, stride } = &timeline.ticks
+            && samples <= FEW
+            && in_rows
+            && !clip.interpolation.sides().repeats()
+        {
+            let mut few = FewTimes {
+                clip,
+                times,
+                stride: *stride,
+                window,
+                output,
+                others: Vec::new(),
+            };
+            self.kernels.in_lanes(&mut few);
+            return few.others.into_iter().try_for_each(|place| {
+                let row = &mut output[place * samples..][..samples];
+                let track = window.tracks.start + place;
+                self.row(clip, track, timeline, window.samples.start, row)
+            });
+        }
         match window.layout {
             Layout::TrackMajor => output
                 .chunks_mut(samples)

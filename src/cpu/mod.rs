@@ -10,6 +10,7 @@ mod engine;
 mod evaluate;
 mod evaluate_arc;
 mod evaluate_polynomial;
+mod few;
 mod gentle;
 mod long;
 mod matrix;

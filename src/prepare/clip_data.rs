@@ -182,6 +182,13 @@ impl ClipData {
         own.iter().map(|&place| self.part(place))
     }
 
+    /// The part of a track that has only one.
+    #[inline(always)]
+    pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
+        let places = self.tracks[track]..self.tracks[track + 1];
+        (places.len() == 1).then(|| self.part(self.parts[places.start]))
+    }
+
     /// The parts of one track in the order in which a copy of it meets them.
     pub(crate) fn parts_in(
         &self,
