@@ -48,11 +48,7 @@ impl Prepared {
                         let run = in_frames(from.frame, to.frame, -1.0);
                         let distance = |sample: usize| sample as f64 - run.whole;
                         if distance(first).abs() >= COUNTABLE || distance(last).abs() >= COUNTABLE {
-                            return Err(FramesError::GapTooLong {
-                                track: part.track,
-                                key: j,
-                                frames: to.frame - from.frame,
-                            });
+                            return Err(self.gap_too_long(part, span, clock.rate()));
                         }
                         RunSource::Segment {
                             index,

@@ -88,7 +88,7 @@ impl Prepared {
                 }
             }
             Ticks::Times { times, stride } => {
-                let own = &times[part.track * stride..];
+                let own = &times[part.track as usize * stride..];
                 self.time_runs(part, own, samples, emit);
                 Ok(())
             }
@@ -195,11 +195,8 @@ impl Prepared {
                         if (last as f64 - whole).abs() >= COUNTABLE
                             || (first as f64 - whole).abs() >= COUNTABLE
                         {
-                            return Err(FramesError::GapTooLong {
-                                track: part.track,
-                                key: block + j,
-                                frames: spans.frame[j + 1] - from_frame,
-                            });
+                            let span = part.spans.start + block + j;
+                            return Err(self.gap_too_long(part, span, clock.rate()));
                         }
                         RunSource::Segment {
                             index,

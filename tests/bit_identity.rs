@@ -627,6 +627,41 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     assert!(words.contains("keys 8999 and 9000"), "{words}");
 }
 
+/// Frames in a gap of more than 2^32 cannot be counted: every way says which key it is
+/// behind, also in a piece of a long track, and behind intervals that were cut.
+#[test]
+fn a_gap_too_long_is_named_by_its_key() {
+    let mut random = Random(85);
+    let gap = 9000;
+    let (mut times, mut keys) = (Vec::new(), Vec::new());
+    for i in 0..10_000 {
+        times.push(f64::from(i) + if i > gap { 1e12 } else { 0.0 });
+        keys.push(random.rotation().as_quat());
+    }
+    let mut set = TrackSet::new();
+    set.push("", &[0.0, 1.0, 2.0], &keys[..3]).unwrap();
+    set.push("", &times, &keys).unwrap();
+    let start = times[9000] + 1.5;
+    let frames = Frames::fps(1).between(start, start + 3.0);
+    for engine in vulkan_devices()
+        .into_iter()
+        .map(Engine::new)
+        .chain([Ok(cpu())])
+    {
+        let engine = engine.unwrap();
+        for method in [method::SLERP, method::CATMULL_ROM, method::SQUAD] {
+            let clip = engine.upload(&set, method).unwrap();
+            let kept = clip.evaluate(&frames).unwrap_err().to_string();
+            let at_once = engine.evaluate(&set, method, &frames).unwrap_err();
+            let device = engine.device_name();
+            for words in [kept, at_once.to_string()] {
+                let named = words.contains("track 1: 1.000e12 frames between key 9000 and");
+                assert!(named, "{device}, {method}: {words}");
+            }
+        }
+    }
+}
+
 /// Tracks of two keys alone take a way of their own on the CPU, and have polynomials that
 /// nobody fitted: the same bits as by segments, at every width, and near the reference.
 #[test]

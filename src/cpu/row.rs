@@ -84,7 +84,7 @@ impl<S: Evaluate> Emit for Row<'_, S> {
                     let from_middle = &mut from_middle[..count];
                     for (j, distance) in from_middle.iter_mut().enumerate() {
                         let sample = run.sample + start + j;
-                        let time = self.timeline.time(self.part.part.track, sample);
+                        let time = self.timeline.time(self.part.part.track as usize, sample);
                         *distance = round_f32(time - middle);
                     }
                     let output = &mut output[start..];
@@ -92,7 +92,7 @@ impl<S: Evaluate> Emit for Row<'_, S> {
                 }
             }
             RunSource::Exact { index, parameter } => {
-                let track = self.part.part.track;
+                let track = self.part.part.track as usize;
                 for (sample, rotation) in (run.sample..).zip(&mut output[..run.count]) {
                     *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
                 }
@@ -130,7 +130,7 @@ impl<S: Evaluate> Emit for ShortRow<'_, S> {
                             first.wrapping_add((sample - run.sample) as i32) as f32
                         }
                         Distance::Seconds { middle } => {
-                            round_f32(self.timeline.time(part.track, sample) - middle)
+                            round_f32(self.timeline.time(part.track as usize, sample) - middle)
                         }
                     };
                     one(
@@ -140,7 +140,7 @@ impl<S: Evaluate> Emit for ShortRow<'_, S> {
                     )
                 }
                 RunSource::Exact { index, parameter } => {
-                    prepared.exact(index, parameter, self.timeline, part.track, sample)
+                    prepared.exact(index, parameter, self.timeline, part.track as usize, sample)
                 }
             };
         }

@@ -64,10 +64,10 @@ pub(super) fn work(
     for (group, prepared) in clip.groups.iter().enumerate() {
         let first = prepared
             .parts
-            .partition_point(|part| part.track < window.tracks.start);
+            .partition_point(|part| (part.track as usize) < window.tracks.start);
         let last = prepared
             .parts
-            .partition_point(|part| part.track < window.tracks.end);
+            .partition_point(|part| (part.track as usize) < window.tracks.end);
         let pieces = prepared.parts[first..last].chunks(PARTS_PER_CHUNK);
         let listings: Vec<_> = pieces
             .map(|parts| Listing {
@@ -114,7 +114,7 @@ impl InLanes for Listing<'_> {
                 timeline: self.timeline,
                 window: self.window,
                 shift: self.shift,
-                track: part.track,
+                track: part.track as usize,
                 chunk: &mut self.chunk,
             };
             let samples = self.window.samples.clone();

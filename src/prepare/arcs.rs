@@ -125,7 +125,8 @@ impl Prepare for ArcPreparation {
         spans.sources.extend(sources);
         let beyond = prepared.copies(track);
         prepared.parts.push(Part {
-            track: index,
+            track: index as u32,
+            first_key: start as u32,
             spans: first_span..first_span + intervals.len(),
             end: track.times[end],
             before: if start == 0 { first_key } else { NONE },

@@ -132,7 +132,7 @@ impl ClipData {
         let mut tracks = Vec::with_capacity(set.track_count() + 1);
         for (g, group) in groups.iter().enumerate() {
             for (p, part) in group.parts.iter().enumerate() {
-                while tracks.len() <= part.track {
+                while tracks.len() <= part.track as usize {
                     tracks.push(parts.len());
                 }
                 parts.push((g as u32, p as u32));

@@ -40,7 +40,7 @@ pub(crate) use steady::arc_component;
 
 use std::ops::Range;
 
-use crate::clock::Timeline;
+use crate::clock::{FramesError, Timeline};
 use crate::cycle::{Cycle, Sides};
 use crate::method::Interpolation;
 use crate::segment::Segments;
@@ -87,7 +87,9 @@ pub(crate) enum Source {
 #[derive(Debug, Clone)]
 pub(crate) struct Part {
     /// The track's place in the set.
-    pub(crate) track: usize,
+    pub(crate) track: u32,
+    /// The first of its keys, in the track.
+    pub(crate) first_key: u32,
     pub(crate) spans: Range<usize>,
     /// Where the last span ends, seconds.
     pub(crate) end: f64,
@@ -215,6 +217,32 @@ impl Prepared {
         self.segments.append(other.segments);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
+    }
+
+    /// Frames of one of a part's spans cannot be counted: between which keys.
+    #[cold]
+    pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {
+        let Spans {
+            starts,
+            sources,
+            keys,
+        } = &self.spans;
+        // What was cut starts at a key only with its first span; where curves do not meet
+        // their keys that cannot be told.
+        let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
+        let is_at_key = |&span: &usize| {
+            let stands = matches!(sources[span], Source::Constant(_));
+            keys[span] != NONE || stands || !meets_keys
+        };
+        let until = part.spans.start..=span;
+        let behind = until.clone().skip(1).filter(is_at_key).count();
+        let from = until.rev().find(is_at_key).unwrap_or(span);
+        let to = (span + 1..part.spans.end).find(is_at_key);
+        FramesError::GapTooLong {
+            track: part.track as usize,
+            key: part.first_key as usize + behind,
+            frames: (to.map_or(part.end, |to| starts[to]) - starts[from]) * rate,
+        }
     }
 
     /// The copies of a part's track among some samples.

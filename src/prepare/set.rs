@@ -65,7 +65,7 @@ pub(super) fn prepare(
     let mut groups: Vec<Prepared> = batches.into_iter().flat_map(|(own, _)| own).collect();
     // Their places are those among the tracks asked for.
     for part in groups.iter_mut().flat_map(|group| &mut group.parts) {
-        part.track -= tracks.start;
+        part.track -= tracks.start as u32;
     }
     Ok((groups, sign))
 }

@@ -107,7 +107,8 @@ impl Prepare for SmoothPreparation {
         let part = prepared.parts.len();
         let beyond = prepared.copies(track);
         prepared.parts.push(Part {
-            track: index,
+            track: index as u32,
+            first_key: intervals.start as u32,
             spans: 0..0,
             end: track.times[intervals.end],
             before: held(intervals.start == 0, first_key, self.interpolation.before),

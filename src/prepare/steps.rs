@@ -47,7 +47,8 @@ impl Prepare for StepPreparation {
         let all = track.keys.len() - 1;
         let beyond = prepared.copies(track);
         prepared.parts.push(Part {
-            track: index,
+            track: index as u32,
+            first_key: intervals.start as u32,
             spans: first_span..first_span + intervals.len(),
             end: track.times[intervals.end],
             before: if intervals.start == 0 { first } else { NONE },

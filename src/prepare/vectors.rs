@@ -74,7 +74,8 @@ pub(super) fn add(
     let times = (track.times[0], track.times[last]);
     let goes_on = beyond != [NONE; 2];
     prepared.parts.push(Part {
-        track: index,
+        track: index as u32,
+        first_key: 0,
         spans: first_span..first_span + last,
         end: track.times[last],
         before: held(beyond[0], first_key),
