@@ -37,8 +37,12 @@ const ENCODINGS: [(&str, &[&str]); 8] = [
 const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
 
 /// Kernels from keys to samples, each with the files that it needs beside its own.
-const SAMPLED: [(&str, &[&str]); 2] = [
+const SAMPLED: [(&str, &[&str]); 3] = [
     ("sampled_arcs", &["sine_cosine", "evaluate_arc", "arc"]),
+    (
+        "sampled_pairs",
+        &["sine_cosine", "evaluate_arc", "arc", "steady"],
+    ),
     ("sampled_cubics", &["gentle"]),
 ];
 

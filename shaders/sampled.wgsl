@@ -1,5 +1,5 @@
 // Fewer samples than keys: an invocation for each sample, straight from the keys beside
-// it. Joined with `sampled_arcs` or `sampled_cubics`, which has `between`.
+// it. Joined with a `sampled_*`, which has `between`.
 // Twin: src/cpu/sample_lanes.rs.
 
 // Where a sample lies among the keys of its row.

@@ -31,8 +31,8 @@ pub(crate) struct KeyJob<'a> {
     tracks: Range<usize>,
     interpolation: &'a Interpolation,
     timeline: &'a Timeline,
-    /// Those of cubics; arcs have none.
-    joints: Option<Joints>,
+    /// What its samples are made of.
+    pub(crate) straight: Straight,
 }
 
 impl<'a> KeyJob<'a> {
@@ -47,11 +47,7 @@ impl<'a> KeyJob<'a> {
         most: usize,
     ) -> Option<Self> {
         let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
-        let joints = match straight(set, interpolation, timeline)? {
-            Straight::Arcs => None,
-            Straight::Cubics(joints) => Some(joints),
-            Straight::Pairs => return None,
-        };
+        let straight = straight(set, interpolation, timeline)?;
         // Where samples are explicit times, a track is not cut.
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
@@ -61,19 +57,22 @@ impl<'a> KeyJob<'a> {
             tracks,
             interpolation,
             timeline,
-            joints,
+            straight,
         })
     }
 
-    /// Whether its curves are cubics, not arcs.
-    pub(crate) fn is_cubic(&self) -> bool {
-        self.joints.is_some()
+    /// Those of cubics; arcs have none.
+    fn joints(&self) -> Option<Joints> {
+        match self.straight {
+            Straight::Cubics(joints) => Some(joints),
+            Straight::Arcs | Straight::Pairs => None,
+        }
     }
 
     /// Works out on the CPU what the device left 0, because it turns too much.
     pub(crate) fn mend(&self, output: &mut [[f32; 4]]) -> Result<(), Error> {
         let left_out = |some: &[[f32; 4]]| some.contains(&[0.0; 4]);
-        if !self.is_cubic() || !output.par_chunks(TASK_KEYS).any(left_out) {
+        if self.joints().is_none() || !output.par_chunks(TASK_KEYS).any(left_out) {
             return Ok(());
         }
         let engine = CpuEngine::widest();
@@ -237,7 +236,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
             None
         };
         // Cubics look at the keys beside their own too.
-        let beside = usize::from(self.job.is_cubic());
+        let beside = usize::from(self.job.joints().is_some());
         let first = long.key.saturating_sub(beside);
         let before = stretch(first, long.key);
         Part {
@@ -319,7 +318,7 @@ impl KeyPiece<'_, '_> {
 
     /// Bytes of its keys, their signs, the samples, the rotations and the joints.
     pub(crate) fn bytes(&self) -> [usize; 5] {
-        let joints = match self.job.joints {
+        let joints = match self.job.joints() {
             Some(_) => self.keys / self.rows,
             None => 0,
         };
@@ -363,7 +362,7 @@ impl KeyPiece<'_, '_> {
             first_key += task.keys;
         }
         let ends = self.job.interpolation.ends;
-        let rule = self.job.joints;
+        let rule = self.job.joints();
         let new = || {
             (
                 FramePlan::new(),

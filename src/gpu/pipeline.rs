@@ -60,11 +60,12 @@ pub(super) fn pose_shader(kernel: PoseKernel) -> Shader {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SampledKernel {
     Arcs,
+    Pairs,
     Cubics,
 }
 
 /// How many of them there are.
-pub(super) const SAMPLED: usize = 2;
+pub(super) const SAMPLED: usize = 3;
 
 impl SampledKernel {
     pub(super) fn shader(self) -> Shader {
@@ -74,7 +75,7 @@ impl SampledKernel {
     /// Number of storage buffers that it binds.
     pub(super) fn bindings(self) -> u32 {
         match self {
-            Self::Arcs => 4,
+            Self::Arcs | Self::Pairs => 4,
             Self::Cubics => 5,
         }
     }

@@ -13,6 +13,7 @@ use super::error::VulkanError;
 use super::pipeline::{Exactness, Pipeline, SampledKernel};
 use super::slot::{Slot, Stopwatch, copy};
 use super::submission::{Access, Binding, Submission};
+use crate::cpu::Straight;
 use crate::engine::Error;
 use crate::key_pieces::{KeyJob, KeyPiece};
 use crate::segment::shader::ROWS_WORKGROUP;
@@ -72,9 +73,10 @@ impl VulkanEngine {
         output: &mut [[f32; 4]],
         stopwatch: &mut Stopwatch,
     ) -> Result<(), Error> {
-        let kernel = match job.is_cubic() {
-            false => SampledKernel::Arcs,
-            true => SampledKernel::Cubics,
+        let kernel = match job.straight {
+            Straight::Arcs => SampledKernel::Arcs,
+            Straight::Pairs => SampledKernel::Pairs,
+            Straight::Cubics(_) => SampledKernel::Cubics,
         };
         let pipeline = self.key_pipeline(kernel)?;
         let mut pieces = job.pieces();

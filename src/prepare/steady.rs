@@ -1,4 +1,4 @@
-//! Arcs as polynomials: what smooth methods make of two keys that are alone. Taylor's
+//! Twin of `shaders/steady.wgsl`, a component at a time: arcs as polynomials, what smooth methods make of two keys that are alone. Taylor's
 //! series of the sine and cosine about the middle are all that it takes; nothing is
 //! sampled and fitted.
 // Loops over lanes index many arrays at once.
@@ -8,23 +8,17 @@ use super::arc_lanes::{LANES, arcs};
 use crate::cpu::InLanes;
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
+use crate::segment::shader::{
+    SERIES_2, SERIES_3, SERIES_4, SERIES_5, SERIES_6, SERIES_7, SERIES_8, SERIES_9, SERIES_10,
+};
 
 /// Powers of the parameter in a segment.
 const COEFFICIENTS: usize = 11;
 
-/// 1, 1, -1/2!, -1/3!, 1/4! …: of cosine and sine in turn.
+/// Of cosine and sine in turn.
 const SERIES: [f32; COEFFICIENTS] = [
-    1.0,
-    1.0,
-    -1.0 / 2.0,
-    -1.0 / 6.0,
-    1.0 / 24.0,
-    1.0 / 120.0,
-    -1.0 / 720.0,
-    -1.0 / 5040.0,
-    1.0 / 40_320.0,
-    1.0 / 362_880.0,
-    -1.0 / 3_628_800.0,
+    1.0, 1.0, SERIES_2, SERIES_3, SERIES_4, SERIES_5, SERIES_6, SERIES_7, SERIES_8, SERIES_9,
+    SERIES_10,
 ];
 
 /// One component of an arc, of its middle and its tangent there, as a polynomial; its

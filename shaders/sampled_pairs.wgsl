@@ -1,0 +1,12 @@
+// Two keys alone by smooth methods, for `sampled`. Joined with `steady`, `arc`,
+// `evaluate_arc`, `sine_cosine` and `canonical`.
+
+fn between(key: u32, sample: Sample) -> vec4f {
+    let c = steady(arc(signed(key), signed(key + 1u)));
+    // As `evaluate_polynomial`.
+    let s = sample.parameter;
+    let z = s * s;
+    let even_high = ((c[10] * z + c[8]) * z + c[6]) * z + c[4];
+    let odd_high = ((c[9] * z + c[7]) * z + c[5]) * z + c[3];
+    return (odd_high * z + c[1]) * s + ((even_high * z + c[2]) * z + c[0]);
+}
