@@ -6,15 +6,20 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::engine::CpuEngine;
+use super::memory::Memory;
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::engine::Error;
+use crate::frame_clock::FrameClock;
 use crate::method::Interpolation;
-use crate::prepare::{BATCH, PartRef, Preparation, Prepared, flip};
+use crate::prepare::{BATCH, PartRef, flip};
 use crate::tracks::TrackSet;
 
-/// Intervals between two that are wanted, up to which they are prepared together.
-const APART: usize = 16;
+/// Intervals between two that are wanted, up to which they are one piece.
+const APART: usize = 2;
+
+/// Pieces that are prepared together.
+const TOGETHER: usize = 256;
 
 /// Some samples of a track.
 #[derive(Clone, Copy)]
@@ -49,27 +54,34 @@ impl CpuEngine {
             (from, output) = (piece.samples.end, others);
             work.push((piece, own));
         }
-        let new = || {
-            let mut preparation = Preparation::new(row.interpolation);
-            preparation.only_for(row.timeline, row.set);
-            (Prepared::new(row.interpolation), preparation)
-        };
         let track = row.set.track(row.index);
-        work.into_par_iter().with_min_len(64).try_for_each_init(
-            new,
-            |(prepared, preparation), (piece, own)| {
-                prepared.clear();
-                preparation.push_piece(prepared, track, row.index, piece.intervals)?;
-                if piece.sign < 0.0 {
-                    prepared.negate(row.interpolation);
-                }
-                let part = PartRef {
-                    prepared,
-                    part: &prepared.parts[0],
-                };
-                Ok(self.part(part, row.timeline, &Cycle::own(piece.samples), own)?)
-            },
-        )
+        let some = |work: &mut [(Piece, &mut [[f32; 4]])], sign: f32| -> Result<(), Error> {
+            let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
+            let Memory {
+                prepared,
+                preparation,
+                ..
+            } = &mut memory;
+            prepared.clear();
+            let intervals = work.iter().map(|(piece, _)| piece.intervals.clone());
+            preparation.push_pieces(prepared, track, row.index, intervals)?;
+            if sign < 0.0 {
+                prepared.negate(row.interpolation);
+            }
+            for (part, (piece, own)) in prepared.parts.iter().zip(work) {
+                let part = PartRef { prepared, part };
+                self.part(part, row.timeline, &Cycle::own(piece.samples.clone()), own)?;
+            }
+            self.memories.give_back(memory);
+            Ok(())
+        };
+        let (mut turned, mut others): (Vec<_>, Vec<_>) =
+            work.into_iter().partition(|(piece, _)| piece.sign < 0.0);
+        let signs = [(&mut turned, -1.0), (&mut others, 1.0)];
+        signs.into_iter().try_for_each(|(work, sign)| {
+            let together = work.par_chunks_mut(TOGETHER);
+            together.try_for_each(|work| some(work, sign))
+        })
     }
 }
 
@@ -97,30 +109,37 @@ impl<'a> Row<'a> {
         let last = times.len() - 1;
         let mut pieces: Vec<Piece> = Vec::new();
         let left_out = |(_, rotation): &(usize, &[f32; 4])| **rotation == [0.0; 4];
+        let Ticks::Frames { rate, start } = self.timeline.ticks else {
+            // They may be in any order.
+            let any = output.iter().enumerate().any(|place| left_out(&place));
+            let whole = || Piece {
+                intervals: 0..last,
+                samples: self.first..self.first + output.len(),
+                sign: 1.0,
+            };
+            return any.then(whole).into_iter().collect();
+        };
+        let clock = FrameClock::new(rate, start, times[last]);
         for (i, _) in output.iter().enumerate().filter(left_out) {
             let sample = self.first + i;
-            if matches!(self.timeline.ticks, Ticks::Times { .. }) {
-                // They may be in any order.
-                return vec![Piece {
-                    intervals: 0..last,
-                    samples: self.first..self.first + output.len(),
-                    sign: 1.0,
-                }];
-            }
             let time = self.timeline.time(self.index, sample);
-            let interval = times.partition_point(|&key| key <= time).saturating_sub(1);
-            // Its neighbours too: a sample within rounding of a key is that key.
-            let start = interval.saturating_sub(1).max(self.key);
-            let end = (interval + 2).min(last);
+            let after = times.partition_point(|&key| key <= time);
+            let mut interval = after.saturating_sub(1).clamp(self.key, last - 1);
+            // A sample within rounding of a key is that key.
+            while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
+                interval += 1;
+            }
+            while interval > self.key && clock.first_frame(times[interval]) > sample as f64 {
+                interval -= 1;
+            }
             match pieces.last_mut() {
-                Some(piece)
-                    if start <= piece.intervals.end + APART && piece.intervals.len() < BATCH =>
-                {
-                    piece.intervals.end = end;
-                    piece.samples.end = sample + 1;
+                Some(Piece {
+                    intervals, samples, ..
+                }) if interval <= intervals.end + APART && intervals.len() < BATCH => {
+                    (intervals.end, samples.end) = (interval + 1, sample + 1);
                 }
                 _ => pieces.push(Piece {
-                    intervals: start..end,
+                    intervals: interval..interval + 1,
                     samples: sample..sample + 1,
                     sign: 1.0,
                 }),
@@ -138,11 +157,6 @@ impl<'a> Row<'a> {
             while key < piece.intervals.start {
                 sign *= flip(keys[key], keys[key + 1]);
                 key += 1;
-            }
-            // Pieces overlap by their neighbours.
-            while key > piece.intervals.start {
-                key -= 1;
-                sign *= flip(keys[key], keys[key + 1]);
             }
             piece.sign = sign;
         }

@@ -56,8 +56,8 @@ pub(crate) fn straight(
     }
 }
 
-/// Whether most of some keys looked at are near those before them. Nothing but the time
-/// that it takes depends on it.
+/// Whether two thirds of some keys looked at are near those before them: with fewer, to
+/// prepare all of them takes no longer. Nothing but time depends on it.
 fn turns_little(set: &TrackSet) -> bool {
     const LOOKS: usize = 64;
     let (mut near, mut looks) = (0, 0);
@@ -69,7 +69,7 @@ fn turns_little(set: &TrackSet) -> bool {
             near += usize::from(1.0 - from.dot(to).abs() <= 0.5 * LONGEST_STEP);
         }
     }
-    2 * near > looks
+    3 * near > 2 * looks
 }
 
 /// Evaluates tracks; what it needs for that is kept.

@@ -30,6 +30,8 @@ pub(crate) struct Stretch {
     pub(super) lane: usize,
     /// Which intervals of the track.
     pub(super) intervals: Range<usize>,
+    /// Whether the first of them is the first that was added: its key counts as stored.
+    pub(super) begins: bool,
     /// Intervals of the whole track.
     pub(crate) all: usize,
     /// When the whole track starts and ends, seconds.

@@ -162,7 +162,8 @@ impl Prepared {
 
 /// Makes segments from key intervals, in blocks that may hold several tracks'.
 pub(super) trait Prepare: Send {
-    /// Adds some intervals of a track, the `index`th of its set, as a part of their own.
+    /// Adds some intervals of a track, the `index`th of its set, as a part of their own, as
+    /// if their first key had the sign it is stored with.
     fn add(
         &mut self,
         prepared: &mut Prepared,
@@ -171,9 +172,8 @@ pub(super) trait Prepare: Send {
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError>;
 
-    /// Finishes what was added; what the signs of the last track's keys make of the
-    /// next, if the first interval added has its key's sign as stored, as the next one
-    /// added will have.
+    /// Finishes what was added; what the signs of the last intervals' keys make of the
+    /// next.
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError>;
 
     /// From now on only intervals that hold a frame need segments; or all.
@@ -231,6 +231,20 @@ impl Preparation {
     ) -> Result<f32, InterpolationError> {
         self.0.add(prepared, track, index, intervals)?;
         self.0.finish(prepared)
+    }
+
+    /// As [`Preparation::push_piece`], several pieces, each a part of its own.
+    pub(crate) fn push_pieces(
+        &mut self,
+        prepared: &mut Prepared,
+        track: Track,
+        index: usize,
+        pieces: impl Iterator<Item = Range<usize>>,
+    ) -> Result<(), InterpolationError> {
+        for intervals in pieces {
+            self.0.add(prepared, track, index, intervals)?;
+        }
+        self.0.finish(prepared).map(drop)
     }
 }
 

@@ -136,6 +136,7 @@ impl Prepare for SmoothPreparation {
             self.stretches.push(Stretch {
                 lane: self.intervals.count,
                 intervals: from..to,
+                begins: from == intervals.start,
                 all,
                 span: (track.times[0], track.times[all]),
                 track: index,
@@ -291,7 +292,7 @@ impl SmoothPreparation {
     /// short without.
     fn align(&mut self, by_steps: bool) -> Result<(), InterpolationError> {
         for stretch in &self.stretches {
-            if stretch.intervals.start == 0 {
+            if stretch.begins {
                 self.sign = 1.0;
             }
             for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
