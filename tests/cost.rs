@@ -42,10 +42,11 @@ fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64>
 
 const TRACKS: u64 = 32;
 
-fn generate(folder: &Path, keys: u32) -> std::path::PathBuf {
+fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
     let file = folder.join(format!("{keys}.dat"));
     let run = Command::new(env!("CARGO_BIN_EXE_tumble"))
-        .args(["generate", "--boxes", &TRACKS.to_string(), "--random"])
+        .args(["generate", "--boxes", &TRACKS.to_string()])
+        .args(motion)
         .args(["--keys", &keys.to_string(), "--seconds", "20", "-o"])
         .arg(&file)
         .output()
@@ -58,7 +59,8 @@ fn generate(folder: &Path, keys: u32) -> std::path::PathBuf {
 #[test]
 fn rotations_and_keys_cost_no_more_than_they_did() {
     let folder = tempfile::tempdir().unwrap();
-    let (few, many) = (generate(folder.path(), 26), generate(folder.path(), 260));
+    let random = |keys| generate(folder.path(), keys, &["--random"]);
+    let (few, many) = (random(26), random(260));
     let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
     let bounds = [
         ("baseline", [36.0, 64.0], 3000.0),
@@ -88,5 +90,30 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
         let each = (per_keys[1] - per_keys[0]) / keys;
         println!("{width}: {each:.0} instructions a key more for a cubic than for an arc");
         assert!(each < a_key, "{width}: {each:.0} a key");
+    }
+}
+
+/// Where keys are denser than samples and near each other, nothing is prepared: to prepare
+/// and fit a cubic would take thousands of instructions for each sample.
+#[test]
+fn samples_straight_from_keys_cost_no_more_than_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let dense = generate(folder.path(), 2400, &[]);
+    let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
+    for (width, bounds) in [("baseline", [190.0, 1000.0]), ("avx2", [135.0, 500.0])] {
+        if width == "avx2" && !has_avx2 {
+            eprintln!("no AVX2 here: not counted");
+            continue;
+        }
+        for (method, bound) in ["slerp", "bessel-overhauser"].into_iter().zip(bounds) {
+            let count = |fps| instructions(&dense, method, fps, width);
+            let (Some(coarse), Some(fine)) = (count(24), count(96)) else {
+                return;
+            };
+            let samples = TRACKS * 20 * (96 - 24);
+            let each = (fine - coarse) as f64 / samples as f64;
+            println!("{width}, {method}: {each:.1} instructions a sample of dense keys");
+            assert!(each < bound, "{width}, {method}: {each:.1} a sample");
+        }
     }
 }
