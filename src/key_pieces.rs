@@ -11,7 +11,7 @@ use crate::cpu::{CpuEngine, Row, Straight, Turns, in_lanes, straight};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::joints::{Joints, TrackJoints};
-use crate::method::Interpolation;
+use crate::method::{Interpolation, Path};
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
 use crate::rotations::Layout;
@@ -48,10 +48,12 @@ impl<'a> KeyJob<'a> {
     ) -> Option<Self> {
         let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
         let straight = straight(set, interpolation, timeline)?;
+        // Arcs of more than half a turn need segments.
+        let is_shortest = interpolation.path == Path::Shortest;
         // Where samples are explicit times, a track is not cut.
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
-        let suits = is_row && by_pieces;
+        let suits = is_row && by_pieces && is_shortest;
         suits.then_some(Self {
             set,
             tracks,

@@ -151,6 +151,26 @@ fn every_method_is_within_its_bounds_for_keys_near_each_other() {
     }
 }
 
+/// Arcs of up to a whole turn, which are made of two.
+#[test]
+fn slerp_is_within_its_bounds_the_long_way_too() {
+    let mut random = Random(15);
+    let mut set = TrackSet::new();
+    for track in smooth_set(15, 0.0, 3.0).tracks() {
+        let mut sign = || random.pick(&[1.0, -1.0]);
+        let keys: Vec<Quat> = track.keys.iter().map(|&key| key * sign()).collect();
+        set.push("", track.times, &keys).unwrap();
+    }
+    let interpolation = Interpolation {
+        path: Path::AsAuthored,
+        ..tumble::method::SLERP.into()
+    };
+    for fps in RATES {
+        let frames = Frames::rate(rate(fps));
+        assert_within_bounds(&set, interpolation, &frames, "the long way");
+    }
+}
+
 /// Catches a time kept in f32: at 24 hours its unit is 8 ms.
 #[test]
 fn accuracy_does_not_decay_by_hour_24() {

@@ -80,12 +80,13 @@ impl CpuEngine {
         let firsts: Vec<usize> = (0..last).step_by(STRETCH).collect();
         let last_of = |first: usize| (first + STRETCH).min(last);
         let new = || Sampled::new(interpolation, straight);
+        let align = |sampled: &mut Sampled<'_>, &first: &usize| {
+            sampled.align(stretch(first, last_of(first)), 1.0)
+        };
         let flips: Vec<f32> = self.on_threads(|| {
-            let align = |sampled: &mut Sampled<'_>, &first: &usize| {
-                sampled.align(stretch(first, last_of(first)), 1.0)
-            };
-            firsts.par_iter().map_init(new, align).collect()
-        });
+            let flips = firsts.par_iter().map_init(new, align);
+            flips.collect::<Result<_, _>>()
+        })?;
         let (mut sign, mut from) = (1.0, 0);
         let mut work = Vec::new();
         for (i, (&first, flip)) in firsts.iter().zip(flips).enumerate() {

@@ -11,7 +11,7 @@ use crate::clock::{Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::method::Interpolation;
+use crate::method::{Interpolation, Path};
 use crate::prepare::{BATCH, PartRef, flip};
 use crate::tracks::TrackSet;
 
@@ -145,7 +145,9 @@ impl<'a> Row<'a> {
                 }),
             }
         }
-        self.align(&mut pieces);
+        if self.interpolation.path == Path::Shortest {
+            self.align(&mut pieces);
+        }
         pieces
     }
 

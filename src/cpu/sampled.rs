@@ -9,12 +9,13 @@ use glam::Quat;
 use super::cubic_lanes::CubicBlock;
 use super::dispatch::in_lanes;
 use super::sample_lanes::{LANES, SampleBlock, Turns};
+use crate::branchless::{dot, unit};
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::Sides;
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::joints::{Joints, TrackJoints};
-use crate::method::{Form, Interpolation};
+use crate::method::{Form, Interpolation, InterpolationError, Path};
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
 use crate::segment::shader::{HELD, INNER, LONGEST_STEP};
@@ -81,6 +82,9 @@ pub(super) struct Sampled<'a> {
     sign: f32,
     /// The sign of every key, where any of them differ.
     signs: Vec<f32>,
+    /// Whether arcs of the track may be of more than half a turn.
+    is_left_out: bool,
+    any_left_out: bool,
 }
 
 enum Block<'a> {
@@ -104,6 +108,8 @@ impl<'a> Sampled<'a> {
             plan: FramePlan::new(),
             sign: 1.0,
             signs: Vec::new(),
+            is_left_out: false,
+            any_left_out: false,
         }
     }
 
@@ -127,7 +133,11 @@ impl<'a> Sampled<'a> {
                 first_key: 0,
                 all: keys.len(),
             };
-            self.align(stretch, 1.0);
+            self.align(stretch, 1.0)?;
+            if self.is_left_out {
+                self.leave_out(samples, &mut output);
+                continue;
+            }
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
                     let latest = times[times.len() - 1];
@@ -143,7 +153,8 @@ impl<'a> Sampled<'a> {
                 }
             }
         }
-        Ok(self.block.flush(&mut output))
+        let left_out = std::mem::take(&mut self.any_left_out);
+        Ok(self.block.flush(&mut output) | left_out)
     }
 
     /// The samples of some intervals of a track, `window`, whose first key counts with
@@ -157,23 +168,48 @@ impl<'a> Sampled<'a> {
         output: &mut [[f32; 4]],
     ) -> Result<bool, Error> {
         let mut output = output.iter_mut();
-        self.align(stretch, sign);
+        self.align(stretch, sign)?;
+        if self.is_left_out {
+            self.leave_out(window.len(), &mut output);
+            return Ok(true);
+        }
         self.frames(stretch, clock, window, &mut output)?;
         Ok(self.block.flush(&mut output))
     }
 
     /// The sign of every key, where the first one's is given; what it is of the last.
-    pub(super) fn align(&mut self, stretch: Stretch<'_>, mut sign: f32) -> f32 {
+    pub(super) fn align(
+        &mut self,
+        stretch: Stretch<'_>,
+        mut sign: f32,
+    ) -> Result<f32, InterpolationError> {
         let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
         self.signs.clear();
         self.sign = sign;
+        self.is_left_out = false;
         if keys.len() == 2 && stretch.first_key == 0 {
-            // The second key's sign is nobody's first.
-            return sign;
+            // The second key's sign is nobody's first; but an arc as authored may be long.
+            if self.interpolation.path == Path::Shortest {
+                return Ok(sign);
+            }
         }
         let mut turns = Turns { keys, any: false };
         in_lanes(&mut turns);
-        if turns.any {
+        if turns.any && self.interpolation.path == Path::AsAuthored {
+            for (i, pair) in keys.windows(2).enumerate() {
+                if self
+                    .interpolation
+                    .path
+                    .refuses(dot(unit(pair[0]), unit(pair[1])))
+                {
+                    return Err(InterpolationError::Antipodal {
+                        track: stretch.index,
+                        key: stretch.first_key + i,
+                    });
+                }
+            }
+            self.is_left_out = true;
+        } else if turns.any {
             self.signs.reserve(keys.len());
             for pair in keys.windows(2) {
                 self.signs.push(sign);
@@ -181,7 +217,14 @@ impl<'a> Sampled<'a> {
             }
             self.signs.push(sign);
         }
-        sign
+        Ok(sign)
+    }
+
+    /// Leaves so many samples to be mended.
+    fn leave_out(&mut self, samples: usize, output: &mut Output<'_>) {
+        self.any_left_out |= self.block.flush(output);
+        output.take(samples).for_each(|place| *place = [0.0; 4]);
+        self.any_left_out = true;
     }
 
     /// The samples in `window` of a stretch's intervals, and of what lies beside the

@@ -63,13 +63,11 @@ impl Interpolation {
         smooth.gentle.filter(|_| suits)
     }
 
-    /// Whether arcs too are curves with a formula: for what follows from derivatives, and
-    /// where they may be longer than half a turn.
+    /// Whether arcs too are curves with a formula: for what follows from derivatives.
     pub(crate) fn is_by_formula(&self) -> bool {
         let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
         let constant = self.speed == Speed::Constant;
-        let any_length = self.path == Path::AsAuthored;
-        self.quantity != Quantity::Rotation || extrapolates || constant || any_length
+        self.quantity != Quantity::Rotation || extrapolates || constant
     }
 
     pub(crate) fn sides(&self) -> Sides {

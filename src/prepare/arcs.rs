@@ -9,8 +9,10 @@ use glam::Quat;
 use super::arc_lanes::{ArcLanes, Components, LANES, arcs};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
+use crate::branchless::{dot, unit};
 use crate::cpu::{InLanes, in_lanes};
-use crate::method::{Ends, Interpolation, InterpolationError};
+use crate::method::{Ends, Interpolation, InterpolationError, Path};
+use crate::numeric::round_f32;
 use crate::segment::{ArcSegment, Segments};
 use crate::tracks::Track;
 
@@ -84,6 +86,7 @@ fn signed(signs: &[f32; LANES], [x, y, z, w]: &Components) -> [[f32; 4]; LANES] 
 pub(crate) struct ArcPreparation {
     block: ArcBlock,
     ends: Ends,
+    path: Path,
     /// What the signs of the keys so far make of the next.
     sign: f32,
 }
@@ -93,6 +96,7 @@ impl ArcPreparation {
         Self {
             block: ArcBlock::new(),
             ends: interpolation.ends,
+            path: interpolation.path,
             sign: 1.0,
         }
     }
@@ -108,26 +112,41 @@ impl Prepare for ArcPreparation {
     ) -> Result<(), InterpolationError> {
         self.ends.check(track.keys, index)?;
         let (start, end) = (intervals.start, intervals.end);
+        let long = self.long_arcs(track, index, intervals.clone())?;
         let first_key = prepared.constants.len() as u32;
         let first_span = prepared.spans.len();
         let last_key = first_key + intervals.len() as u32;
         let keys = track.keys[start..=end].iter();
         prepared.constants.extend(keys.map(Quat::to_array));
-        // Every interval has one span and one segment.
+        // Every interval has one span and one segment; a long arc has two of each.
         let segments = (prepared.segments.len() + self.block.count) as u32;
         let spans = &mut prepared.spans;
-        let count = intervals.len() as u32;
-        spans
-            .starts
-            .extend_from_slice(&track.times[intervals.clone()]);
-        spans.keys.extend(first_key..last_key);
-        let sources = (segments..segments + count).map(Source::Segment);
+        if long.is_empty() {
+            let own = &track.times[intervals.clone()];
+            spans.starts.extend_from_slice(own);
+            spans.keys.extend(first_key..last_key);
+        }
+        let mut halves = long.iter().peekable();
+        for (key, constant) in intervals.clone().zip(first_key..) {
+            let half = halves.next_if(|half| half.key == key);
+            if !long.is_empty() {
+                let [from, to] = [track.times[key], track.times[key + 1]];
+                spans.starts.push(from);
+                spans.keys.push(constant);
+                if half.is_some() {
+                    spans.starts.push(from + (to - from) * 0.5);
+                    spans.keys.push(NONE);
+                }
+            }
+        }
+        let count = spans.starts.len() - first_span;
+        let sources = (segments..segments + count as u32).map(Source::Segment);
         spans.sources.extend(sources);
         let beyond = prepared.copies(track);
         prepared.parts.push(Part {
             track: index as u32,
             first_key: start as u32,
-            spans: first_span..first_span + intervals.len(),
+            spans: first_span..first_span + count,
             end: track.times[end],
             before: if start == 0 { first_key } else { NONE },
             after: if end + 1 == track.keys.len() {
@@ -137,15 +156,16 @@ impl Prepare for ArcPreparation {
             },
             beyond,
         });
+        let mut halves = long.iter().peekable();
         for key in intervals {
-            if self.block.count == LANES {
-                self.flush(prepared);
+            let [from, to] = [key, key + 1].map(|key| track.keys[key].to_array());
+            match halves.next_if(|half| half.key == key) {
+                Some(half) => {
+                    self.push(prepared, from, half.middle, key == 0);
+                    self.push(prepared, half.middle, to, false);
+                }
+                None => self.push(prepared, from, to, key == 0),
             }
-            let lane = self.block.count;
-            self.block.from[lane] = track.keys[key].to_array();
-            self.block.to[lane] = track.keys[key + 1].to_array();
-            self.block.is_first[lane] = key == 0;
-            self.block.count += 1;
         }
         Ok(())
     }
@@ -156,7 +176,53 @@ impl Prepare for ArcPreparation {
     }
 }
 
+/// The middle of an arc of more than half a turn, which is made of two.
+struct Half {
+    /// The key that the arc starts with.
+    key: usize,
+    middle: [f32; 4],
+}
+
 impl ArcPreparation {
+    /// Where signs count as authored an arc may be up to a whole turn: such arcs among some.
+    fn long_arcs(
+        &self,
+        track: Track,
+        index: usize,
+        intervals: Range<usize>,
+    ) -> Result<Vec<Half>, InterpolationError> {
+        let mut long = Vec::new();
+        if self.path == Path::Shortest {
+            return Ok(long);
+        }
+        for key in intervals {
+            let [from, to] = [key, key + 1].map(|key| unit(track.keys[key].to_array()));
+            let cosine = dot(from, to);
+            if self.path.refuses(cosine) {
+                let track = index;
+                return Err(InterpolationError::Antipodal { track, key });
+            }
+            if cosine < 0.0 {
+                let sum: [f64; 4] = std::array::from_fn(|c| from[c] + to[c]);
+                let length = dot(sum, sum).sqrt();
+                let middle = sum.map(|component| round_f32(component / length));
+                long.push(Half { key, middle });
+            }
+        }
+        Ok(long)
+    }
+
+    #[inline]
+    fn push(&mut self, prepared: &mut Prepared, from: [f32; 4], to: [f32; 4], is_first: bool) {
+        if self.block.count == LANES {
+            self.flush(prepared);
+        }
+        let lane = self.block.count;
+        (self.block.from[lane], self.block.to[lane]) = (from, to);
+        self.block.is_first[lane] = is_first;
+        self.block.count += 1;
+    }
+
     fn flush(&mut self, prepared: &mut Prepared) {
         in_lanes(&mut self.block);
         let block = &mut self.block;
