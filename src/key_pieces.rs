@@ -1,23 +1,22 @@
 //! Sets with fewer samples than keys on a Vulkan device: keys go there as they are stored,
 //! with where the samples lie among them, some tracks at a time. Nothing is prepared.
 
+mod written;
+
 use std::ops::Range;
 
-use glam::Quat;
 use rayon::prelude::*;
 
-use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cpu::{CpuEngine, Row, Straight, Turns, in_lanes, straight};
+use crate::clock::{Ticks, Timeline};
+use crate::cpu::{CpuEngine, Row, Straight, straight};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
-use crate::joints::{Joints, TrackJoints};
+use crate::joints::Joints;
 use crate::method::{Interpolation, Path};
-use crate::plan::{FramePlan, Stretch, time_sample};
-use crate::prepare::flip;
+use crate::plan::Stretch;
 use crate::rotations::Layout;
-use crate::segment::shader::HELD;
-use crate::segment::{Joint, Rows, Sample};
 use crate::tracks::TrackSet;
+use written::turned;
 
 /// Rows of one piece: workgroups along y.
 const ROWS: usize = 65_535;
@@ -299,200 +298,4 @@ impl<'a> KeyJob<'a> {
             Ticks::Times { .. } => None,
         }
     }
-}
-
-impl KeyPiece<'_, '_> {
-    pub(crate) fn rows(&self) -> Rows {
-        Rows {
-            samples: self.samples as u32,
-            keys: (self.keys / self.rows) as u32,
-        }
-    }
-
-    pub(crate) fn row_count(&self) -> usize {
-        self.rows
-    }
-
-    /// Rotations that it becomes.
-    pub(crate) fn rotation_count(&self) -> usize {
-        self.samples * self.rows
-    }
-
-    /// Bytes of its keys, their signs, the samples, the rotations and the joints.
-    pub(crate) fn bytes(&self) -> [usize; 5] {
-        let joints = match self.job.joints() {
-            Some(_) => self.keys / self.rows,
-            None => 0,
-        };
-        [
-            self.keys * size_of::<Quat>(),
-            self.keys.div_ceil(32) * size_of::<u32>(),
-            self.samples * size_of::<Sample>(),
-            self.rotation_count() * size_of::<Quat>(),
-            joints * size_of::<Joint>(),
-        ]
-    }
-
-    /// Writes what the kernel reads.
-    pub(crate) fn write(
-        &self,
-        mut keys: &mut [[f32; 4]],
-        signs: &mut [u32],
-        mut samples: &mut [Sample],
-        mut joints: &mut [Joint],
-    ) -> Result<(), FramesError> {
-        let mut first_key = 0;
-        let mut places = Vec::with_capacity(self.tasks.len());
-        for task in &self.tasks {
-            // Where all rows are alike only the first one's are told.
-            let (told, joined) = match self.rows {
-                1 => (task.samples, task.keys.min(joints.len())),
-                _ => (samples.len(), joints.len()),
-            };
-            let (own_keys, other_keys) = keys.split_at_mut(task.keys);
-            let (own_samples, other_samples) = samples.split_at_mut(told);
-            let (own_joints, other_joints) = joints.split_at_mut(joined);
-            (keys, samples, joints) = (other_keys, other_samples, other_joints);
-            let written = Written {
-                keys: own_keys,
-                samples: own_samples,
-                joints: own_joints,
-                next_key: first_key,
-                turned: Vec::new(),
-            };
-            places.push((task, written));
-            first_key += task.keys;
-        }
-        let ends = self.job.interpolation.ends;
-        let rule = self.job.joints();
-        let new = || {
-            (
-                FramePlan::new(),
-                rule.map(|rule| TrackJoints::new(rule, ends)),
-            )
-        };
-        let turned: Vec<Vec<usize>> = places
-            .into_par_iter()
-            .map_init(new, |known, (task, mut written)| {
-                match &task.what {
-                    What::Part(part) => self.write_part(part, known, &mut written)?,
-                    What::Tracks(tracks) => {
-                        for index in tracks.clone() {
-                            self.write_part(&self.job.track(index), known, &mut written)?;
-                        }
-                    }
-                }
-                Ok(written.turned)
-            })
-            .collect::<Result<_, FramesError>>()?;
-        signs.fill(0);
-        for key in turned.into_iter().flatten() {
-            signs[key / 32] |= 1 << (key % 32);
-        }
-        Ok(())
-    }
-
-    fn write_part<'p>(
-        &self,
-        part: &Part<'p>,
-        (plan, joints): &mut (FramePlan<'p>, Option<TrackJoints<'p>>),
-        written: &mut Written<'_>,
-    ) -> Result<(), FramesError> {
-        let first_key = written.next_key;
-        let keys: &[[f32; 4]] = bytemuck::cast_slice(part.stretch.keys);
-        let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
-        own.copy_from_slice(keys);
-        written.keys = others;
-        let turn = |key| written.turned.push(first_key + key);
-        turned(&part.stretch, part.sign, turn);
-        if !written.samples.is_empty() {
-            let all = std::mem::take(&mut written.samples);
-            let (own, others) = all.split_at_mut(part.window.len());
-            self.write_samples(part, first_key as u32, own, plan)?;
-            written.samples = others;
-        }
-        if let (Some(joints), false) = (joints, written.joints.is_empty()) {
-            let all = std::mem::take(&mut written.joints);
-            let (own, others) = all.split_at_mut(keys.len());
-            let Stretch {
-                times,
-                first_key,
-                all,
-                ..
-            } = part.stretch;
-            own.copy_from_slice(joints.of(times, first_key, all));
-            written.joints = others;
-        }
-        written.next_key += keys.len();
-        Ok(())
-    }
-
-    fn write_samples<'p>(
-        &self,
-        part: &Part<'p>,
-        first_key: u32,
-        samples: &mut [Sample],
-        plan: &mut FramePlan<'p>,
-    ) -> Result<(), FramesError> {
-        let KeyJob { set, timeline, .. } = self.job;
-        let index = part.stretch.index;
-        match &timeline.ticks {
-            Ticks::Frames { rate, start } => {
-                let all = set.times_and_keys(index).0;
-                let clock = FrameClock::new(*rate, *start, all[all.len() - 1]);
-                let found = plan.samples(part.stretch, clock, &part.window)?;
-                for (sample, found) in samples.iter_mut().zip(found) {
-                    *sample = Sample {
-                        key: found.key + first_key,
-                        ..*found
-                    };
-                }
-            }
-            Ticks::Times { times, stride } => {
-                let times = &times[index * stride..][..samples.len()];
-                let mut near = 0;
-                for (sample, &time) in samples.iter_mut().zip(times) {
-                    let found = time_sample(part.stretch.times, time, near);
-                    near = (found.key & !HELD) as usize;
-                    *sample = Sample {
-                        key: found.key + first_key,
-                        ..found
-                    };
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// What a thread has still to write, and what it has found.
-struct Written<'w> {
-    keys: &'w mut [[f32; 4]],
-    samples: &'w mut [Sample],
-    joints: &'w mut [Joint],
-    /// The place of the next key among the piece's.
-    next_key: usize,
-    /// Keys whose sign is turned.
-    turned: Vec<usize>,
-}
-
-/// Calls `turn` for each key whose sign those before it turn, where the first one's is
-/// given; the sign of the last.
-fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
-    let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-    let mut turns = Turns { keys, any: false };
-    in_lanes(&mut turns);
-    if !turns.any && first > 0.0 {
-        return first;
-    }
-    let mut sign = first;
-    for (i, key) in keys.iter().enumerate() {
-        if i > 0 {
-            sign *= flip(keys[i - 1], *key);
-        }
-        if sign < 0.0 {
-            turn(i);
-        }
-    }
-    sign
 }
