@@ -1,6 +1,6 @@
 // Fewer samples than keys: an invocation for each sample, straight from the keys beside
 // it. Joined with a `sampled_*`, which has `between`.
-// Twin: src/cpu/sample_lanes.rs.
+// Twin: src/cpu/sampled.rs.
 
 // Where a sample lies among the keys of its row.
 struct Sample {

@@ -1,4 +1,5 @@
 // Cubics for `sampled`. Joined with `gentle` and `canonical`.
+// Twin: src/cpu/cubic_lanes.rs.
 
 // Of the keys of a row.
 @group(0) @binding(4) var<storage, read> joints: array<Joint>;

@@ -1,5 +1,6 @@
 // Two keys alone by smooth methods, for `sampled`. Joined with `steady`, `arc`,
 // `evaluate_arc`, `sine_cosine` and `canonical`.
+// Twin: src/cpu/sample_lanes.rs.
 
 fn between(key: u32, sample: Sample) -> vec4f {
     let c = steady(arc(signed(key), signed(key + 1u)));

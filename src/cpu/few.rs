@@ -128,13 +128,15 @@ impl<'a> PartRef<'a> {
         if !(start <= time && time < end) {
             return None;
         }
-        let constant = |index: u32| Some(One::Constant(prepared.constants[index as usize]));
+        // Written out: closures are not always inlined.
         let key = prepared.spans.keys[span];
         if time == start && key != NONE {
-            return constant(key);
+            return Some(One::Constant(prepared.constants[key as usize]));
         }
         let index = match prepared.spans.sources[span] {
-            Source::Constant(index) => return constant(index),
+            Source::Constant(index) => {
+                return Some(One::Constant(prepared.constants[index as usize]));
+            }
             Source::Exact(_) => return None,
             Source::Segment(index) => index as usize,
         };

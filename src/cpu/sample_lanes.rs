@@ -1,4 +1,5 @@
-//! Twin of `shaders/sampled_arcs.wgsl`: arcs with fewer samples than keys, in lanes.
+//! Twin of `shaders/sampled_arcs.wgsl` and `shaders/sampled_pairs.wgsl`: samples by two
+//! keys, in lanes.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 

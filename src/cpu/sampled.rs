@@ -1,6 +1,7 @@
-//! Fewer samples than keys: a sample to a lane, straight from the keys beside it. No
-//! segment is kept, and none is made where no sample falls. The same operations as by way
-//! of segments, and so the same bits. Cubics that turn too much for it stay 0.
+//! Twin of `shaders/sampled.wgsl`. Fewer samples than keys: a sample to a lane, straight
+//! from the keys beside it. No segment is kept, and none is made where no sample falls. The
+//! same operations as by way of segments, and so the same bits. Cubics that turn too much
+//! for it stay 0.
 
 use std::ops::Range;
 

@@ -128,15 +128,15 @@ impl Prepare for ArcPreparation {
         }
         let mut halves = long.iter().peekable();
         for (key, constant) in intervals.clone().zip(first_key..) {
-            let half = halves.next_if(|half| half.key == key);
-            if !long.is_empty() {
-                let [from, to] = [track.times[key], track.times[key + 1]];
-                spans.starts.push(from);
-                spans.keys.push(constant);
-                if half.is_some() {
-                    spans.starts.push(from + (to - from) * 0.5);
-                    spans.keys.push(NONE);
-                }
+            if long.is_empty() {
+                break; // done already
+            }
+            let [from, to] = [track.times[key], track.times[key + 1]];
+            spans.starts.push(from);
+            spans.keys.push(constant);
+            if halves.next_if(|half| half.key == key).is_some() {
+                spans.starts.push(from + (to - from) * 0.5);
+                spans.keys.push(NONE);
             }
         }
         let count = spans.starts.len() - first_span;
@@ -158,14 +158,21 @@ impl Prepare for ArcPreparation {
         });
         let mut halves = long.iter().peekable();
         for key in intervals {
-            let [from, to] = [key, key + 1].map(|key| track.keys[key].to_array());
-            match halves.next_if(|half| half.key == key) {
-                Some(half) => {
-                    self.push(prepared, from, half.middle, key == 0);
-                    self.push(prepared, half.middle, to, false);
-                }
-                None => self.push(prepared, from, to, key == 0),
+            let middle = match long.is_empty() {
+                true => None,
+                false => halves.next_if(|half| half.key == key),
+            };
+            if let Some(half) = middle {
+                let lane = self.lane(prepared);
+                self.block.from[lane] = track.keys[key].to_array();
+                self.block.to[lane] = half.middle;
+                self.block.is_first[lane] = key == 0;
             }
+            let lane = self.lane(prepared);
+            let from = middle.map_or(track.keys[key].to_array(), |half| half.middle);
+            self.block.from[lane] = from;
+            self.block.to[lane] = track.keys[key + 1].to_array();
+            self.block.is_first[lane] = key == 0 && middle.is_none();
         }
         Ok(())
     }
@@ -212,15 +219,14 @@ impl ArcPreparation {
         Ok(long)
     }
 
-    #[inline]
-    fn push(&mut self, prepared: &mut Prepared, from: [f32; 4], to: [f32; 4], is_first: bool) {
+    /// The next lane that is free.
+    #[inline(always)]
+    fn lane(&mut self, prepared: &mut Prepared) -> usize {
         if self.block.count == LANES {
             self.flush(prepared);
         }
-        let lane = self.block.count;
-        (self.block.from[lane], self.block.to[lane]) = (from, to);
-        self.block.is_first[lane] = is_first;
         self.block.count += 1;
+        self.block.count - 1
     }
 
     fn flush(&mut self, prepared: &mut Prepared) {

@@ -186,7 +186,11 @@ impl ClipData {
     #[inline(always)]
     pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
         let places = self.tracks[track]..self.tracks[track + 1];
-        (places.len() == 1).then(|| self.part(self.parts[places.start]))
+        if places.len() == 1 {
+            Some(self.part(self.parts[places.start]))
+        } else {
+            None
+        }
     }
 
     /// The parts of one track in the order in which a copy of it meets them.

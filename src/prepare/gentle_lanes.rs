@@ -46,14 +46,19 @@ impl GentleLanes {
     /// Finds out which keys are near each other; whether any curve may turn little, and
     /// whether all do.
     pub(super) fn look(&mut self, intervals: &Intervals, stretches: &[Stretch]) -> (bool, bool) {
-        self.holds = [false; ROOM];
-        in_lanes(&mut Chords {
+        let mut chords = Chords {
             lanes: self,
             intervals,
-        });
-        let lanes = || stretches.iter().flat_map(Stretch::lanes);
-        let may = |lane: usize| lane > 0 && (lane - 1..=lane + 1).all(|near| self.near[near]);
-        (lanes().any(may), lanes().all(may))
+            any: false,
+        };
+        in_lanes(&mut chords);
+        if !chords.any {
+            self.holds = [false; ROOM];
+            return (false, false);
+        }
+        let mut lanes = stretches.iter().flat_map(Stretch::lanes);
+        let all = lanes.all(|lane| lane > 0 && self.near[lane - 1..=lane + 1] == [true; 3]);
+        (true, all)
     }
 
     /// Prepares them; the signs of the intervals' first keys are known.
@@ -97,6 +102,8 @@ impl GentleLanes {
 struct Chords<'a> {
     lanes: &'a mut GentleLanes,
     intervals: &'a Intervals,
+    /// Whether three intervals in a row have keys near each other.
+    any: bool,
 }
 
 impl InLanes for Chords<'_> {
@@ -114,7 +121,11 @@ impl InLanes for Chords<'_> {
             flips[j] = flip;
             near[j] = x * x + y * y + z * z + w * w <= LONGEST_STEP;
         }
-        (self.lanes.flips, self.lanes.near) = (flips, near);
+        let mut any = false;
+        for j in 2..LANES {
+            any |= near[j - 2] & near[j - 1] & near[j];
+        }
+        (self.lanes.flips, self.lanes.near, self.any) = (flips, near, any);
     }
 }
 
