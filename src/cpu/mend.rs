@@ -18,9 +18,6 @@ use crate::tracks::TrackSet;
 /// Intervals between two that are wanted, up to which they are one piece.
 const APART: usize = 2;
 
-/// Pieces that are prepared together.
-const TOGETHER: usize = 256;
-
 /// Some samples of a track.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
@@ -42,6 +39,10 @@ struct Piece {
     sign: f32,
 }
 
+/// Pieces that are prepared together, with their places in the result, and the sign of
+/// their first keys.
+type Batch<'o> = (Vec<(Piece, &'o mut [[f32; 4]])>, f32);
+
 impl CpuEngine {
     /// Works out what is 0 in a row.
     pub(crate) fn mend(&self, row: Row<'_>, mut output: &mut [[f32; 4]]) -> Result<(), Error> {
@@ -55,7 +56,7 @@ impl CpuEngine {
             work.push((piece, own));
         }
         let track = row.set.track(row.index);
-        let some = |work: &mut [(Piece, &mut [[f32; 4]])], sign: f32| -> Result<(), Error> {
+        let mend = |(batch, sign): Batch<'_>| -> Result<(), Error> {
             let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
             let Memory {
                 prepared,
@@ -63,25 +64,35 @@ impl CpuEngine {
                 ..
             } = &mut memory;
             prepared.clear();
-            let intervals = work.iter().map(|(piece, _)| piece.intervals.clone());
+            let intervals = batch.iter().map(|(piece, _)| piece.intervals.clone());
             preparation.push_pieces(prepared, track, row.index, intervals)?;
             if sign < 0.0 {
                 prepared.negate(row.interpolation);
             }
-            for (part, (piece, own)) in prepared.parts.iter().zip(work) {
+            for (part, (piece, own)) in prepared.parts.iter().zip(batch) {
                 let part = PartRef { prepared, part };
-                self.part(part, row.timeline, &Cycle::own(piece.samples.clone()), own)?;
+                self.part(part, row.timeline, &Cycle::own(piece.samples), own)?;
             }
             self.memories.give_back(memory);
             Ok(())
         };
-        let (mut turned, mut others): (Vec<_>, Vec<_>) =
+        let (turned, others): (Vec<_>, Vec<_>) =
             work.into_iter().partition(|(piece, _)| piece.sign < 0.0);
-        let signs = [(&mut turned, -1.0), (&mut others, 1.0)];
-        signs.into_iter().try_for_each(|(work, sign)| {
-            let together = work.par_chunks_mut(TOGETHER);
-            together.try_for_each(|work| some(work, sign))
-        })
+        let mut batches: Vec<Batch<'_>> = Vec::new();
+        for (work, sign) in [(turned, -1.0), (others, 1.0)] {
+            let mut intervals = BATCH;
+            for (piece, own) in work {
+                if intervals >= BATCH {
+                    batches.push((Vec::new(), sign));
+                    intervals = 0;
+                }
+                intervals += piece.intervals.len();
+                if let Some((batch, _)) = batches.last_mut() {
+                    batch.push((piece, own));
+                }
+            }
+        }
+        batches.into_par_iter().try_for_each(mend)
     }
 }
 
