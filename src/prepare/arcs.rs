@@ -125,18 +125,16 @@ impl Prepare for ArcPreparation {
             let own = &track.times[intervals.clone()];
             spans.starts.extend_from_slice(own);
             spans.keys.extend(first_key..last_key);
-        }
-        let mut halves = long.iter().peekable();
-        for (key, constant) in intervals.clone().zip(first_key..) {
-            if long.is_empty() {
-                break; // done already
-            }
-            let [from, to] = [track.times[key], track.times[key + 1]];
-            spans.starts.push(from);
-            spans.keys.push(constant);
-            if halves.next_if(|half| half.key == key).is_some() {
-                spans.starts.push(from + (to - from) * 0.5);
-                spans.keys.push(NONE);
+        } else {
+            let mut halves = long.iter().peekable();
+            for (key, constant) in intervals.clone().zip(first_key..) {
+                let [from, to] = [track.times[key], track.times[key + 1]];
+                spans.starts.push(from);
+                spans.keys.push(constant);
+                if halves.next_if(|half| half.key == key).is_some() {
+                    spans.starts.push(from + (to - from) * 0.5);
+                    spans.keys.push(NONE);
+                }
             }
         }
         let count = spans.starts.len() - first_span;
