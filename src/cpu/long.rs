@@ -103,12 +103,13 @@ impl CpuEngine {
             let all = work.into_par_iter();
             all.try_for_each_init(new, |sampled, (first, sign, window, own)| {
                 // Cubics look at the keys beside their own too.
-                let start = first.saturating_sub(1);
+                let beside = usize::from(matches!(straight, Straight::Cubics(_)));
+                let start = first.saturating_sub(beside);
                 let before = match start < first {
                     true => sign * flip(keys[start], keys[first]),
                     false => sign,
                 };
-                let stretch = stretch(start, (last_of(first) + 1).min(last));
+                let stretch = stretch(start, (last_of(first) + beside).min(last));
                 if sampled.stretch(stretch, before, clock, &window, own)? {
                     let row = Row {
                         first: window.start,
