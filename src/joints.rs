@@ -1,6 +1,7 @@
 //! What the tangent at a key is made of, where curves are prepared in f32 straight from
 //! keys: all that depends on times is here, in f64.
 
+use crate::cpu::{InLanes, in_lanes};
 use crate::method::Ends;
 use crate::segment::Joint;
 use crate::segment::shader::{END, INNER, OUTSIDE};
@@ -90,7 +91,7 @@ impl<'a> TrackJoints<'a> {
             times,
             joints: &mut self.joints,
         };
-        crate::cpu::in_lanes(&mut work);
+        in_lanes(&mut work);
         let is_curve = all > 2;
         if first == 0 && is_curve {
             self.joints[0] = Joints::end(self.ends);
@@ -109,7 +110,7 @@ struct Between<'a> {
     joints: &'a mut [Joint],
 }
 
-impl crate::cpu::InLanes for Between<'_> {
+impl InLanes for Between<'_> {
     #[inline(always)]
     fn run(&mut self) {
         let inner = self.times.len().saturating_sub(2);

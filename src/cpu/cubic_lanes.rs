@@ -4,7 +4,7 @@
 
 use super::dispatch::InLanes;
 use super::evaluate::canonical;
-use super::gentle::gentle;
+use super::gentle::{gentle, signed};
 use super::sample_lanes::LANES;
 use crate::joints::UNKNOWN;
 use crate::prepare::whole;
@@ -54,10 +54,10 @@ impl InLanes for CubicBlock {
         for j in 0..whole(self.count) {
             let sign = self.signs[j];
             let keys = [
-                scaled(before[j], sign),
-                scaled(start[j], sign),
-                scaled(end[j], sign),
-                scaled(after[j], sign),
+                signed(before[j], sign),
+                signed(start[j], sign),
+                signed(end[j], sign),
+                signed(after[j], sign),
             ];
             let curve = gentle(keys, first[j], last[j]);
             let c = &curve.powers;
@@ -82,11 +82,6 @@ impl InLanes for CubicBlock {
         }
         self.wild += wild as usize;
     }
-}
-
-#[inline(always)]
-fn scaled([x, y, z, w]: [f32; 4], k: f32) -> [f32; 4] {
-    [x * k, y * k, z * k, w * k]
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
-pub(crate) use gentle::gentle;
+pub(crate) use gentle::{gentle, signed};
 pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
 pub(crate) use mend::Row;

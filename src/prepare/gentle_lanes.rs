@@ -4,8 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::cpu::{InLanes, gentle, in_lanes};
-use crate::joints::Joints;
+use crate::cpu::{InLanes, gentle, in_lanes, signed};
+use crate::joints::{Joints, UNKNOWN};
 use crate::method::{Ends, Path};
 use crate::segment::shader::{INNER, LONGEST_STEP};
 use crate::segment::{Joint, PolynomialSegment};
@@ -69,7 +69,7 @@ impl GentleLanes {
         });
         for stretch in stretches.iter().filter(|_| !self.is_loop) {
             let end = match stretch.all {
-                1 => crate::joints::UNKNOWN,
+                1 => UNKNOWN,
                 _ => self.end,
             };
             if let Some(lane) = stretch.first() {
@@ -167,10 +167,10 @@ impl InLanes for Curves<'_> {
             let sign_end = own * flips[j + 1];
             let sign_after = sign_end * flips[j + 2];
             let (first, last) = (joints[j + 1], joints[j + 2]);
-            let start = scaled(from[j + 1], own);
-            let end = scaled(to[j + 1], sign_end);
-            let before = scaled(from[j], sign_before);
-            let after = scaled(to[j + 2], sign_after);
+            let start = signed(from[j + 1], own);
+            let end = signed(to[j + 1], sign_end);
+            let before = signed(from[j], sign_before);
+            let after = signed(to[j + 2], sign_after);
             // Where there is no neighbour, the key again.
             let before = either(first.kind == INNER, before, start);
             let after = either(last.kind == INNER, after, end);
@@ -200,9 +200,4 @@ fn either(first: bool, a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
         if first { a[2] } else { b[2] },
         if first { a[3] } else { b[3] },
     ]
-}
-
-#[inline(always)]
-fn scaled([x, y, z, w]: [f32; 4], k: f32) -> [f32; 4] {
-    [x * k, y * k, z * k, w * k]
 }
