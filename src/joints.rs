@@ -15,6 +15,8 @@ pub(crate) enum Joints {
     ByTime,
 }
 
+const SIXTH: f32 = 1.0 / 6.0;
+
 /// How much longer one interval may be than its neighbour.
 const MOST_UNEVEN: f64 = 16.0;
 
@@ -54,8 +56,6 @@ impl Joints {
         }
     }
 }
-
-const SIXTH: f32 = 1.0 / 6.0;
 
 /// The joints of a track's keys, of those that are asked for; kept for the next track
 /// with the same times.

@@ -8,7 +8,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::clock::{Ticks, Timeline};
-use crate::cpu::{CpuEngine, Row, Straight, straight};
+use crate::cpu::{CpuEngine, LEFT_OUT, Row, Straight, straight};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::joints::Joints;
@@ -72,7 +72,7 @@ impl<'a> KeyJob<'a> {
 
     /// Works out on the CPU what the device left 0, because it turns too much.
     pub(crate) fn mend(&self, output: &mut [[f32; 4]]) -> Result<(), Error> {
-        let left_out = |some: &[[f32; 4]]| some.contains(&[0.0; 4]);
+        let left_out = |some: &[[f32; 4]]| some.contains(&LEFT_OUT);
         if self.joints().is_none() || !output.par_chunks(TASK_KEYS).any(left_out) {
             return Ok(());
         }

@@ -15,6 +15,9 @@ use crate::method::{Interpolation, Path};
 use crate::prepare::{BATCH, PartRef, flip};
 use crate::tracks::TrackSet;
 
+/// What stands for a sample that was left out: no rotation is 0.
+pub(crate) const LEFT_OUT: [f32; 4] = [0.0; 4];
+
 /// Intervals between two that are wanted, up to which they are one piece.
 const APART: usize = 2;
 
@@ -44,7 +47,7 @@ struct Piece {
 type Batch<'o> = (Vec<(Piece, &'o mut [[f32; 4]])>, f32);
 
 impl CpuEngine {
-    /// Works out what is 0 in a row.
+    /// Works out what was left out of a row.
     pub(crate) fn mend(&self, row: Row<'_>, mut output: &mut [[f32; 4]]) -> Result<(), Error> {
         let pieces = row.pieces(output);
         let mut from = row.first;
@@ -119,20 +122,22 @@ impl<'a> Row<'a> {
         let (times, _) = self.set.times_and_keys(self.index);
         let last = times.len() - 1;
         let mut pieces: Vec<Piece> = Vec::new();
-        let left_out = |(_, rotation): &(usize, &[f32; 4])| **rotation == [0.0; 4];
         let Ticks::Frames { rate, start } = self.timeline.ticks else {
             // They may be in any order.
-            let any = output.iter().enumerate().any(|place| left_out(&place));
-            let whole = || Piece {
-                intervals: 0..last,
-                samples: self.first..self.first + output.len(),
-                sign: 1.0,
-            };
-            return any.then(whole).into_iter().collect();
+            if output.contains(&LEFT_OUT) {
+                pieces.push(Piece {
+                    intervals: 0..last,
+                    samples: self.first..self.first + output.len(),
+                    sign: 1.0,
+                });
+            }
+            return pieces;
         };
         let clock = FrameClock::new(rate, start, times[last]);
-        for (i, _) in output.iter().enumerate().filter(left_out) {
-            let sample = self.first + i;
+        for (sample, rotation) in (self.first..).zip(output) {
+            if *rotation != LEFT_OUT {
+                continue;
+            }
             let time = self.timeline.time(self.index, sample);
             let after = times.partition_point(|&key| key <= time);
             let mut interval = after.saturating_sub(1).clamp(self.key, last - 1);

@@ -40,7 +40,7 @@ pub(crate) use engine::CpuEngine;
 pub(crate) use gentle::{gentle, signed};
 pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
-pub(crate) use mend::Row;
+pub(crate) use mend::{LEFT_OUT, Row};
 pub(crate) use poses::{add, blend, mix, world};
 pub(crate) use sample_lanes::Turns;
 pub(crate) use sampled::{Straight, straight};

@@ -9,6 +9,7 @@ use glam::Quat;
 
 use super::cubic_lanes::CubicBlock;
 use super::dispatch::in_lanes;
+use super::mend::LEFT_OUT;
 use super::sample_lanes::{LANES, SampleBlock, Turns};
 use crate::branchless::{dot, unit};
 use crate::clock::{Ticks, Timeline};
@@ -224,7 +225,7 @@ impl<'a> Sampled<'a> {
     /// Leaves so many samples to be mended.
     fn leave_out(&mut self, samples: usize, output: &mut Output<'_>) {
         self.any_left_out |= self.block.flush(output);
-        output.take(samples).for_each(|place| *place = [0.0; 4]);
+        output.take(samples).for_each(|place| *place = LEFT_OUT);
         self.any_left_out = true;
     }
 
