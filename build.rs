@@ -15,6 +15,10 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 #[path = "src/spirv.rs"]
 mod spirv;
 
+/// How a kernel reads its buffers: as they are declared, or 64 bits at once. The name of
+/// the latter says so.
+const READS: [&str; 2] = ["narrow", "wide"];
+
 /// What the kernel is joined with: one of each, and its name is that of all three.
 const FORMS: [&str; 2] = ["arc", "polynomial"];
 const CLOCKS: [(&str, &str); 2] = [
@@ -36,14 +40,20 @@ const ENCODINGS: [(&str, &[&str]); 8] = [
 /// Kernels over poses that are already there.
 const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
 
-/// Kernels from keys to samples, each with the files that it needs beside its own.
-const SAMPLED: [(&str, &[&str]); 3] = [
-    ("sampled_arcs", &["sine_cosine", "evaluate_arc", "arc"]),
+/// Kernels from keys to samples, each with the files that it needs beside its own, and with
+/// those that read, narrow or wide.
+const SAMPLED: [(&str, &[&str], &[&str]); 3] = [
+    (
+        "sampled_arcs",
+        &["sine_cosine", "evaluate_arc", "arc"],
+        &["sampled"],
+    ),
     (
         "sampled_pairs",
         &["sine_cosine", "evaluate_arc", "arc", "steady"],
+        &["sampled"],
     ),
-    ("sampled_cubics", &["gentle"]),
+    ("sampled_cubics", &["gentle"], &["sampled", "joints"]),
 ];
 
 /// Every pipeline: its name, and the files that are joined into it.
@@ -54,19 +64,26 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
             .map(str::to_owned)
             .to_vec(),
     )];
-    for form in FORMS {
-        for (clock, distance) in CLOCKS {
-            for (encoding, needed) in ENCODINGS {
-                let own = [
-                    "canonical",
-                    "kernel",
-                    distance,
-                    "sine_cosine",
-                    &format!("evaluate_{form}"),
-                    &format!("store_{encoding}"),
-                ];
-                let files = own.iter().chain(needed).map(|&file| file.to_owned());
-                pipelines.push((format!("{form}_{clock}_{encoding}"), files.collect()));
+    for reads in READS {
+        for form in FORMS {
+            for (clock, distance) in CLOCKS {
+                for (encoding, needed) in ENCODINGS {
+                    let own = [
+                        "canonical",
+                        "kernel",
+                        distance,
+                        "sine_cosine",
+                        &format!("evaluate_{form}"),
+                        &format!("store_{encoding}"),
+                    ];
+                    let mut files: Vec<_> =
+                        own.iter().chain(needed).map(|&f| f.to_owned()).collect();
+                    files.push(format!("kernel_{reads}"));
+                    if reads == "wide" {
+                        files.extend(["wide".to_owned(), format!("{form}_wide")]);
+                    }
+                    pipelines.push((named(&format!("{form}_{clock}_{encoding}"), reads), files));
+                }
             }
         }
     }
@@ -81,12 +98,26 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
         let files = shared.into_iter().chain([pose]).map(str::to_owned);
         pipelines.push((pose.to_owned(), files.collect()));
     }
-    for (sampled, needed) in SAMPLED {
-        let files = ["canonical", "sampled"].iter().chain(needed).copied();
-        let files = files.chain([sampled]).map(str::to_owned);
-        pipelines.push((sampled.to_owned(), files.collect()));
+    for reads in READS {
+        for (sampled, needed, read) in SAMPLED {
+            let shared = ["canonical", "sampled", sampled];
+            let own = shared.iter().chain(needed).map(|&file| file.to_owned());
+            let mut files: Vec<_> = own.collect();
+            files.extend(read.iter().map(|read| format!("{read}_{reads}")));
+            if reads == "wide" {
+                files.push("wide".to_owned());
+            }
+            pipelines.push((named(sampled, reads), files));
+        }
     }
     pipelines
+}
+
+fn named(kernel: &str, reads: &str) -> String {
+    match reads {
+        "wide" => format!("{kernel}_wide"),
+        _ => kernel.to_owned(),
+    }
 }
 
 fn main() {
@@ -126,7 +157,8 @@ fn read_shader(file: &str) -> String {
 }
 
 fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
-    let info = Validator::new(ValidationFlags::all(), Capabilities::IMMEDIATES)
+    let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
+    let info = Validator::new(ValidationFlags::all(), capabilities)
         .validate(module)
         .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
     let options = spv::Options {

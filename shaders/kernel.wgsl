@@ -1,5 +1,6 @@
-// The one entry point of every form. Joined with a form (`Segment`, `evaluate`),
-// a `distance_from_middle`, a `store` and `sine_cosine` by the build.
+// The one entry point of every form. Joined with a form (`Segment`, `evaluate`), what it
+// reads (`segment_at`, `constant_at`, `item_at`), a `distance_from_middle`, a `store` and
+// `sine_cosine` by the build.
 
 // A run of samples of one track that lie in one segment, or hold one constant.
 struct Item {
@@ -31,9 +32,6 @@ const WORKGROUP: u32 = 64;
 const ITEM_SAMPLES: u32 = 16;
 const HOLD: u32 = 0x80000000;
 
-@group(0) @binding(0) var<storage, read> segments: array<Segment>;
-@group(0) @binding(1) var<storage, read> constants: array<vec4f>;
-@group(0) @binding(2) var<storage, read> items: array<Item>;
 @group(0) @binding(3) var<storage, read> distances: array<f32>;
 
 var<immediate> launch: Launch;
@@ -47,18 +45,22 @@ fn main(
     if index >= launch.item_count {
         return;
     }
-    let item = items[launch.first_item + index];
+    let item = item_at(launch.first_item + index);
+    let stride = launch.stride;
+    var output = item.output;
     if (item.count & HOLD) != 0u {
-        let constant = constants[item.source];
+        let constant = constant_at(item.source);
         let count = item.count & ~HOLD;
         for (var j = 0u; j < count; j++) {
-            store(item.output + j * launch.stride, constant);
+            store(output, constant);
+            output += stride;
         }
         return;
     }
-    let segment = segments[item.source];
+    let segment = segment_at(item.source);
     for (var j = 0u; j < item.count; j++) {
         let parameter = distance_from_middle(item.first, j) * item.scale + item.offset;
-        store(item.output + j * launch.stride, canonical(evaluate(segment, parameter)));
+        store(output, canonical(evaluate(segment, parameter)));
+        output += stride;
     }
 }

@@ -1,5 +1,6 @@
 // Fewer samples than keys: an invocation for each sample, straight from the keys beside
-// it. Joined with a `sampled_*`, which has `between`.
+// it. Joined with a `sampled_*`, which has `between`, and with what reads (`key_at`,
+// `sample_at`).
 // Twin: src/cpu/sampled.rs.
 
 // Where a sample lies among the keys of its row.
@@ -20,10 +21,8 @@ struct Rows {
 const ROWS_WORKGROUP: u32 = 64;
 const HELD: u32 = 0x80000000;
 
-@group(0) @binding(0) var<storage, read> keys: array<vec4f>;
 // A bit for each key: whether those before it turn its sign.
 @group(0) @binding(1) var<storage, read> signs: array<u32>;
-@group(0) @binding(2) var<storage, read> samples: array<Sample>;
 @group(0) @binding(3) var<storage, read_write> rotations: array<vec4f>;
 
 var<immediate> rows: Rows;
@@ -33,11 +32,11 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     if invocation.x >= rows.samples {
         return;
     }
-    let sample = samples[invocation.x];
+    let sample = sample_at(invocation.x);
     let key = invocation.y * rows.keys + (sample.key & ~HELD);
     let place = invocation.y * rows.samples + invocation.x;
     if (sample.key & HELD) != 0u {
-        rotations[place] = keys[key];
+        rotations[place] = key_at(key);
         return;
     }
     rotations[place] = canonical(between(key, sample));
@@ -45,5 +44,5 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
 
 fn signed(key: u32) -> vec4f {
     let sign = (signs[key / 32u] >> (key % 32u)) << 31u;
-    return bitcast<vec4f>(bitcast<vec4u>(keys[key]) ^ vec4u(sign));
+    return bitcast<vec4f>(bitcast<vec4u>(key_at(key)) ^ vec4u(sign));
 }

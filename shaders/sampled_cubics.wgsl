@@ -1,13 +1,10 @@
-// Cubics for `sampled`. Joined with `gentle` and `canonical`.
+// Cubics for `sampled`. Joined with `gentle`, `canonical`, and what reads (`joint_at`).
 // Twin: src/cpu/cubic_lanes.rs.
-
-// Of the keys of a row.
-@group(0) @binding(4) var<storage, read> joints: array<Joint>;
 
 // No rotation, 0, where the curve turns too much for `gentle`.
 fn between(key: u32, sample: Sample) -> vec4f {
-    let first = joints[sample.key];
-    let last = joints[sample.key + 1u];
+    let first = joint_at(sample.key);
+    let last = joint_at(sample.key + 1u);
     let before = select(key, key - 1u, first.kind == INNER);
     let after = select(key + 1u, key + 2u, last.kind == INNER);
     let curve = gentle(signed(before), signed(key), signed(key + 1u), signed(after), first, last);

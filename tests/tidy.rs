@@ -56,6 +56,15 @@ fn every_shader_function_has_its_twin() {
         let Some(twin) = text.lines().find_map(|line| line.split("Twin: ").nth(1)) else {
             let glue = [
                 "kernel",
+                "kernel_narrow",
+                "kernel_wide",
+                "arc_wide",
+                "polynomial_wide",
+                "sampled_narrow",
+                "sampled_wide",
+                "joints_narrow",
+                "joints_wide",
+                "wide",
                 "distance_in_frames",
                 "distance_in_seconds",
                 "store_f32",

@@ -8,11 +8,14 @@ use ash::{ext, khr, vk};
 
 use super::error::{Named, VulkanError};
 use super::physical::PhysicalDevice;
+use super::pipeline::Reads;
 
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(super) struct LogicalDevice {
     pub(super) raw: ash::Device,
     pub(super) physical: PhysicalDevice,
+    /// How its kernels read.
+    pub(super) reads: Reads,
     queue: Mutex<vk::Queue>,
     names: Option<ext::debug_utils::Device>,
     owned: bool,
@@ -31,31 +34,36 @@ impl LogicalDevice {
             .then_some(khr::shader_float_controls::NAME.as_ptr())
             .into_iter()
             .collect();
+        let reads = physical.reads();
+        let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads == Reads::Wide);
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
-            .enabled_extension_names(&extensions);
+            .enabled_extension_names(&extensions)
+            .enabled_features(&features);
         let instance = &physical.instance.raw;
         // SAFETY: the physical device belongs to the instance and has this family.
         let raw =
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
         // SAFETY: one queue of this family was just created.
         let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
-        Ok(Self::wrap(physical, raw, queue, true))
+        Ok(Self::wrap(physical, raw, queue, reads, true))
     }
 
-    /// An application's device; it stays the application's to destroy.
+    /// An application's device; it stays the application's to destroy, and may not have
+    /// been asked for wide integers.
     pub(super) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
     ) -> Arc<Self> {
-        Self::wrap(physical, raw, queue, false)
+        Self::wrap(physical, raw, queue, Reads::Narrow, false)
     }
 
     fn wrap(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
+        reads: Reads,
         owned: bool,
     ) -> Arc<Self> {
         let instance = &physical.instance;
@@ -66,6 +74,7 @@ impl LogicalDevice {
         Arc::new(Self {
             raw,
             physical,
+            reads,
             queue,
             names,
             owned,

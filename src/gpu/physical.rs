@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::error::{Named, VulkanError};
 use super::instance::Instance;
+use super::pipeline::Reads;
 use crate::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
@@ -74,6 +75,7 @@ pub(crate) struct PhysicalDevice {
     /// The extension must be enabled: the device is older than Vulkan 1.2.
     pub(super) float_controls_extension: bool,
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
+    has_wide_integers: bool,
     pub(crate) info: DeviceInfo,
 }
 
@@ -141,6 +143,8 @@ impl PhysicalDevice {
         // SAFETY: Vulkan 1.1; only structures that the device knows are chained.
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
         // SAFETY: as above.
+        let features = unsafe { vk_instance.get_physical_device_features(raw) };
+        // SAFETY: as above.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
@@ -182,8 +186,18 @@ impl PhysicalDevice {
             float_controls,
             float_controls_extension: reports_controls && !core_1_2,
             memory,
+            has_wide_integers: features.shader_int64 == vk::TRUE,
             info,
         }))
+    }
+
+    /// How its kernels are to read. A card brings the words of many lanes at once, and 128
+    /// bits of each.
+    pub(super) fn reads(&self) -> Reads {
+        match self.info.kind {
+            DeviceKind::Cpu if self.has_wide_integers => Reads::Wide,
+            _ => Reads::Narrow,
+        }
     }
 
     /// Whether its queue can take time stamps.

@@ -15,8 +15,8 @@ use crate::spirv;
 /// A shader that the build compiled: its name and its words.
 pub(super) type Shader = (&'static str, &'static [u8]);
 
-/// All of them: the canary, then the kernels, by form, clock and encoding, then those of
-/// poses.
+/// All of them: the canary, then the kernels, by reads, form, clock and encoding, then those
+/// of poses, then those from keys, by reads.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// Every kernel that a Vulkan device may be given: its name and its SPIR-V, words with the
@@ -36,9 +36,19 @@ pub(super) enum Clock {
     Times,
 }
 
-/// Kernels that there are.
+/// How a kernel reads its buffers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reads {
+    /// As they are declared.
+    Narrow,
+    /// 64 bits at once: the device has such integers, and brings every lane's words one by
+    /// one.
+    Wide,
+}
+
+/// Kernels that there are, with either reads.
 pub(super) const KERNELS: usize = 32;
-const _: () = assert!(SHADERS.len() == 1 + KERNELS + POSES + SAMPLED);
+const _: () = assert!(SHADERS.len() == 1 + 2 * KERNELS + POSES + 2 * SAMPLED);
 
 /// Kernels over poses that are already there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +63,7 @@ pub(crate) enum PoseKernel {
 pub(super) const POSES: usize = 4;
 
 pub(super) fn pose_shader(kernel: PoseKernel) -> Shader {
-    SHADERS[1 + KERNELS + kernel as usize]
+    SHADERS[1 + 2 * KERNELS + kernel as usize]
 }
 
 /// Kernels from keys to samples.
@@ -64,12 +74,13 @@ pub(super) enum SampledKernel {
     Cubics,
 }
 
-/// How many of them there are.
+/// How many of them there are, with either reads.
 pub(super) const SAMPLED: usize = 3;
 
 impl SampledKernel {
-    pub(super) fn shader(self) -> Shader {
-        SHADERS[1 + KERNELS + POSES + self as usize]
+    pub(super) fn shader(self, reads: Reads) -> Shader {
+        let first = 1 + 2 * KERNELS + POSES + SAMPLED * reads as usize;
+        SHADERS[first + self as usize]
     }
 
     /// Number of storage buffers that it binds.
@@ -81,8 +92,13 @@ impl SampledKernel {
     }
 }
 
-/// A kernel, and its place among all.
-pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, usize) {
+/// A kernel, and its place among all with the same reads.
+pub(super) fn kernel(
+    reads: Reads,
+    form: Form,
+    clock: Clock,
+    encoding: Encoding,
+) -> (Shader, usize) {
     let form = match form {
         Form::Arc => 0,
         Form::Polynomial => 1,
@@ -102,7 +118,7 @@ pub(super) fn kernel(form: Form, clock: Clock, encoding: Encoding) -> (Shader, u
         Encoding::Vector => 7,
     };
     let place = (form * 2 + clock) * 8 + encoding;
-    (SHADERS[1 + place], place)
+    (SHADERS[1 + KERNELS * reads as usize + place], place)
 }
 
 /// Number of storage buffers that `kernel.wgsl` binds.

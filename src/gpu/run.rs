@@ -241,7 +241,7 @@ impl VulkanEngine {
             .pipelines
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let (shader, place) = kernel(form, clock, encoding);
+        let (shader, place) = kernel(self.device.reads, form, clock, encoding);
         let place = &mut all[place];
         if let Some(pipeline) = place {
             return Ok(Arc::clone(pipeline));

@@ -107,7 +107,7 @@ impl VulkanEngine {
             return Ok(Arc::clone(pipeline));
         }
         let exactness = Exactness::Demanded;
-        let (shader, bindings) = (kernel.shader(), kernel.bindings());
+        let (shader, bindings) = (kernel.shader(self.device.reads), kernel.bindings());
         let pipeline = Pipeline::new(&self.device, shader, bindings, exactness)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
     }

@@ -1,0 +1,5 @@
+// `Segment` of `evaluate_arc`, 64 bits at once.
+
+fn segment_at(place: u32) -> Segment {
+    return Segment(quad(segments[2u * place]), quad(segments[2u * place + 1u]));
+}
