@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> items: array<array<u64, 3>>;
 
 fn constant_at(place: u32) -> vec4f {
-    return quad(constants[place]);
+    return quad_f32(constants[place]);
 }
 
 fn item_at(place: u32) -> Item {

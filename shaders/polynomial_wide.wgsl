@@ -3,16 +3,16 @@
 fn segment_at(place: u32) -> Segment {
     let first = 11u * place;
     return Segment(array(
-        quad(segments[first]),
-        quad(segments[first + 1u]),
-        quad(segments[first + 2u]),
-        quad(segments[first + 3u]),
-        quad(segments[first + 4u]),
-        quad(segments[first + 5u]),
-        quad(segments[first + 6u]),
-        quad(segments[first + 7u]),
-        quad(segments[first + 8u]),
-        quad(segments[first + 9u]),
-        quad(segments[first + 10u]),
+        quad_f32(segments[first]),
+        quad_f32(segments[first + 1u]),
+        quad_f32(segments[first + 2u]),
+        quad_f32(segments[first + 3u]),
+        quad_f32(segments[first + 4u]),
+        quad_f32(segments[first + 5u]),
+        quad_f32(segments[first + 6u]),
+        quad_f32(segments[first + 7u]),
+        quad_f32(segments[first + 8u]),
+        quad_f32(segments[first + 9u]),
+        quad_f32(segments[first + 10u]),
     ));
 }

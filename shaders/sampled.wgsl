@@ -20,10 +20,11 @@ struct Rows {
 
 const ROWS_WORKGROUP: u32 = 64;
 const HELD: u32 = 0x80000000;
+// In a key's x: those before it turn its sign. No component is as large as 2, which is what
+// this bit says of a float.
+const TURNED: u32 = 0x40000000;
 
-// A bit for each key: whether those before it turn its sign.
-@group(0) @binding(1) var<storage, read> signs: array<u32>;
-@group(0) @binding(3) var<storage, read_write> rotations: array<vec4f>;
+@group(0) @binding(2) var<storage, read_write> rotations: array<vec4f>;
 
 var<immediate> rows: Rows;
 
@@ -36,13 +37,16 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let key = invocation.y * rows.keys + (sample.key & ~HELD);
     let place = invocation.y * rows.samples + invocation.x;
     if (sample.key & HELD) != 0u {
-        rotations[place] = key_at(key);
+        let stored = key_at(key) & vec4u(~TURNED, vec3u(~0u));
+        rotations[place] = bitcast<vec4f>(stored);
         return;
     }
     rotations[place] = canonical(between(key, sample));
 }
 
 fn signed(key: u32) -> vec4f {
-    let sign = (signs[key / 32u] >> (key % 32u)) << 31u;
-    return bitcast<vec4f>(bitcast<vec4u>(key_at(key)) ^ vec4u(sign));
+    let stored = key_at(key);
+    let turned = stored.x & TURNED;
+    let sign = turned << 1u;
+    return bitcast<vec4f>(stored ^ vec4u(turned | sign, vec3u(sign)));
 }

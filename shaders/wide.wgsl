@@ -8,6 +8,10 @@ fn high(pair: u64) -> u32 {
     return u32(pair >> 32u);
 }
 
-fn quad(pairs: vec2<u64>) -> vec4f {
-    return bitcast<vec4f>(vec4u(low(pairs.x), high(pairs.x), low(pairs.y), high(pairs.y)));
+fn quad(pairs: vec2<u64>) -> vec4u {
+    return vec4u(low(pairs.x), high(pairs.x), low(pairs.y), high(pairs.y));
+}
+
+fn quad_f32(pairs: vec2<u64>) -> vec4f {
+    return bitcast<vec4f>(quad(pairs));
 }

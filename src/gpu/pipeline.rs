@@ -86,8 +86,8 @@ impl SampledKernel {
     /// Number of storage buffers that it binds.
     pub(super) fn bindings(self) -> u32 {
         match self {
-            Self::Arcs | Self::Pairs => 4,
-            Self::Cubics => 5,
+            Self::Arcs | Self::Pairs => 3,
+            Self::Cubics => 4,
         }
     }
 }

@@ -23,7 +23,6 @@ use crate::segment::shader::ROWS_WORKGROUP;
 pub(super) struct KeySlot {
     submission: Submission,
     keys: Option<Buffer>,
-    signs: Option<Buffer>,
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
     joints: Option<Buffer>,
@@ -118,7 +117,6 @@ impl KeySlot {
         Ok(Self {
             submission: Submission::new(device)?,
             keys: None,
-            signs: None,
             samples: None,
             rotations: None,
             joints: None,
@@ -134,24 +132,16 @@ impl KeySlot {
         pipeline: &Pipeline,
         piece: &KeyPiece<'_, '_>,
     ) -> Result<(), Error> {
-        let [
-            key_bytes,
-            sign_bytes,
-            sample_bytes,
-            rotation_bytes,
-            joint_bytes,
-        ] = piece.bytes();
+        let [key_bytes, sample_bytes, rotation_bytes, joint_bytes] = piece.bytes();
         let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
             Slot::grow(device, buffer, bytes as u64, residence)
         };
         room(&mut self.keys, key_bytes, Residence::Upload)?;
-        room(&mut self.signs, sign_bytes, Residence::Upload)?;
         room(&mut self.samples, sample_bytes, Residence::Upload)?;
         room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
         room(&mut self.joints, joint_bytes.max(1), Residence::Upload)?;
-        let (Some(keys), Some(signs), Some(samples), Some(rotations), Some(joints)) = (
+        let (Some(keys), Some(samples), Some(rotations), Some(joints)) = (
             &mut self.keys,
-            &mut self.signs,
             &mut self.samples,
             &self.rotations,
             &mut self.joints,
@@ -160,13 +150,11 @@ impl KeySlot {
         };
         piece.write(
             bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes)),
-            bytemuck::cast_slice_mut(signs.bytes_mut(0..sign_bytes)),
             bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
             bytemuck::cast_slice_mut(joints.bytes_mut(0..joint_bytes)),
         )?;
         let bindings = [
             Binding::whole(keys),
-            Binding::whole(signs),
             Binding::whole(samples),
             Binding::whole(rotations),
             Binding::whole(joints),

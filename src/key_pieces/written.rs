@@ -1,4 +1,4 @@
-//! What a kernel reads of a piece: its keys, their signs, where the samples lie, and joints.
+//! What a kernel reads of a piece: its keys with their signs, where the samples lie, and joints.
 
 use glam::Quat;
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use crate::frame_clock::FrameClock;
 use crate::joints::TrackJoints;
 use crate::plan::{FramePlan, Stretch, time_sample};
 use crate::prepare::flip;
-use crate::segment::shader::HELD;
+use crate::segment::shader::{HELD, TURNED};
 use crate::segment::{Joint, Rows, Sample};
 
 impl KeyPiece<'_, '_> {
@@ -30,15 +30,14 @@ impl KeyPiece<'_, '_> {
         self.samples * self.rows
     }
 
-    /// Bytes of its keys, their signs, the samples, the rotations and the joints.
-    pub(crate) fn bytes(&self) -> [usize; 5] {
+    /// Bytes of its keys, the samples, the rotations and the joints.
+    pub(crate) fn bytes(&self) -> [usize; 4] {
         let joints = match self.job.joints() {
             Some(_) => self.keys / self.rows,
             None => 0,
         };
         [
             self.keys * size_of::<Quat>(),
-            self.keys.div_ceil(32) * size_of::<u32>(),
             self.samples * size_of::<Sample>(),
             self.rotation_count() * size_of::<Quat>(),
             joints * size_of::<Joint>(),
@@ -48,8 +47,7 @@ impl KeyPiece<'_, '_> {
     /// Writes what the kernel reads.
     pub(crate) fn write(
         &self,
-        mut keys: &mut [[f32; 4]],
-        signs: &mut [u32],
+        mut keys: &mut [[u32; 4]],
         mut samples: &mut [Sample],
         mut joints: &mut [Joint],
     ) -> Result<(), FramesError> {
@@ -70,7 +68,6 @@ impl KeyPiece<'_, '_> {
                 samples: own_samples,
                 joints: own_joints,
                 next_key: first_key,
-                turned: Vec::new(),
             };
             places.push((task, written));
             first_key += task.keys;
@@ -83,9 +80,9 @@ impl KeyPiece<'_, '_> {
                 rule.map(|rule| TrackJoints::new(rule, ends)),
             )
         };
-        let turned: Vec<Vec<usize>> = places
+        places
             .into_par_iter()
-            .map_init(new, |known, (task, mut written)| {
+            .try_for_each_init(new, |known, (task, mut written)| {
                 match &task.what {
                     What::Part(part) => self.write_part(part, known, &mut written)?,
                     What::Tracks(tracks) => {
@@ -94,14 +91,8 @@ impl KeyPiece<'_, '_> {
                         }
                     }
                 }
-                Ok(written.turned)
+                Ok(())
             })
-            .collect::<Result<_, FramesError>>()?;
-        signs.fill(0);
-        for key in turned.into_iter().flatten() {
-            signs[key / 32] |= 1 << (key % 32);
-        }
-        Ok(())
     }
 
     fn write_part<'p>(
@@ -111,12 +102,11 @@ impl KeyPiece<'_, '_> {
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
         let first_key = written.next_key;
-        let keys: &[[f32; 4]] = bytemuck::cast_slice(part.stretch.keys);
+        let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
         let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
         own.copy_from_slice(keys);
+        turned(&part.stretch, part.sign, |key| own[key][0] |= TURNED);
         written.keys = others;
-        let turn = |key| written.turned.push(first_key + key);
-        turned(&part.stretch, part.sign, turn);
         if !written.samples.is_empty() {
             let all = std::mem::take(&mut written.samples);
             let (own, others) = all.split_at_mut(part.window.len());
@@ -179,13 +169,11 @@ impl KeyPiece<'_, '_> {
 
 /// What a thread has still to write, and what it has found.
 struct Written<'w> {
-    keys: &'w mut [[f32; 4]],
+    keys: &'w mut [[u32; 4]],
     samples: &'w mut [Sample],
     joints: &'w mut [Joint],
     /// The place of the next key among the piece's.
     next_key: usize,
-    /// Keys whose sign is turned.
-    turned: Vec<usize>,
 }
 
 /// Calls `turn` for each key whose sign those before it turn, where the first one's is
