@@ -16,9 +16,13 @@ struct Rows {
     // Samples, and keys, of each row.
     samples: u32,
     keys: u32,
+    // How many rows.
+    count: u32,
 }
 
 const ROWS_WORKGROUP: u32 = 64;
+// Rows of one invocation.
+const ROWS_EACH: u32 = 4;
 const HELD: u32 = 0x80000000;
 // In a key's x: those before it turn its sign. No component is as large as 2, which is what
 // this bit says of a float.
@@ -34,14 +38,23 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
         return;
     }
     let sample = sample_at(invocation.x);
-    let key = invocation.y * rows.keys + (sample.key & ~HELD);
-    let place = invocation.y * rows.samples + invocation.x;
-    if (sample.key & HELD) != 0u {
-        let stored = key_at(key) & vec4u(~TURNED, vec3u(~0u));
-        rotations[place] = bitcast<vec4f>(stored);
-        return;
+    let known = known_of(sample);
+    let row = invocation.y * ROWS_EACH;
+    let count = select(ROWS_EACH, rows.count - row, rows.count < row + ROWS_EACH);
+    let keys = rows.keys;
+    let samples = rows.samples;
+    var key = row * keys + (sample.key & ~HELD);
+    var place = row * samples + invocation.x;
+    for (var j = 0u; j < count; j++) {
+        if (sample.key & HELD) != 0u {
+            let stored = key_at(key) & vec4u(~TURNED, vec3u(~0u));
+            rotations[place] = bitcast<vec4f>(stored);
+        } else {
+            rotations[place] = canonical(between(key, known));
+        }
+        key += keys;
+        place += samples;
     }
-    rotations[place] = canonical(between(key, sample));
 }
 
 fn signed(key: u32) -> vec4f {

@@ -2,10 +2,19 @@
 // `evaluate_arc`, `sine_cosine` and `canonical`.
 // Twin: src/cpu/sample_lanes.rs.
 
-fn between(key: u32, sample: Sample) -> vec4f {
+// What is the same for all rows.
+struct Known {
+    parameter: f32,
+}
+
+fn known_of(sample: Sample) -> Known {
+    return Known(sample.parameter);
+}
+
+fn between(key: u32, known: Known) -> vec4f {
     let c = steady(arc(signed(key), signed(key + 1u)));
     // As `evaluate_polynomial`.
-    let s = sample.parameter;
+    let s = known.parameter;
     let z = s * s;
     let even_high = ((c[10] * z + c[8]) * z + c[6]) * z + c[4];
     let odd_high = ((c[9] * z + c[7]) * z + c[5]) * z + c[3];

@@ -83,6 +83,7 @@ pub(crate) struct Joint {
 pub(crate) struct Rows {
     pub(crate) samples: u32,
     pub(crate) keys: u32,
+    pub(crate) count: u32,
 }
 
 /// `Link` of `pose_world.wgsl`.
@@ -174,7 +175,13 @@ assert_layout!(
     outgoing = JOINT_OUTGOING,
     kind = JOINT_KIND
 );
-assert_layout!(Rows, ROWS_SIZE, samples = ROWS_SAMPLES, keys = ROWS_KEYS);
+assert_layout!(
+    Rows,
+    ROWS_SIZE,
+    samples = ROWS_SAMPLES,
+    keys = ROWS_KEYS,
+    count = ROWS_COUNT
+);
 assert_layout!(
     Link,
     LINK_SIZE,

@@ -16,7 +16,7 @@ use super::submission::{Access, Binding, Submission};
 use crate::cpu::Straight;
 use crate::engine::Error;
 use crate::key_pieces::{KeyJob, KeyPiece};
-use crate::segment::shader::ROWS_WORKGROUP;
+use crate::segment::shader::{ROWS_EACH, ROWS_WORKGROUP};
 
 /// What one piece in flight needs; the submission comes first, so that it is waited for
 /// before its buffers go.
@@ -163,7 +163,7 @@ impl KeySlot {
         let rows = piece.rows();
         let groups = [
             rows.samples.div_ceil(ROWS_WORKGROUP),
-            piece.row_count() as u32,
+            rows.count.div_ceil(ROWS_EACH),
         ];
         self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         self.submission.begin(1)?;

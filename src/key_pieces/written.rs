@@ -18,11 +18,8 @@ impl KeyPiece<'_, '_> {
         Rows {
             samples: self.samples as u32,
             keys: (self.keys / self.rows) as u32,
+            count: self.rows as u32,
         }
-    }
-
-    pub(crate) fn row_count(&self) -> usize {
-        self.rows
     }
 
     /// Rotations that it becomes.
