@@ -15,9 +15,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 #[path = "src/spirv.rs"]
 mod spirv;
 
-/// How a kernel reads its buffers: as they are declared, or 64 bits at once. The name of
-/// the latter says so.
-const READS: [&str; 2] = ["narrow", "wide"];
+/// How a kernel reads: storage buffers, or texel buffers. The name of the latter says so.
+const READS: [&str; 2] = ["storage", "texels"];
 
 /// What the kernel is joined with: one of each, and its name is that of all three.
 const FORMS: [&str; 2] = ["arc", "polynomial"];
@@ -41,7 +40,7 @@ const ENCODINGS: [(&str, &[&str]); 8] = [
 const POSES: [&str; 4] = ["pose_blend", "pose_mix", "pose_add", "pose_world"];
 
 /// Kernels from keys to samples, each with the files that it needs beside its own, and with
-/// those that read, narrow or wide.
+/// those that read.
 const SAMPLED: [(&str, &[&str], &[&str]); 3] = [
     (
         "sampled_arcs",
@@ -79,8 +78,8 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
                     let mut files: Vec<_> =
                         own.iter().chain(needed).map(|&f| f.to_owned()).collect();
                     files.push(format!("kernel_{reads}"));
-                    if reads == "wide" {
-                        files.extend(["wide".to_owned(), format!("{form}_wide")]);
+                    if reads == "texels" {
+                        files.push(format!("{form}_texels"));
                     }
                     pipelines.push((named(&format!("{form}_{clock}_{encoding}"), reads), files));
                 }
@@ -104,9 +103,6 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
             let own = shared.iter().chain(needed).map(|&file| file.to_owned());
             let mut files: Vec<_> = own.collect();
             files.extend(read.iter().map(|read| format!("{read}_{reads}")));
-            if reads == "wide" {
-                files.push("wide".to_owned());
-            }
             pipelines.push((named(sampled, reads), files));
         }
     }
@@ -115,7 +111,7 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
 
 fn named(kernel: &str, reads: &str) -> String {
     match reads {
-        "wide" => format!("{kernel}_wide"),
+        "texels" => format!("{kernel}_texels"),
         _ => kernel.to_owned(),
     }
 }
@@ -157,8 +153,7 @@ fn read_shader(file: &str) -> String {
 }
 
 fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
-    let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
-    let info = Validator::new(ValidationFlags::all(), capabilities)
+    let info = Validator::new(ValidationFlags::all(), Capabilities::IMMEDIATES)
         .validate(module)
         .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
     let options = spv::Options {
@@ -170,6 +165,7 @@ fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
     };
     let words = spv::write_vec(module, &info, &options, None)
         .unwrap_or_else(|error| panic!("{name}: {error}"));
+    let words = spirv::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
     spirv::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 

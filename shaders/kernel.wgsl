@@ -1,6 +1,6 @@
-// The one entry point of every form. Joined with a form (`Segment`, `evaluate`), what it
-// reads (`segment_at`, `constant_at`, `item_at`), a `distance_from_middle`, a `store` and
-// `sine_cosine` by the build.
+// The one entry point of every form. Joined with a form (`Segment`, `evaluate`), with what
+// reads (`segment_at`, `constant_at`, `item_at`, `distance_at`), a `distance_from_middle`, a
+// `store` and `sine_cosine` by the build.
 
 // A run of samples of one track that lie in one segment, or hold one constant.
 struct Item {
@@ -31,8 +31,6 @@ struct Launch {
 const WORKGROUP: u32 = 64;
 const ITEM_SAMPLES: u32 = 16;
 const HOLD: u32 = 0x80000000;
-
-@group(0) @binding(3) var<storage, read> distances: array<f32>;
 
 var<immediate> launch: Launch;
 

@@ -96,6 +96,18 @@ pub enum Transfer {
     Staged,
 }
 
+/// How kernels of a Vulkan device read keys, segments and work lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reads {
+    /// Texel buffers on software devices that can, else storage buffers.
+    #[default]
+    Automatic,
+    /// Storage buffers.
+    StorageBuffers,
+    /// Texel buffers, where the device can hold in one what it may allocate at once.
+    TexelBuffers,
+}
+
 /// Choices for an [`Engine`](crate::Engine); none of them changes a bit of any result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -109,6 +121,8 @@ pub struct EngineOptions {
     pub vector_width: Option<VectorWidth>,
     /// How results come back from a Vulkan device.
     pub transfer: Transfer,
+    /// How a Vulkan device's kernels read.
+    pub reads: Reads,
     /// Use a device although its canaries fail: its bits may differ.
     pub allow_inexact: bool,
 }

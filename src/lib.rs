@@ -88,7 +88,7 @@ pub use clip::Clip;
 pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
 pub use cpu::{UnknownWidth, VectorWidth};
 pub use cycle::Outside;
-pub use device::{Device, EngineOptions, Timings, Transfer, VulkanDevice};
+pub use device::{Device, EngineOptions, Reads, Timings, Transfer, VulkanDevice};
 pub use encoding::{Encoding, MatrixOrder};
 pub use engine::{Engine, Error};
 pub use euler::{EulerSequence, UnknownSequence};

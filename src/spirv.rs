@@ -22,6 +22,9 @@ mod op {
     pub(super) const ENTRY_POINT: u16 = 15;
     pub(super) const EXECUTION_MODE: u16 = 16;
     pub(super) const CAPABILITY: u16 = 17;
+    pub(super) const TYPE_IMAGE: u16 = 25;
+    pub(super) const LOAD: u16 = 61;
+    pub(super) const IMAGE_FETCH: u16 = 95;
     pub(super) const TYPE_FLOAT: u16 = 22;
     pub(super) const EXECUTION_MODE_ID: u16 = 331;
     pub(super) const DECORATE: u16 = 71;
@@ -176,6 +179,42 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
         .map(|i| i.start)
         .ok_or(SpirvError::Incomplete)?;
     Ok([&module[..place], &additions, &module[place..]].concat())
+}
+
+/// Turns the textures of one dimension of a module into texel buffers, which are read the
+/// same way and as long as a buffer may be. WGSL has none.
+///
+/// # Errors
+/// A [`SpirvError`] for words that are no module.
+pub fn texel_buffers(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    const SAMPLED_1D: u32 = 43;
+    const SAMPLED_BUFFER: u32 = 46;
+    const BUFFER: u32 = 5; // a dimension
+    const FETCH_WORDS: usize = 5; // without the level of detail, which a buffer has not
+    let code = instructions(module)?;
+    let mut words = module[..HEADER_WORDS].to_vec();
+    // Types, and what was loaded of them.
+    let mut buffers = BTreeSet::new();
+    for instruction in &code {
+        let first = words.len();
+        words.extend_from_slice(instruction.words);
+        match (instruction.opcode, instruction.words) {
+            (op::CAPABILITY, [_, SAMPLED_1D]) => words[first + 1] = SAMPLED_BUFFER,
+            (op::TYPE_IMAGE, [_, id, _, 0, ..]) => {
+                words[first + 3] = BUFFER;
+                buffers.insert(*id);
+            }
+            (op::LOAD, [_, kind, id, ..]) if buffers.contains(kind) => {
+                buffers.insert(*id);
+            }
+            (op::IMAGE_FETCH, [_, _, _, image, _, ..]) if buffers.contains(image) => {
+                words.truncate(first + FETCH_WORDS);
+                words[first] = instruction_word(op::IMAGE_FETCH, FETCH_WORDS as u32);
+            }
+            _ => {}
+        }
+    }
+    Ok(words)
 }
 
 fn precedes_annotations(opcode: u16) -> bool {

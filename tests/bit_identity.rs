@@ -4,7 +4,9 @@
 mod support;
 
 use glam::{DQuat, DVec3, Quat};
-use support::{Random, first_difference, give_key_data, hostile_set, vulkan_devices};
+use support::{
+    Random, first_difference, give_key_data, hostile_set, vulkan_devices, vulkan_engines,
+};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, Rotations,
@@ -44,8 +46,7 @@ fn assert_same_bits(expected: &[Quat], found: &[Quat], what: &str) {
 #[test]
 fn fifty_million_hostile_rotations_have_the_same_bits() {
     let cpu = cpu();
-    for device in vulkan_devices() {
-        let vulkan = Engine::new(device).unwrap();
+    for vulkan in vulkan_engines(|_| {}) {
         let mut random = Random(1);
         let mut compared = 0;
         for seed in 0.. {
@@ -100,21 +101,20 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let set = hostile_set(5, 100);
     let frames = Frames::fps(25).between(-1.0, 20.0);
     let budgets = [None, Some(1), Some(10_000), Some(200_000), Some(5_000_000)];
-    for device in vulkan_devices() {
-        for method in METHODS {
-            let expected = cpu().evaluate(&set, method, &frames).unwrap();
-            for transfer in [Transfer::InPlace, Transfer::Staged] {
-                for memory in budgets {
-                    let engine = engine(&device, |options| {
-                        options.transfer = transfer;
-                        options.memory = memory;
-                    });
+    let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());
+    for transfer in [Transfer::InPlace, Transfer::Staged] {
+        for memory in budgets {
+            for engine in vulkan_engines(|options| {
+                options.transfer = transfer;
+                options.memory = memory;
+            }) {
+                for (method, expected) in METHODS.iter().zip(&expected) {
                     let what = format!("{method}, {transfer:?}, {memory:?} bytes");
-                    let found = engine.evaluate(&set, method, &frames).unwrap();
+                    let found = engine.evaluate(&set, *method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), &what);
                     let layout = Layout::FrameMajor;
-                    let transposed = engine.evaluate_as(&set, method, &frames, layout).unwrap();
-                    assert_transposed(&expected, &transposed);
+                    let transposed = engine.evaluate_as(&set, *method, &frames, layout).unwrap();
+                    assert_transposed(expected, &transposed);
                 }
             }
         }
@@ -158,15 +158,14 @@ fn arbitrary_times_have_the_same_bits() {
     sorted.sort_by(f64::total_cmp);
     let each: Vec<f64> = (0..200 * 50).map(|_| random.between(-3.0, 40.0)).collect();
     let requests = [Frames::at(times), Frames::at(sorted), Frames::at_each(each)];
-    for device in vulkan_devices() {
-        for (memory, transfer) in [
-            (None, Transfer::Automatic),
-            (Some(100_000), Transfer::Staged),
-        ] {
-            let vulkan = engine(&device, |options| {
-                options.memory = memory;
-                options.transfer = transfer;
-            });
+    for (memory, transfer) in [
+        (None, Transfer::Automatic),
+        (Some(100_000), Transfer::Staged),
+    ] {
+        for vulkan in vulkan_engines(|options| {
+            options.memory = memory;
+            options.transfer = transfer;
+        }) {
             for method in METHODS {
                 for frames in &requests {
                     let expected = cpu().evaluate(&set, method, frames).unwrap();
@@ -192,8 +191,7 @@ fn the_path_as_authored_has_the_same_bits() {
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(60);
-    for device in vulkan_devices() {
-        let vulkan = Engine::new(device).unwrap();
+    for vulkan in vulkan_engines(|_| {}) {
         for method in METHODS {
             let path = Path::AsAuthored;
             let interpolation = Interpolation {
@@ -220,8 +218,7 @@ fn closed_loops_have_the_same_bits() {
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(120);
-    for device in vulkan_devices() {
-        let vulkan = Engine::new(device).unwrap();
+    for vulkan in vulkan_engines(|_| {}) {
         for method in METHODS {
             let interpolation = Interpolation {
                 ends: Ends::Loop,
@@ -271,8 +268,7 @@ fn stretches_of_a_long_track_have_the_bits_of_the_whole() {
 #[test]
 fn reused_buffers_hold_nothing_of_older_results() {
     let set = hostile_set(3, 64);
-    for device in vulkan_devices() {
-        let vulkan = Engine::new(device).unwrap();
+    for vulkan in vulkan_engines(|_| {}) {
         let clip = vulkan.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
         let reference = cpu().upload(&set, method::BESSEL_OVERHAUSER).unwrap();
         for end in [30.0, 3.0, 20.0, 0.0, 29.0, 1.0] {
@@ -297,8 +293,7 @@ fn reused_buffers_hold_nothing_of_older_results() {
 fn several_threads_share_an_engine() {
     let set = hostile_set(31, 32);
     let frames = Frames::fps(60).between(0.0, 10.0);
-    for device in vulkan_devices() {
-        let vulkan = Engine::new(device).unwrap();
+    for vulkan in vulkan_engines(|_| {}) {
         let clip = vulkan.upload(&set, method::CATMULL_ROM).unwrap();
         let expected = cpu().evaluate(&set, method::CATMULL_ROM, &frames).unwrap();
         std::thread::scope(|scope| {
@@ -317,8 +312,7 @@ fn several_threads_share_an_engine() {
 #[test]
 fn nothing_to_evaluate_is_no_error() {
     let frames = Frames::fps(25);
-    for device in [vec![Device::Cpu], vulkan_devices()].concat() {
-        let engine = Engine::new(device).unwrap();
+    for engine in vulkan_engines(|_| {}).into_iter().chain([cpu()]) {
         for method in METHODS {
             let empty = engine.evaluate(&TrackSet::new(), method, &frames).unwrap();
             assert_eq!((empty.tracks(), empty.as_quats().len()), (0, 0));
@@ -527,8 +521,7 @@ fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
                 let expected = clip.evaluate(&frames).unwrap();
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
                 assert_everywhere(&expected, &set, method.into(), &frames);
-                for device in vulkan_devices() {
-                    let engine = engine(&device, |options| options.memory = Some(1 << 20));
+                for engine in vulkan_engines(|options| options.memory = Some(1 << 20)) {
                     let found = engine.evaluate(&set, method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
                 }
@@ -564,9 +557,8 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
         // A device with little memory gets the track in stretches, and those with many
         // samples in pieces.
-        for device in vulkan_devices() {
-            for memory in [None, Some(1 << 20)] {
-                let engine = engine(&device, |options| options.memory = memory);
+        for memory in [None, Some(1 << 20)] {
+            for engine in vulkan_engines(|options| options.memory = memory) {
                 let found = engine.evaluate(&set, slerp, &frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), &what);
             }
@@ -608,8 +600,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             // A device that has not the memory for the whole track.
-            for device in vulkan_devices() {
-                let engine = engine(&device, |options| options.memory = Some(2 << 20));
+            for engine in vulkan_engines(|options| options.memory = Some(2 << 20)) {
                 let found = engine.evaluate(&set, interpolation, frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -752,6 +743,10 @@ fn few_times_of_each_track_have_the_bits_of_many() {
         set.push("", &times, &keys).unwrap();
     }
     give_key_data(&mut set, 84);
+    let engines = vulkan_engines(|_| {})
+        .into_iter()
+        .chain([cpu()])
+        .collect::<Vec<_>>();
     for method in METHODS {
         for count in 1..=3 {
             let some = |copies: usize| -> Vec<f64> {
@@ -763,8 +758,8 @@ fn few_times_of_each_track_have_the_bits_of_many() {
             let of_track = |row: &[Quat]| row[..count].to_vec();
             let rows = many.as_quats().chunks(4 * count);
             let expected: Vec<Quat> = rows.flat_map(of_track).collect();
-            for device in vulkan_devices().into_iter().chain([Device::Cpu]) {
-                let clip = Engine::new(device).unwrap().upload(&set, method).unwrap();
+            for engine in &engines {
+                let clip = engine.upload(&set, method).unwrap();
                 let found = clip.evaluate(&Frames::at_each(some(1))).unwrap();
                 assert_same_bits(&expected, found.as_quats(), method.name);
             }
@@ -793,12 +788,9 @@ fn dense_sets_go_piece_by_piece() {
         let expected = expected.evaluate(&frames).unwrap();
         let on_cpu = cpu().evaluate(&set, method, &frames).unwrap();
         assert_same_bits(expected.as_quats(), on_cpu.as_quats(), method.name);
-        for device in vulkan_devices() {
-            let engine = Engine::new(device.clone()).unwrap();
+        let small = vulkan_engines(|options| options.memory = Some(2 << 20));
+        for engine in vulkan_engines(|_| {}).into_iter().chain(small) {
             let found = engine.evaluate(&set, method, &frames).unwrap();
-            assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
-            let small = self::engine(&device, |options| options.memory = Some(2 << 20));
-            let found = small.evaluate(&set, method, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             let layout = Layout::FrameMajor;
             let columns = engine.evaluate_as(&set, method, &frames, layout).unwrap();
@@ -811,12 +803,8 @@ fn dense_sets_go_piece_by_piece() {
         path: Path::AsAuthored,
         ..method::BESSEL_OVERHAUSER.into()
     };
-    for engine in vulkan_devices()
-        .into_iter()
-        .map(Engine::new)
-        .chain([Ok(cpu())])
-    {
-        let refused = engine.unwrap().evaluate(&set, as_authored, &frames);
+    for engine in vulkan_engines(|_| {}).into_iter().chain([cpu()]) {
+        let refused = engine.evaluate(&set, as_authored, &frames);
         let words = refused.unwrap_err().to_string();
         assert!(words.contains("track 990: keys 4 and 5"), "{words}");
     }

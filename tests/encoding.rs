@@ -3,10 +3,9 @@
 
 mod support;
 
-use support::{hostile_set, vulkan_devices};
+use support::{hostile_set, vulkan_engines};
 use tumble::{
-    Axes, Device, Encoding, Engine, EngineOptions, Error, Frames, Interpolation, Layout, Quantity,
-    method,
+    Axes, Device, Encoding, Engine, Error, Frames, Interpolation, Layout, Quantity, method,
 };
 
 #[test]
@@ -17,11 +16,10 @@ fn every_device_encodes_like_the_host() {
         .collect();
     let requests = [Frames::fps(60).between(-1.0, 25.0), Frames::at(explicit)];
     let cpu = Engine::new(Device::Cpu).unwrap();
-    for device in [vec![Device::Cpu], vulkan_devices()].concat() {
-        for memory in [None, Some(500_000)] {
-            let mut options = EngineOptions::default();
-            options.memory = memory;
-            let engine = Engine::with_options(device.clone(), &options).unwrap();
+    for memory in [None, Some(500_000)] {
+        let vulkan = vulkan_engines(|options| options.memory = memory);
+        for engine in vulkan.iter().chain([&cpu]) {
+            let device = engine.device_name();
             // Both forms, and nothing but constants.
             for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
                 let clip = engine.upload(&set, method).unwrap();

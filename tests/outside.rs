@@ -3,11 +3,11 @@
 mod support;
 
 use glam::{DQuat, DVec3, Quat};
-use support::{Random, first_difference, give_key_data, vulkan_devices};
+use support::{Random, first_difference, give_key_data, vulkan_engines};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Axes, Device, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside, Quantity,
-    Track, TrackSet, method,
+    Axes, Device, Engine, Frames, Interpolation, Layout, METHODS, Outside, Quantity, Track,
+    TrackSet, method,
 };
 
 const ALL: [Outside; 4] = [
@@ -167,14 +167,11 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                     None,
                     "{what}"
                 );
-                for device in vulkan_devices() {
-                    for memory in [None, Some(50_000)] {
-                        let mut options = EngineOptions::default();
-                        options.memory = memory;
-                        let engine = Engine::with_options(device.clone(), &options).unwrap();
+                for memory in [None, Some(50_000)] {
+                    for engine in vulkan_engines(|options| options.memory = memory) {
                         let found = engine.evaluate(&long, interpolation, &frames).unwrap();
                         let difference = first_difference(expected.as_quats(), found.as_quats());
-                        assert_eq!(difference, None, "{what}, {device:?}");
+                        assert_eq!(difference, None, "{what}, {}", engine.device_name());
                     }
                 }
             }

@@ -8,7 +8,7 @@ use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
 use tumble::spirv::{
-    FloatControls, SpirvError, float_controls, no_contraction, without_decorations,
+    FloatControls, SpirvError, float_controls, no_contraction, texel_buffers, without_decorations,
 };
 
 const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -189,9 +189,36 @@ fn controls_reach_every_entry_point() {
     }
 }
 
+/// A texture of one dimension is at most as long as a picture is wide.
+#[test]
+fn textures_of_one_dimension_become_texel_buffers() {
+    let module = compile(
+        "@group(0) @binding(0) var texels: texture_1d<u32>;
+         @group(0) @binding(1) var picture: texture_2d<u32>;
+         @group(0) @binding(2) var<storage, read_write> values: array<vec4u>;
+         @compute @workgroup_size(1) fn main(@builtin(global_invocation_id) at: vec3u) {
+             values[at.x] = textureLoad(texels, at.x, 0) + textureLoad(picture, at.xy, 0);
+         }",
+    );
+    let passed = texel_buffers(&module).unwrap();
+    validate("texels", "vulkan1.1", &passed);
+    // Dimension and whether it is an array; capabilities; what a fetch says of levels.
+    let all = instructions(&passed);
+    let of = |wanted: u16| all.iter().filter(move |(opcode, _)| *opcode == wanted);
+    let mut dimensions: Vec<u32> = of(25).map(|(_, operands)| operands[2]).collect();
+    dimensions.sort_unstable();
+    assert_eq!(dimensions, [1, 5]);
+    assert!(of(17).any(|(_, operands)| operands == &[46]));
+    assert!(of(17).all(|(_, operands)| operands != &[43]));
+    let fetches: Vec<usize> = of(95).map(|(_, operands)| operands.len()).collect();
+    assert_eq!(fetches.iter().filter(|&&length| length == 4).count(), 1);
+    assert_eq!(texel_buffers(&passed).unwrap(), passed);
+}
+
 #[test]
 fn what_is_no_module_is_refused() {
     assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv));
+    assert_eq!(texel_buffers(&[]), Err(SpirvError::NotSpirv));
     assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv));
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
     assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete));
@@ -228,6 +255,7 @@ proptest! {
         let _ = no_contraction(&module);
         let _ = float_controls(&module, ALL_CONTROLS);
         let _ = without_decorations(&module);
+        let _ = texel_buffers(&module);
     }
 
     /// A damaged shader is refused or stays a list of whole instructions.
@@ -239,6 +267,7 @@ proptest! {
             module[place] = value;
             let _ = no_contraction(&module);
             let _ = float_controls(&module, ALL_CONTROLS);
+            let _ = texel_buffers(&module);
         }
     }
 }

@@ -6,7 +6,7 @@ mod support;
 
 use support::{first_difference, hostile_set, vulkan_devices};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Skeleton, Transfer,
+    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Reads, Skeleton, Transfer,
     VulkanBuffer, VulkanError, method,
 };
 
@@ -49,9 +49,15 @@ fn the_validation_layer_has_nothing_to_say() {
         Frames::at(vec![0.5, 0.25, 7.0]),
     ];
     for device in devices {
-        for transfer in [Transfer::InPlace, Transfer::Staged] {
+        for (transfer, reads) in [
+            (Transfer::InPlace, Reads::StorageBuffers),
+            (Transfer::InPlace, Reads::TexelBuffers),
+            (Transfer::Staged, Reads::StorageBuffers),
+            (Transfer::Staged, Reads::TexelBuffers),
+        ] {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
+            options.reads = reads;
             options.memory = Some(1_000_000);
             let engine = Engine::with_options(device.clone(), &options).unwrap();
             // Constants alone, and both forms.

@@ -37,6 +37,8 @@ impl Residence {
 pub(super) struct Buffer {
     device: Arc<LogicalDevice>,
     pub(super) raw: vk::Buffer,
+    /// As texels of 16 bytes; null where no kernel reads it so.
+    pub(super) view: vk::BufferView,
     memory: vk::DeviceMemory,
     mapped: Option<NonNull<u8>>,
     size: u64,
@@ -57,17 +59,21 @@ impl Buffer {
         residence: Residence,
     ) -> Result<Self, VulkanError> {
         let size = size.max(16).next_multiple_of(16);
-        let info = vk::BufferCreateInfo::default().size(size).usage(
-            vk::BufferUsageFlags::STORAGE_BUFFER
-                | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::TRANSFER_DST,
-        );
+        let is_texels = device.reads_texels && residence != Residence::Readback;
+        let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        if is_texels {
+            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
+        }
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         // SAFETY: the device is alive, here and below; what is created is destroyed
         // in `drop`, also when a later step fails.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
         let mut buffer = Self {
             device: Arc::clone(device),
             raw,
+            view: vk::BufferView::null(),
             memory: vk::DeviceMemory::null(),
             mapped: None,
             size,
@@ -88,6 +94,16 @@ impl Buffer {
         // SAFETY: fresh memory of a type that the buffer allows.
         unsafe { device.raw.bind_buffer_memory(raw, buffer.memory, 0) }
             .named("vkBindBufferMemory")?;
+        if is_texels {
+            let info = vk::BufferViewCreateInfo::default()
+                .buffer(raw)
+                .format(vk::Format::R32G32B32A32_UINT)
+                .range(vk::WHOLE_SIZE);
+            // SAFETY: the buffer has memory, is made for this use and not longer than a
+            // view may be.
+            buffer.view = unsafe { device.raw.create_buffer_view(&info, None) }
+                .named("vkCreateBufferView")?;
+        }
         if residence != Residence::Device {
             let flags = vk::MemoryMapFlags::empty();
             // SAFETY: the memory is host-visible and not mapped yet.
@@ -141,6 +157,7 @@ impl Drop for Buffer {
             // work keeps its buffers until the fence is signalled. Freeing memory
             // unmaps it; null handles are allowed.
             unsafe {
+                self.device.raw.destroy_buffer_view(self.view, None);
                 self.device.raw.destroy_buffer(self.raw, None);
                 self.device.raw.free_memory(self.memory, None);
             }

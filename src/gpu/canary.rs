@@ -220,6 +220,7 @@ fn probes() -> Vec<Probe> {
 mod tests {
     use super::super::{list, physical::DeviceKind};
     use super::*;
+    use crate::device::Reads;
 
     /// A comparison that cannot fail proves nothing: without the decorations
     /// lavapipe folds `(a + b) - a`, and its canary must sing.
@@ -234,7 +235,7 @@ mod tests {
             eprintln!("NO LAVAPIPE: the negative control did not run");
             return;
         };
-        let device = LogicalDevice::new(lavapipe).unwrap();
+        let device = LogicalDevice::new(lavapipe, Reads::Automatic).unwrap();
         let differing = |exactness| {
             let reports = expressions(&device, exactness).unwrap();
             reports

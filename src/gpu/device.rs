@@ -8,14 +8,14 @@ use ash::{ext, khr, vk};
 
 use super::error::{Named, VulkanError};
 use super::physical::PhysicalDevice;
-use super::pipeline::Reads;
+use crate::device::Reads;
 
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(super) struct LogicalDevice {
     pub(super) raw: ash::Device,
     pub(super) physical: PhysicalDevice,
-    /// How its kernels read.
-    pub(super) reads: Reads,
+    /// Whether its kernels read texel buffers.
+    pub(super) reads_texels: bool,
     queue: Mutex<vk::Queue>,
     names: Option<ext::debug_utils::Device>,
     owned: bool,
@@ -24,7 +24,7 @@ pub(super) struct LogicalDevice {
 }
 
 impl LogicalDevice {
-    pub(super) fn new(physical: PhysicalDevice) -> Result<Arc<Self>, VulkanError> {
+    pub(super) fn new(physical: PhysicalDevice, reads: Reads) -> Result<Arc<Self>, VulkanError> {
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(physical.queue_family)
@@ -34,12 +34,9 @@ impl LogicalDevice {
             .then_some(khr::shader_float_controls::NAME.as_ptr())
             .into_iter()
             .collect();
-        let reads = physical.reads();
-        let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads == Reads::Wide);
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
-            .enabled_extension_names(&extensions)
-            .enabled_features(&features);
+            .enabled_extension_names(&extensions);
         let instance = &physical.instance.raw;
         // SAFETY: the physical device belongs to the instance and has this family.
         let raw =
@@ -49,14 +46,14 @@ impl LogicalDevice {
         Ok(Self::wrap(physical, raw, queue, reads, true))
     }
 
-    /// An application's device; it stays the application's to destroy, and may not have
-    /// been asked for wide integers.
+    /// An application's device; it stays the application's to destroy.
     pub(super) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
+        reads: Reads,
     ) -> Arc<Self> {
-        Self::wrap(physical, raw, queue, Reads::Narrow, false)
+        Self::wrap(physical, raw, queue, reads, false)
     }
 
     fn wrap(
@@ -73,8 +70,8 @@ impl LogicalDevice {
         let (queue, hung) = (Mutex::new(queue), AtomicBool::new(false));
         Arc::new(Self {
             raw,
+            reads_texels: physical.reads_texels(reads),
             physical,
-            reads,
             queue,
             names,
             owned,

@@ -95,7 +95,7 @@ impl VulkanEngine {
         physical: PhysicalDevice,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
-        let device = LogicalDevice::new(physical)?;
+        let device = LogicalDevice::new(physical, options.reads)?;
         Self::with_device(device, options)
     }
 

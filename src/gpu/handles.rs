@@ -144,7 +144,8 @@ impl VulkanEngine {
             // What the device could do was not asked for.
             physical.float_controls = FloatControls::default();
         }
-        let device = LogicalDevice::borrowed(physical, handles.device, handles.queue);
+        let device =
+            LogicalDevice::borrowed(physical, handles.device, handles.queue, options.reads);
         Self::with_device(device, options)
     }
 }

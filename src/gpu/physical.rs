@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::error::{Named, VulkanError};
 use super::instance::Instance;
-use super::pipeline::Reads;
+use crate::device::Reads;
 use crate::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
@@ -45,6 +45,9 @@ pub struct DeviceInfo {
     pub rounds_to_nearest_even: bool,
 }
 
+/// Bytes of a texel, where a kernel reads so.
+const TEXEL_BYTES: u64 = 16;
+
 /// Kinds of Vulkan devices, fastest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -75,7 +78,7 @@ pub(crate) struct PhysicalDevice {
     /// The extension must be enabled: the device is older than Vulkan 1.2.
     pub(super) float_controls_extension: bool,
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
-    has_wide_integers: bool,
+    max_texel_buffer_elements: u32,
     pub(crate) info: DeviceInfo,
 }
 
@@ -143,8 +146,6 @@ impl PhysicalDevice {
         // SAFETY: Vulkan 1.1; only structures that the device knows are chained.
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
         // SAFETY: as above.
-        let features = unsafe { vk_instance.get_physical_device_features(raw) };
-        // SAFETY: as above.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
@@ -186,17 +187,21 @@ impl PhysicalDevice {
             float_controls,
             float_controls_extension: reports_controls && !core_1_2,
             memory,
-            has_wide_integers: features.shader_int64 == vk::TRUE,
+            max_texel_buffer_elements: limits.max_texel_buffer_elements,
             info,
         }))
     }
 
-    /// How its kernels are to read. A card brings the words of many lanes at once, and 128
-    /// bits of each.
-    pub(super) fn reads(&self) -> Reads {
-        match self.info.kind {
-            DeviceKind::Cpu if self.has_wide_integers => Reads::Wide,
-            _ => Reads::Narrow,
+    /// Whether its kernels are to read texel buffers. Cards bring together what neighbouring
+    /// lanes ask for; lavapipe brings it lane by lane, and 32 bits of a storage buffer more
+    /// slowly than a texel of 128.
+    pub(super) fn reads_texels(&self, reads: Reads) -> bool {
+        let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
+        let can = longest >= self.info.max_memory_allocation_size;
+        match reads {
+            Reads::Automatic => can && self.info.kind == DeviceKind::Cpu,
+            Reads::StorageBuffers => false,
+            Reads::TexelBuffers => can,
         }
     }
 

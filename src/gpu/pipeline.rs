@@ -15,8 +15,8 @@ use crate::spirv;
 /// A shader that the build compiled: its name and its words.
 pub(super) type Shader = (&'static str, &'static [u8]);
 
-/// All of them: the canary, then the kernels, by reads, form, clock and encoding, then those
-/// of poses, then those from keys, by reads.
+/// All of them: the canary, then the kernels, from storage buffers and from texels, by form, clock and encoding, then those
+/// of poses, then those from keys, likewise.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// Every kernel that a Vulkan device may be given: its name and its SPIR-V, words with the
@@ -36,17 +36,36 @@ pub(super) enum Clock {
     Times,
 }
 
-/// How a kernel reads its buffers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reads {
-    /// As they are declared.
-    Narrow,
-    /// 64 bits at once: the device has such integers, and brings every lane's words one by
-    /// one.
-    Wide,
+/// What a kernel binds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bindings {
+    pub(super) count: u32,
+    /// A bit for each that is a texel buffer; the others are storage buffers.
+    pub(super) texels: u32,
 }
 
-/// Kernels that there are, with either reads.
+impl Bindings {
+    /// So many storage buffers.
+    pub(super) const fn storage(count: u32) -> Self {
+        Self { count, texels: 0 }
+    }
+
+    /// Of a kernel that reads `read` as texels, or not.
+    fn read(as_texels: bool, count: u32, read: u32) -> Self {
+        let texels = if as_texels { read } else { 0 };
+        Self { count, texels }
+    }
+
+    pub(super) fn kind(self, binding: u32) -> vk::DescriptorType {
+        if self.texels >> binding & 1 == 1 {
+            vk::DescriptorType::UNIFORM_TEXEL_BUFFER
+        } else {
+            vk::DescriptorType::STORAGE_BUFFER
+        }
+    }
+}
+
+/// Kernels that there are, from storage buffers or from texels.
 pub(super) const KERNELS: usize = 32;
 const _: () = assert!(SHADERS.len() == 1 + 2 * KERNELS + POSES + 2 * SAMPLED);
 
@@ -74,27 +93,27 @@ pub(super) enum SampledKernel {
     Cubics,
 }
 
-/// How many of them there are, with either reads.
+/// How many of them there are, from storage buffers or from texels.
 pub(super) const SAMPLED: usize = 3;
 
 impl SampledKernel {
-    pub(super) fn shader(self, reads: Reads) -> Shader {
-        let first = 1 + 2 * KERNELS + POSES + SAMPLED * reads as usize;
+    pub(super) fn shader(self, as_texels: bool) -> Shader {
+        let first = 1 + 2 * KERNELS + POSES + SAMPLED * usize::from(as_texels);
         SHADERS[first + self as usize]
     }
 
-    /// Number of storage buffers that it binds.
-    pub(super) fn bindings(self) -> u32 {
+    /// Keys, samples, rotations; and joints.
+    pub(super) fn bindings(self, as_texels: bool) -> Bindings {
         match self {
-            Self::Arcs | Self::Pairs => 3,
-            Self::Cubics => 4,
+            Self::Arcs | Self::Pairs => Bindings::read(as_texels, 3, 0b11),
+            Self::Cubics => Bindings::read(as_texels, 4, 0b1011),
         }
     }
 }
 
-/// A kernel, and its place among all with the same reads.
+/// A kernel, and its place among all that read in the same way.
 pub(super) fn kernel(
-    reads: Reads,
+    as_texels: bool,
     form: Form,
     clock: Clock,
     encoding: Encoding,
@@ -118,15 +137,20 @@ pub(super) fn kernel(
         Encoding::Vector => 7,
     };
     let place = (form * 2 + clock) * 8 + encoding;
-    (SHADERS[1 + KERNELS * reads as usize + place], place)
+    (SHADERS[1 + KERNELS * usize::from(as_texels) + place], place)
 }
 
-/// Number of storage buffers that `kernel.wgsl` binds.
-pub(super) const KERNEL_BINDINGS: u32 = 5;
-/// Number of storage buffers that a `pose_*.wgsl` binds: three inputs and the output.
-pub(super) const POSE_BINDINGS: u32 = 4;
-/// Number of storage buffers that `canary.wgsl` binds.
-pub(super) const CANARY_BINDINGS: u32 = 2;
+/// What `kernel.wgsl` binds: segments, constants, items, distances, and its output.
+pub(super) fn kernel_bindings(as_texels: bool) -> Bindings {
+    Bindings::read(as_texels, MOST_BINDINGS, 0b1111)
+}
+
+/// No kernel binds more.
+pub(super) const MOST_BINDINGS: u32 = 5;
+/// What a `pose_*.wgsl` binds: three inputs and the output.
+pub(super) const POSE_BINDINGS: Bindings = Bindings::storage(4);
+/// What `canary.wgsl` binds.
+pub(super) const CANARY_BINDINGS: Bindings = Bindings::storage(2);
 
 /// A compute pipeline with its layouts.
 pub(super) struct Pipeline {
@@ -134,16 +158,16 @@ pub(super) struct Pipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
     pub(super) set_layout: vk::DescriptorSetLayout,
-    pub(super) bindings: u32,
+    pub(super) bindings: Bindings,
     pub(super) has_run: AtomicBool,
 }
 
 impl Pipeline {
-    /// A pipeline whose set 0 binds `bindings` storage buffers.
+    /// A pipeline whose set 0 is that.
     pub(super) fn new(
         device: &Arc<LogicalDevice>,
         shader: Shader,
-        bindings: u32,
+        bindings: Bindings,
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
         let mut pipeline = Self {
@@ -154,11 +178,11 @@ impl Pipeline {
             bindings,
             has_run: AtomicBool::new(false),
         };
-        let list: Vec<_> = (0..bindings)
+        let list: Vec<_> = (0..bindings.count)
             .map(|binding| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .descriptor_type(bindings.kind(binding))
                     .descriptor_count(1)
                     .stage_flags(vk::ShaderStageFlags::COMPUTE)
             })

@@ -6,10 +6,12 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
+use ash::vk;
+
 use super::buffer::Residence;
 use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
 use super::error::VulkanError;
-use super::pipeline::{Clock, Exactness, KERNEL_BINDINGS, Pipeline, kernel};
+use super::pipeline::{Clock, Exactness, Pipeline, kernel, kernel_bindings};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding};
 use super::work_list::{WorkChunk, work};
@@ -153,16 +155,19 @@ impl VulkanEngine {
         let rotations = match (target, &slot.rotations) {
             (Target::Buffer(buffer), _) => Binding {
                 buffer: buffer.raw,
+                view: vk::BufferView::null(),
                 offset: aligned,
                 size,
             },
             (Target::External(buffer), _) => Binding {
                 buffer: buffer.raw,
+                view: vk::BufferView::null(),
                 offset: aligned,
                 size,
             },
             (Target::Slice(_), Some(buffer)) => Binding {
                 buffer: buffer.raw,
+                view: vk::BufferView::null(),
                 offset: 0,
                 size,
             },
@@ -241,13 +246,14 @@ impl VulkanEngine {
             .pipelines
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let (shader, place) = kernel(self.device.reads, form, clock, encoding);
+        let (shader, place) = kernel(self.device.reads_texels, form, clock, encoding);
         let place = &mut all[place];
         if let Some(pipeline) = place {
             return Ok(Arc::clone(pipeline));
         }
         let exactness = Exactness::Demanded;
-        let pipeline = Pipeline::new(&self.device, shader, KERNEL_BINDINGS, exactness)?;
+        let bindings = kernel_bindings(self.device.reads_texels);
+        let pipeline = Pipeline::new(&self.device, shader, bindings, exactness)?;
         Ok(Arc::clone(place.insert(Arc::new(pipeline))))
     }
 

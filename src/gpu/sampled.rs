@@ -106,7 +106,10 @@ impl VulkanEngine {
             return Ok(Arc::clone(pipeline));
         }
         let exactness = Exactness::Demanded;
-        let (shader, bindings) = (kernel.shader(self.device.reads), kernel.bindings());
+        let (shader, bindings) = (
+            kernel.shader(self.device.reads_texels),
+            kernel.bindings(self.device.reads_texels),
+        );
         let pipeline = Pipeline::new(&self.device, shader, bindings, exactness)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
     }
@@ -159,7 +162,7 @@ impl KeySlot {
             Binding::whole(rotations),
             Binding::whole(joints),
         ];
-        let bindings = &bindings[..pipeline.bindings as usize];
+        let bindings = &bindings[..pipeline.bindings.count as usize];
         let rows = piece.rows();
         let groups = [
             rows.samples.div_ceil(ROWS_WORKGROUP),

@@ -8,7 +8,7 @@ use ash::vk;
 use super::buffer::Buffer;
 use super::device::LogicalDevice;
 use super::error::{Named, VulkanError};
-use super::pipeline::Pipeline;
+use super::pipeline::{MOST_BINDINGS, Pipeline};
 
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
@@ -44,6 +44,8 @@ pub(super) struct Spent {
 #[derive(Clone, Copy)]
 pub(super) struct Binding {
     pub(super) buffer: vk::Buffer,
+    /// As texels, all of the buffer; where a kernel reads it so.
+    pub(super) view: vk::BufferView,
     pub(super) offset: u64,
     pub(super) size: u64,
 }
@@ -53,6 +55,7 @@ impl Binding {
     pub(super) fn whole(buffer: &Buffer) -> Self {
         Self {
             buffer: buffer.raw,
+            view: buffer.view,
             offset: 0,
             size: buffer.size(),
         }
@@ -106,9 +109,15 @@ impl Submission {
         debug_assert!(self.submitted.is_none());
         let raw = &self.device.raw;
         if sets > self.capacity {
-            let sizes = [vk::DescriptorPoolSize::default()
-                .ty(vk::DescriptorType::STORAGE_BUFFER)
-                .descriptor_count(sets * super::pipeline::KERNEL_BINDINGS)];
+            let sizes = [
+                vk::DescriptorType::STORAGE_BUFFER,
+                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            ]
+            .map(|kind| {
+                vk::DescriptorPoolSize::default()
+                    .ty(kind)
+                    .descriptor_count(sets * MOST_BINDINGS)
+            });
             let info = vk::DescriptorPoolCreateInfo::default()
                 .max_sets(sets)
                 .pool_sizes(&sizes);
@@ -151,7 +160,7 @@ impl Submission {
         constants: &[u8],
         groups: [u32; 2],
     ) -> Result<(), VulkanError> {
-        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
+        debug_assert_eq!(bindings.len(), pipeline.bindings.count as usize);
         let raw = &self.device.raw;
         let layouts = [pipeline.set_layout];
         let info = vk::DescriptorSetAllocateInfo::default()
@@ -169,14 +178,19 @@ impl Submission {
                     .range(binding.size)]
             })
             .collect();
+        let views: Vec<_> = bindings.iter().map(|binding| [binding.view]).collect();
         let writes: Vec<_> = (0..)
-            .zip(&infos)
-            .map(|(binding, info)| {
-                vk::WriteDescriptorSet::default()
+            .zip(infos.iter().zip(&views))
+            .map(|(binding, (info, view))| {
+                let kind = pipeline.bindings.kind(binding);
+                let write = vk::WriteDescriptorSet::default()
                     .dst_set(set)
                     .dst_binding(binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                    .buffer_info(info)
+                    .descriptor_type(kind);
+                match kind {
+                    vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(info),
+                    _ => write.texel_buffer_view(view),
+                }
             })
             .collect();
         let commands = self.commands;

@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Device, Tcb, TrackSet};
+use tumble::{Device, Engine, EngineOptions, Reads, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.
@@ -19,6 +19,19 @@ pub fn vulkan_devices() -> Vec<Device> {
         eprintln!("NO VULKAN DEVICE: this test compared nothing");
     }
     devices
+}
+
+/// Every Vulkan device, reading storage buffers and reading texel buffers.
+pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
+    let both = |device: Device| {
+        [Reads::StorageBuffers, Reads::TexelBuffers].map(|reads| {
+            let mut options = EngineOptions::default();
+            options.reads = reads;
+            change(&mut options);
+            Engine::with_options(device.clone(), &options).unwrap()
+        })
+    };
+    vulkan_devices().into_iter().flat_map(both).collect()
 }
 
 /// Mesa's software driver, by its manifest.
