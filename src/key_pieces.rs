@@ -148,8 +148,8 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
     /// The next piece, of about so many keys and so many samples at most.
     pub(crate) fn next(&mut self, most: usize) -> Result<Option<KeyPiece<'a, 'j>>, Error> {
         let job = self.job;
-        if let Some(long) = self.long.take() {
-            return Ok(Some(job.piece_of(self.part_of(long, most))));
+        if let Some(piece) = self.next_of_long(most) {
+            return Ok(Some(piece));
         }
         let samples = job.timeline.len();
         let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
@@ -173,7 +173,8 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
                     sample: 0,
                 };
                 self.next += 1;
-                return Ok(Some(job.piece_of(self.part_of(long, most))));
+                self.long = Some(long);
+                return Ok(self.next_of_long(most));
             }
             if rows == 0 {
                 first_times = own_times;
@@ -202,6 +203,29 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
             keys: all_keys,
             samples: tracks / rows * samples,
         }))
+    }
+
+    /// The next piece of a track that is more than a piece: parts for as many threads.
+    fn next_of_long(&mut self, most: usize) -> Option<KeyPiece<'a, 'j>> {
+        let mut piece = KeyPiece {
+            job: self.job,
+            tasks: Vec::new(),
+            rows: 1,
+            keys: 0,
+            samples: 0,
+        };
+        while let Some(long) = self.long.filter(|_| piece.keys.max(piece.samples) < most) {
+            let part = self.part_of(long, most.min(TASK_KEYS));
+            let (keys, samples) = (part.stretch.keys.len(), part.window.len());
+            piece.keys += keys;
+            piece.samples += samples;
+            piece.tasks.push(Task {
+                what: What::Part(part),
+                keys,
+                samples,
+            });
+        }
+        (!piece.tasks.is_empty()).then_some(piece)
     }
 
     /// A stretch of a track that is more than a piece, and what of it is left.
@@ -259,21 +283,6 @@ impl Task<'_> {
 }
 
 impl<'a> KeyJob<'a> {
-    fn piece_of<'j>(&'j self, part: Part<'a>) -> KeyPiece<'a, 'j> {
-        let (keys, samples) = (part.stretch.keys.len(), part.window.len());
-        KeyPiece {
-            job: self,
-            tasks: vec![Task {
-                what: What::Part(part),
-                keys,
-                samples,
-            }],
-            rows: 1,
-            keys,
-            samples,
-        }
-    }
-
     /// All of a track.
     fn track(&self, index: usize) -> Part<'a> {
         let (times, keys) = self.set.times_and_keys(index);

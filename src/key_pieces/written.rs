@@ -173,14 +173,19 @@ struct Written<'w> {
     next_key: usize,
 }
 
+/// So many keys are looked at one by one.
+const FEW: usize = 4;
+
 /// Calls `turn` for each key whose sign those before it turn, where the first one's is
 /// given; the sign of the last.
 pub(super) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
     let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-    let mut turns = Turns { keys, any: false };
-    in_lanes(&mut turns);
-    if !turns.any && first > 0.0 {
-        return first;
+    if keys.len() > FEW {
+        let mut turns = Turns { keys, any: false };
+        in_lanes(&mut turns);
+        if !turns.any && first > 0.0 {
+            return first;
+        }
     }
     let mut sign = first;
     for (i, key) in keys.iter().enumerate() {
