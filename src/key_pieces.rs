@@ -12,7 +12,7 @@ use crate::cpu::{CpuEngine, LEFT_OUT, Row, Straight, straight};
 use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::joints::Joints;
-use crate::method::{Interpolation, Path};
+use crate::method::{Ends, Interpolation, Path};
 use crate::plan::Stretch;
 use crate::rotations::Layout;
 use crate::tracks::TrackSet;
@@ -151,56 +151,60 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         if let Some(piece) = self.next_of_long(most) {
             return Ok(Some(piece));
         }
-        let samples = job.timeline.len();
+        let (set, samples, first) = (job.set, job.timeline.len(), self.next);
         let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
-        let mut tasks = Vec::new();
-        let mut first_times: &[f64] = &[];
-        let (mut alike, mut all_keys) = (in_frames, 0);
-        let (first, mut start, mut keys) = (self.next, self.next, 0);
-        while self.next < job.tracks.end {
-            let (own_times, own_keys) = job.set.times_and_keys(self.next);
-            let rows = self.next - first;
-            let is_full = all_keys + own_keys.len() > most || (rows + 1) * samples > most;
-            if is_full && rows > 0 {
-                break;
+        // The first track of `tracks` that is not among those with so many keys together.
+        let within = |tracks: Range<usize>, most: usize| {
+            let (mut low, mut high) = (tracks.start, tracks.end);
+            while low < high {
+                let middle = low.midpoint(high);
+                if set.keys_of(tracks.start..middle + 1) <= most {
+                    low = middle + 1;
+                } else {
+                    high = middle;
+                }
             }
-            job.interpolation.ends.check(own_keys, self.next)?;
-            if is_full && in_frames {
-                let long = Long {
-                    track: self.next,
-                    key: 0,
-                    sign: 1.0,
-                    sample: 0,
-                };
-                self.next += 1;
-                self.long = Some(long);
-                return Ok(self.next_of_long(most));
-            }
-            if rows == 0 {
-                first_times = own_times;
-            }
-            alike &= std::ptr::eq(first_times, own_times) && rows < ROWS;
-            self.next += 1;
-            all_keys += own_keys.len();
-            keys += own_keys.len();
-            if keys >= TASK_KEYS {
-                tasks.push(Task::new(start..self.next, keys, samples));
-                (start, keys) = (self.next, 0);
-            }
-        }
-        if keys > 0 {
-            tasks.push(Task::new(start..self.next, keys, samples));
-        }
-        let tracks = self.next - first;
-        if tracks == 0 {
+            low
+        };
+        let rows = most / samples.max(1);
+        let end = within(first..job.tracks.end, most).min(first.saturating_add(rows));
+        let is_long = end == first;
+        self.next = job.tracks.end.min(end.max(first + 1));
+        job.check(first..self.next)?;
+        if first == self.next {
             return Ok(None);
         }
+        if is_long && in_frames {
+            self.long = Some(Long {
+                track: first,
+                key: 0,
+                sign: 1.0,
+                sample: 0,
+            });
+            return Ok(self.next_of_long(most));
+        }
+        let mut tasks = Vec::new();
+        let mut start = first;
+        while start < self.next {
+            let end = within(start..self.next, TASK_KEYS).max(start + 1);
+            tasks.push(Task {
+                what: What::Tracks(start..end),
+                keys: set.keys_of(start..end),
+                samples: (end - start) * samples,
+            });
+            start = end;
+        }
+        let times = |track| set.times_and_keys(track).0;
+        let tracks = self.next - first;
+        let alike = in_frames
+            && tracks <= ROWS
+            && (first..self.next).all(|track| std::ptr::eq(times(first), times(track)));
         let rows = if alike { tracks } else { 1 };
         Ok(Some(KeyPiece {
             job,
             tasks,
             rows,
-            keys: all_keys,
+            keys: set.keys_of(first..self.next),
             samples: tracks / rows * samples,
         }))
     }
@@ -272,17 +276,18 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
     }
 }
 
-impl Task<'_> {
-    fn new(tracks: Range<usize>, keys: usize, samples: usize) -> Self {
-        Self {
-            samples: tracks.len() * samples,
-            what: What::Tracks(tracks),
-            keys,
-        }
-    }
-}
-
 impl<'a> KeyJob<'a> {
+    /// Refuses tracks that do not end as they must.
+    fn check(&self, tracks: Range<usize>) -> Result<(), Error> {
+        let ends = self.interpolation.ends;
+        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
+            for track in tracks {
+                ends.check(self.set.times_and_keys(track).1, track)?;
+            }
+        }
+        Ok(())
+    }
+
     /// All of a track.
     fn track(&self, index: usize) -> Part<'a> {
         let (times, keys) = self.set.times_and_keys(index);

@@ -241,6 +241,17 @@ impl TrackSet {
         (times, &self.keys[first_key..first_key + len])
     }
 
+    /// How many keys tracks that follow one another have: those of all lie one behind the
+    /// other.
+    pub(crate) fn keys_of(&self, tracks: Range<usize>) -> usize {
+        let first = |track: usize| {
+            self.tracks
+                .get(track)
+                .map_or(self.keys.len(), |t| t.first_key)
+        };
+        first(tracks.end) - first(tracks.start)
+    }
+
     /// Every track in order.
     #[must_use]
     pub fn tracks(&self) -> impl ExactSizeIterator<Item = Track<'_>> {

@@ -9,7 +9,7 @@ use crate::cpu::{Turns, in_lanes};
 use crate::frame_clock::FrameClock;
 use crate::joints::TrackJoints;
 use crate::plan::{FramePlan, Stretch, time_sample};
-use crate::prepare::flip;
+use crate::prepare::{flip, may_turn};
 use crate::segment::shader::{HELD, TURNED};
 use crate::segment::{Joint, Rows, Sample};
 
@@ -173,19 +173,23 @@ struct Written<'w> {
     next_key: usize,
 }
 
-/// So many keys are looked at one by one.
+/// To look at so many keys one by one takes no longer than to call what looks at lanes.
 const FEW: usize = 4;
 
 /// Calls `turn` for each key whose sign those before it turn, where the first one's is
 /// given; the sign of the last.
 pub(super) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
     let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-    if keys.len() > FEW {
+    let any = if keys.len() > FEW {
         let mut turns = Turns { keys, any: false };
         in_lanes(&mut turns);
-        if !turns.any && first > 0.0 {
-            return first;
-        }
+        turns.any
+    } else {
+        let mut pairs = keys.windows(2);
+        pairs.any(|pair| may_turn(pair[0], pair[1]))
+    };
+    if !any && first > 0.0 {
+        return first;
     }
     let mut sign = first;
     for (i, key) in keys.iter().enumerate() {

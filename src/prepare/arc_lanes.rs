@@ -134,6 +134,12 @@ pub(crate) fn flip(from: [f32; 4], to: [f32; 4]) -> f32 {
     }
 }
 
+/// Whether the second key's sign is turned, or in doubt.
+#[inline(always)]
+pub(crate) fn may_turn(from: [f32; 4], to: [f32; 4]) -> bool {
+    inner(from, to) <= IN_DOUBT
+}
+
 /// Whether the sign of any key after the first of some is turned, or in doubt.
 #[inline(always)]
 pub(crate) fn any_turns(keys: &[[f32; 4]]) -> bool {
@@ -141,7 +147,7 @@ pub(crate) fn any_turns(keys: &[[f32; 4]]) -> bool {
     let (from, to) = (&keys[..intervals], &keys[keys.len() - intervals..]);
     let mut turns = 0;
     for j in 0..intervals {
-        turns |= u32::from(inner(from[j], to[j]) <= IN_DOUBT);
+        turns |= u32::from(may_turn(from[j], to[j]));
     }
     turns != 0
 }
