@@ -38,28 +38,37 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
         return;
     }
     let sample = sample_at(invocation.x);
-    let known = known_of(sample);
+    let is_held = (sample.key & HELD) != 0u;
+    let first = sample.key & ~HELD;
+    // Behind the last key there is none.
+    let next = select(1u, 0u, is_held);
+    let known = known_of(first, first + next, sample.parameter);
     let row = invocation.y * ROWS_EACH;
     let count = select(ROWS_EACH, rows.count - row, rows.count < row + ROWS_EACH);
     let keys = rows.keys;
     let samples = rows.samples;
-    var key = row * keys + (sample.key & ~HELD);
+    var key = row * keys + first;
     var place = row * samples + invocation.x;
     for (var j = 0u; j < count; j++) {
-        if (sample.key & HELD) != 0u {
-            let stored = key_at(key) & vec4u(~TURNED, vec3u(~0u));
-            rotations[place] = bitcast<vec4f>(stored);
-        } else {
-            rotations[place] = canonical(between(key, known));
-        }
+        let stored = key_at(key);
+        let own = canonical(between(key, signed(stored), key + next, known));
+        rotations[place] = select(own, as_given(stored), is_held);
         key += keys;
         place += samples;
     }
 }
 
-fn signed(key: u32) -> vec4f {
-    let stored = key_at(key);
+fn as_given(stored: vec4u) -> vec4f {
+    return bitcast<vec4f>(vec4u(stored.x & ~TURNED, stored.yzw));
+}
+
+// In the sign that the keys before it give.
+fn signed(stored: vec4u) -> vec4f {
     let turned = stored.x & TURNED;
     let sign = turned << 1u;
     return bitcast<vec4f>(stored ^ vec4u(turned | sign, vec3u(sign)));
+}
+
+fn signed_at(key: u32) -> vec4f {
+    return signed(key_at(key));
 }

@@ -6,10 +6,10 @@ struct Known {
     parameter: f32,
 }
 
-fn known_of(sample: Sample) -> Known {
-    return Known(sample.parameter);
+fn known_of(first: u32, next: u32, parameter: f32) -> Known {
+    return Known(parameter);
 }
 
-fn between(key: u32, known: Known) -> vec4f {
-    return evaluate(arc(signed(key), signed(key + 1u)), known.parameter);
+fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
+    return evaluate(arc(start, signed_at(next)), known.parameter);
 }

@@ -8,18 +8,17 @@ struct Known {
     parameter: f32,
 }
 
-fn known_of(sample: Sample) -> Known {
-    let key = sample.key & ~HELD;
-    return Known(joint_at(key), joint_at(key + 1u), sample.parameter);
+fn known_of(first: u32, next: u32, parameter: f32) -> Known {
+    return Known(joint_at(first), joint_at(next), parameter);
 }
 
 // No rotation, 0, where the curve turns too much for `gentle`.
-fn between(key: u32, known: Known) -> vec4f {
+fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
     let first = known.first;
     let last = known.last;
-    let before = select(key, key - 1u, first.kind == INNER);
-    let after = select(key + 1u, key + 2u, last.kind == INNER);
-    let curve = gentle(signed(before), signed(key), signed(key + 1u), signed(after), first, last);
+    let before = signed_at(select(key, key - 1u, first.kind == INNER));
+    let after = signed_at(select(next, next + 1u, last.kind == INNER));
+    let curve = gentle(before, start, signed_at(next), after, first, last);
     // As `evaluate_polynomial`, whose other powers are 0.
     let s = known.parameter;
     let z = s * s;

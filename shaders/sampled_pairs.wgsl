@@ -7,12 +7,12 @@ struct Known {
     parameter: f32,
 }
 
-fn known_of(sample: Sample) -> Known {
-    return Known(sample.parameter);
+fn known_of(first: u32, next: u32, parameter: f32) -> Known {
+    return Known(parameter);
 }
 
-fn between(key: u32, known: Known) -> vec4f {
-    let c = steady(arc(signed(key), signed(key + 1u)));
+fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
+    let c = steady(arc(start, signed_at(next)));
     // As `evaluate_polynomial`.
     let s = known.parameter;
     let z = s * s;
