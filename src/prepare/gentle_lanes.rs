@@ -10,6 +10,9 @@ use crate::method::{Ends, Path};
 use crate::segment::shader::{INNER, LONGEST_STEP};
 use crate::segment::{Joint, PolynomialSegment};
 
+/// Lanes of the widest vectors.
+const VECTOR: usize = 16;
+
 /// The curves of a block's intervals.
 pub(super) struct GentleLanes {
     rule: Joints,
@@ -19,8 +22,10 @@ pub(super) struct GentleLanes {
     may_flip: bool,
     /// -1 where the sign of an interval's second key is turned.
     pub(super) flips: [f32; ROOM],
-    /// Whether both keys are near each other.
+    /// Whether the keys of the interval, and of both beside it, are near each other.
     near: [bool; ROOM],
+    /// Whole vectors of lanes, behind which no lane holds such a curve.
+    wanted: usize,
     /// Of the key that an interval starts with.
     joints: [Joint; ROOM],
     powers: [[[f32; 4]; ROOM]; 7],
@@ -37,6 +42,7 @@ impl GentleLanes {
             may_flip: path == Path::Shortest,
             flips: [1.0; ROOM],
             near: [false; ROOM],
+            wanted: 0,
             joints: [end; ROOM],
             powers: [[[0.0; 4]; ROOM]; 7],
             holds: [false; ROOM],
@@ -46,19 +52,24 @@ impl GentleLanes {
     /// Finds out which keys are near each other; whether any curve may turn little, and
     /// whether all do.
     pub(super) fn look(&mut self, intervals: &Intervals, stretches: &[Stretch]) -> (bool, bool) {
-        let mut chords = Chords {
+        in_lanes(&mut Chords {
             lanes: self,
             intervals,
-            any: false,
-        };
-        in_lanes(&mut chords);
-        if !chords.any {
-            self.holds = [false; ROOM];
-            return (false, false);
+        });
+        self.holds = [false; ROOM];
+        let (mut last, mut others) = (None, 0);
+        for lanes in stretches.iter().map(Stretch::lanes) {
+            let near = &self.near[lanes.clone()];
+            let place = near.iter().rposition(|&near| near);
+            last = place.map(|place| lanes.start + place).or(last);
+            others += near.iter().map(|&near| usize::from(!near)).sum::<usize>();
         }
-        let mut lanes = stretches.iter().flat_map(Stretch::lanes);
-        let all = lanes.all(|lane| lane > 0 && self.near[lane - 1..=lane + 1] == [true; 3]);
-        (true, all)
+        let Some(last) = last else {
+            return (false, false);
+        };
+        // A lane's curve is worked out one lane before it.
+        self.wanted = last.next_multiple_of(VECTOR);
+        (true, others == 0)
     }
 
     /// Prepares them; the signs of the intervals' first keys are known.
@@ -102,14 +113,12 @@ impl GentleLanes {
 struct Chords<'a> {
     lanes: &'a mut GentleLanes,
     intervals: &'a Intervals,
-    /// Whether three intervals in a row have keys near each other.
-    any: bool,
 }
 
 impl InLanes for Chords<'_> {
     #[inline(always)]
     fn run(&mut self) {
-        let (mut flips, mut near) = ([1.0; ROOM], [false; ROOM]);
+        let (mut flips, mut own, mut near) = ([1.0; ROOM], [false; ROOM], [false; ROOM]);
         let Intervals { from, to, .. } = self.intervals;
         let turned = if self.lanes.may_flip { -1.0 } else { 1.0 };
         for j in 0..self.intervals.whole32() {
@@ -119,13 +128,12 @@ impl InLanes for Chords<'_> {
             let (x, y) = (bx * flip - ax, by * flip - ay);
             let (z, w) = (bz * flip - az, bw * flip - aw);
             flips[j] = flip;
-            near[j] = x * x + y * y + z * z + w * w <= LONGEST_STEP;
+            own[j] = x * x + y * y + z * z + w * w <= LONGEST_STEP;
         }
-        let mut any = false;
-        for j in 2..LANES {
-            any |= near[j - 2] & near[j - 1] & near[j];
+        for j in 1..LANES {
+            near[j] = own[j - 1] & own[j] & own[j + 1];
         }
-        (self.lanes.flips, self.lanes.near, self.any) = (flips, near, any);
+        (self.lanes.flips, self.lanes.near) = (flips, near);
     }
 }
 
@@ -156,12 +164,17 @@ impl InLanes for Curves<'_> {
     fn run(&mut self) {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
-        let GentleLanes { flips, joints, .. } = &*self.lanes;
+        let GentleLanes {
+            flips,
+            joints,
+            wanted,
+            ..
+        } = &*self.lanes;
         let Intervals {
             from, to, signs, ..
         } = self.intervals;
         // The lane before each is context, at least.
-        for j in 0..self.intervals.whole32() {
+        for j in 0..*wanted.min(&LANES) {
             let own = signs[j + 1] as f32;
             let sign_before = own * flips[j];
             let sign_end = own * flips[j + 1];
