@@ -174,6 +174,7 @@ fallible! {
     vkCreateDevice(physical, info, allocator, out) creates;
     vkCreateDebugUtilsMessengerEXT(instance, info, allocator, out) creates;
     vkCreateBuffer(device, info, allocator, out) creates;
+    vkCreateBufferView(device, info, allocator, out) creates;
     vkBindBufferMemory(device, buffer, memory, offset) asks;
     vkMapMemory(device, memory, offset, size, flags, out) asks;
     vkCreateCommandPool(device, info, allocator, out) creates;
@@ -225,6 +226,7 @@ macro_rules! destroys {
 destroys! {
     vkDestroyDebugUtilsMessengerEXT of vkCreateDebugUtilsMessengerEXT;
     vkDestroyBuffer of vkCreateBuffer;
+    vkDestroyBufferView of vkCreateBufferView;
     vkDestroyCommandPool of vkCreateCommandPool;
     vkDestroyFence of vkCreateFence;
     vkDestroyQueryPool of vkCreateQueryPool;
