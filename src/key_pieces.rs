@@ -218,8 +218,13 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
             keys: 0,
             samples: 0,
         };
-        while let Some(long) = self.long.filter(|_| piece.keys.max(piece.samples) < most) {
-            let part = self.part_of(long, most.min(TASK_KEYS));
+        let each = most.min(TASK_KEYS);
+        while let Some(long) = self.long {
+            let is_full = piece.keys.max(piece.samples) + each > most;
+            if is_full && !piece.tasks.is_empty() {
+                break;
+            }
+            let part = self.part_of(long, each);
             let (keys, samples) = (part.stretch.keys.len(), part.window.len());
             piece.keys += keys;
             piece.samples += samples;

@@ -15,8 +15,9 @@ use crate::spirv;
 /// A shader that the build compiled: its name and its words.
 pub(super) type Shader = (&'static str, &'static [u8]);
 
-/// All of them: the canary, then the kernels, from storage buffers and from texels, by form, clock and encoding, then those
-/// of poses, then those from keys, likewise.
+/// All of them: the canary, then the kernels by form, clock and encoding, those that read
+/// storage buffers before those that read texels, then those of poses, then those from keys,
+/// likewise.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// Every kernel that a Vulkan device may be given: its name and its SPIR-V, words with the
