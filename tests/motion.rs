@@ -127,21 +127,23 @@ fn ends_move_as_they_are_told() {
 #[test]
 fn the_same_bits_on_every_device() {
     let cpu = Engine::new(Device::Cpu).unwrap();
-    for vulkan in vulkan_engines(|_| {}) {
-        for seed in 0..3 {
-            let set = hostile_set(seed, 128);
-            let frames = Frames::fps(30).between(-1.0, 20.0);
-            for method in METHODS {
-                for quantity in QUANTITIES {
-                    let interpolation = Interpolation {
-                        quantity,
-                        ..method.into()
-                    };
-                    let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
+    let engines = vulkan_engines(|_| {});
+    for seed in 0..3 {
+        let set = hostile_set(seed, 128);
+        let frames = Frames::fps(30).between(-1.0, 20.0);
+        for method in METHODS {
+            for quantity in QUANTITIES {
+                let interpolation = Interpolation {
+                    quantity,
+                    ..method.into()
+                };
+                let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
+                assert!(expected.as_quats().iter().all(|q| q.is_finite()));
+                // Each device reads in one way, and in the other the next time.
+                for vulkan in engines.iter().skip(seed as usize % 2).step_by(2) {
                     let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
                     let difference = first_difference(expected.as_quats(), found.as_quats());
                     assert_eq!(difference, None, "{method}, {quantity:?}, seed {seed}");
-                    assert!(expected.as_quats().iter().all(|q| q.is_finite()));
                 }
             }
         }
