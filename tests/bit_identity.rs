@@ -67,14 +67,13 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
                 let what = format!("{name}, {interpolation:?}, {rate} fps, seed {seed}");
                 assert_same_bits(expected.as_quats(), found.as_quats(), &what);
             }
-            // Each device has read them in two ways.
-            compared += 2 * expected.as_quats().len();
+            compared += expected.as_quats().len();
         }
         if compared >= 50_000_000 {
             break;
         }
     }
-    println!("{compared} rotations of each device, 0 differ");
+    println!("{compared} rotations of each device, read in either way, 0 differ");
 }
 
 /// Catches an instruction set whose code fuses or reorders.
@@ -108,6 +107,8 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());
     let ways = [
         (Transfer::InPlace, Reads::StorageBuffers),
+        (Transfer::Staged, Reads::StorageBuffers),
+        (Transfer::InPlace, Reads::TexelBuffers),
         (Transfer::Staged, Reads::TexelBuffers),
     ];
     for (transfer, reads) in ways {

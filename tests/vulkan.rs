@@ -51,6 +51,8 @@ fn the_validation_layer_has_nothing_to_say() {
     for device in devices {
         for (transfer, reads) in [
             (Transfer::InPlace, Reads::StorageBuffers),
+            (Transfer::Staged, Reads::StorageBuffers),
+            (Transfer::InPlace, Reads::TexelBuffers),
             (Transfer::Staged, Reads::TexelBuffers),
         ] {
             let mut options = EngineOptions::default();

@@ -6,8 +6,6 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
-use ash::vk;
-
 use super::buffer::Residence;
 use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
 use super::error::VulkanError;
@@ -153,24 +151,9 @@ impl VulkanEngine {
             (items, distances) = (own_items, own_distances);
         }
         let rotations = match (target, &slot.rotations) {
-            (Target::Buffer(buffer), _) => Binding {
-                buffer: buffer.raw,
-                view: vk::BufferView::null(),
-                offset: aligned,
-                size,
-            },
-            (Target::External(buffer), _) => Binding {
-                buffer: buffer.raw,
-                view: vk::BufferView::null(),
-                offset: aligned,
-                size,
-            },
-            (Target::Slice(_), Some(buffer)) => Binding {
-                buffer: buffer.raw,
-                view: vk::BufferView::null(),
-                offset: 0,
-                size,
-            },
+            (Target::Buffer(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
+            (Target::External(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
+            (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let pipeline = self.pipeline(clip.interpolation.form(), timeline, encoding)?;

@@ -51,6 +51,16 @@ pub(super) struct Binding {
 }
 
 impl Binding {
+    /// A stretch of a buffer that no kernel reads as texels.
+    pub(super) fn stretch(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
+        Self {
+            buffer,
+            view: vk::BufferView::null(),
+            offset,
+            size,
+        }
+    }
+
     /// All of a buffer.
     pub(super) fn whole(buffer: &Buffer) -> Self {
         Self {
