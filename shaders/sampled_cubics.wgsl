@@ -20,10 +20,10 @@ fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
     let after = signed_at(select(next, next + 1u, last.kind == INNER));
     let curve = gentle(before, start, signed_at(next), after, first, last);
     // As `evaluate_polynomial`, whose other powers are 0.
+    let c = curve.powers;
     let s = known.parameter;
     let z = s * s;
-    let even = ((curve.powers[6] * z + curve.powers[4]) * z + curve.powers[2]) * z
-        + curve.powers[0];
-    let odd = (curve.powers[5] * z + curve.powers[3]) * z + curve.powers[1];
-    return select(vec4f(0.0), odd * s + even, curve.holds);
+    let even = c[6] * (z * z) + (c[4] * z + c[2]);
+    let odd = c[5] * (z * z) + (c[3] * z + c[1]);
+    return select(vec4f(0.0), c[0] + (odd * s + even * z), curve.holds);
 }

@@ -16,7 +16,8 @@ fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
     // As `evaluate_polynomial`.
     let s = known.parameter;
     let z = s * s;
-    let even_high = ((c[10] * z + c[8]) * z + c[6]) * z + c[4];
-    let odd_high = ((c[9] * z + c[7]) * z + c[5]) * z + c[3];
-    return (odd_high * z + c[1]) * s + ((even_high * z + c[2]) * z + c[0]);
+    let zz = z * z;
+    let even = (c[10] * zz + (c[8] * z + c[6])) * zz + (c[4] * z + c[2]);
+    let odd = (c[9] * zz + (c[7] * z + c[5])) * zz + (c[3] * z + c[1]);
+    return c[0] + (odd * s + even * z);
 }

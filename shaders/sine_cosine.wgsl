@@ -40,9 +40,12 @@ const SHORT_COSINE_6: f32 = -0.00138873013202101;
 const SHORT_COSINE_8: f32 = 2.4430661142105237e-5;
 
 fn short_sine_and_fall(x: f32, z: f32) -> vec2f {
-    let sine_tail = (SHORT_SINE_7 * z + SHORT_SINE_5) * z + SHORT_SINE_3;
+    let zz = z * z;
+    let sine_low = SHORT_SINE_5 * z + SHORT_SINE_3;
+    let sine_tail = SHORT_SINE_7 * zz + sine_low;
     let sine = sine_tail * (z * x) + x;
-    let cosine_high = (SHORT_COSINE_8 * z + SHORT_COSINE_6) * z + SHORT_COSINE_4;
-    let fall = (cosine_high * z + SHORT_COSINE_2) * z;
+    let cosine_low = SHORT_COSINE_4 * z + SHORT_COSINE_2;
+    let cosine_high = SHORT_COSINE_8 * z + SHORT_COSINE_6;
+    let fall = (cosine_high * zz + cosine_low) * z;
     return vec2f(sine, fall);
 }

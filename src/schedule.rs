@@ -69,7 +69,6 @@ impl<F: FnMut(Run)> Emit for F {
 
 impl Prepared {
     /// The runs of one part within the samples of a cycle, in order.
-    #[inline(always)]
     pub(crate) fn runs(
         &self,
         part: &Part,
@@ -77,15 +76,28 @@ impl Prepared {
         cycle: &Cycle,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        let samples = cycle.samples.clone();
+        match &timeline.ticks {
+            Ticks::Frames { rate, start } if !cycle.is_own() => {
+                let clock = FrameClock::new(*rate, *start, part.end);
+                self.copy_runs(part, CopyClock::new(clock, cycle), cycle, emit)
+            }
+            _ => self.own_runs(part, timeline, cycle.samples.clone(), emit),
+        }
+    }
+
+    /// As [`Prepared::runs`], of the track itself and not of a copy.
+    #[inline(always)]
+    pub(crate) fn own_runs(
+        &self,
+        part: &Part,
+        timeline: &Timeline,
+        samples: Range<usize>,
+        emit: &mut impl Emit,
+    ) -> Result<(), FramesError> {
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
                 let clock = FrameClock::new(*rate, *start, part.end);
-                if cycle.is_own() {
-                    self.frame_runs(part, clock, samples, emit)
-                } else {
-                    self.copy_runs(part, CopyClock::new(clock, cycle), cycle, emit)
-                }
+                self.frame_runs(part, clock, samples, emit)
             }
             Ticks::Times { times, stride } => {
                 let own = &times[part.track as usize * stride..];

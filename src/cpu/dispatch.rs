@@ -3,8 +3,16 @@
 //! subtraction and multiplication are used, never a fused one.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+mod eight;
+
 use std::str::FromStr;
 use std::sync::OnceLock;
+
+use glam::Vec4;
+
+#[cfg(target_arch = "x86_64")]
+use eight::Eight;
 
 use super::evaluate::Evaluate;
 use super::row::row;
@@ -193,7 +201,9 @@ fn lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
 }
 
 fn baseline<S: Evaluate>() -> Kernel<S> {
-    Kernel { row: row::<S> }
+    Kernel {
+        row: row::<Vec4, S>,
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -210,7 +220,7 @@ macro_rules! compiled_for {
                 cycle: &Cycle,
                 output: &mut [[f32; 4]],
             ) -> Result<(), FramesError> {
-                super::row(part, segments, timeline, cycle, output)
+                super::row::<super::Eight, S>(part, segments, timeline, cycle, output)
             }
 
             #[target_feature(enable = $features)]

@@ -1,59 +1,13 @@
 //! Twin of `shaders/kernel.wgsl`: the samples of one run, in vector lanes.
 
+use super::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
-/// Samples are evaluated in multiples of this many: the lanes of the widest vector.
-pub(super) const BLOCK: usize = 16;
-
-/// So few samples are evaluated one by one: a block would be mostly waste.
+/// So few samples are evaluated one by one: a vector would be mostly waste.
 pub(super) const FEW: usize = 3;
-
-/// Samples whose components are kept before they are stored.
-pub(super) const CHUNK: usize = 4 * BLOCK;
-
-/// Room for the components of some samples, before they are put together.
-pub(crate) trait Room {
-    /// So many samples.
-    const SAMPLES: usize;
-
-    fn new() -> Self;
-
-    /// The components of the first `count` samples.
-    fn components(&mut self, count: usize) -> [&mut [f32]; 4];
-}
-
-/// Aligned to the widest vector: where one lies across two cache lines, everything takes
-/// a sixth longer.
-#[repr(align(64))]
-pub(crate) struct RoomFor<const SAMPLES: usize> {
-    components: [[f32; SAMPLES]; 4],
-}
-
-impl<const SAMPLES: usize> Room for RoomFor<SAMPLES> {
-    const SAMPLES: usize = SAMPLES;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Self {
-            components: [[0.0; SAMPLES]; 4],
-        }
-    }
-
-    #[inline(always)]
-    fn components(&mut self, count: usize) -> [&mut [f32]; 4] {
-        // Slices of one length: no bounds check is left to keep a loop scalar.
-        self.components
-            .each_mut()
-            .map(|component| &mut component[..count])
-    }
-}
 
 /// One form's formula.
 pub(crate) trait Evaluate {
-    /// Room for the components of the samples that are worked out before they are put
-    /// together.
-    type Room: Room;
-
     /// What is the same for all samples.
     #[inline(always)]
     fn constant(&self) -> f32 {
@@ -61,8 +15,17 @@ pub(crate) trait Evaluate {
     }
 
     /// The rotation at a parameter of the segment, `x y z w`.
-    fn evaluate(&self, constant: f32, parameter: f32) -> [f32; 4];
+    fn evaluate<N: Number>(&self, constant: N, parameter: N) -> [N; 4];
+
+    /// Whether [`canonical`] would change no component of any sample. Each is a sum `m + r`
+    /// with the segment's middle `m`. Where |m| >= 2^-40, either |r| < |m|/2, and the sum is
+    /// more than 2^-41; or both are multiples of 2^-64, and so is the sum, which is +0 where
+    /// they cancel. Where all of the component's constants are +0, it is +0.
+    fn is_canonical(&self) -> bool;
 }
+
+/// See [`Evaluate::is_canonical`].
+pub(super) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// How a run's parameter follows from the distance to the segment's middle.
 #[derive(Debug, Clone, Copy)]
@@ -71,34 +34,57 @@ pub(crate) struct Affine {
     pub(crate) offset: f32,
 }
 
-/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. What lies
-/// behind `count` may be overwritten up to the end of a block.
+/// Whether the distances of all frames of a run, and of those that fill its last vector, are
+/// whole numbers of f32, and so are their sums.
 #[inline(always)]
-pub(super) fn frames<S: Evaluate>(
+pub(super) fn are_exact(first: i32, count: usize) -> bool {
+    const EXACT: i64 = 1 << 24;
+    let last = i64::from(first) + (count + STEPS.len()) as i64;
+    i64::from(first) >= -EXACT && last <= EXACT
+}
+
+/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. What lies behind
+/// `count` may be overwritten up to the end of a vector. Distances [`are_exact`].
+#[inline(always)]
+pub(super) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     first: i32,
     count: usize,
-    room: &mut S::Room,
     output: &mut [[f32; 4]],
 ) {
-    // An integer converts with one rounding, like the shader's sum of two exact
-    // halves.
-    let distance = |j: u32| first.wrapping_add(j as i32) as f32;
-    run(segment, affine, count, distance, room, output);
+    let first = first as f32;
+    if count <= FEW {
+        for (j, rotation) in output[..count].iter_mut().enumerate() {
+            *rotation = one(segment, affine, first + j as f32);
+        }
+        return;
+    }
+    let next = L::all(first) + L::load(&STEPS);
+    let step = L::all(L::COUNT as f32);
+    run(segment, affine, count, Frames { next, step }, output);
 }
 
-/// Evaluates the samples whose distances from the middle are given.
+/// The distances of a vector's samples from its first.
+const STEPS: [f32; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// Evaluates the first `count` samples of those whose distances from the middle are given;
+/// behind `count` there are more, up to the end of a vector.
 #[inline(always)]
-pub(super) fn distances<S: Evaluate>(
+pub(super) fn distances<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     distances: &[f32],
-    room: &mut S::Room,
+    count: usize,
     output: &mut [[f32; 4]],
 ) {
-    let distance = |j: u32| distances[(j as usize).min(distances.len() - 1)];
-    run(segment, affine, distances.len(), distance, room, output);
+    if count <= FEW {
+        for (rotation, &distance) in output[..count].iter_mut().zip(distances) {
+            *rotation = one(segment, affine, distance);
+        }
+        return;
+    }
+    run::<L, S>(segment, affine, count, Listed(distances), output);
 }
 
 /// Evaluates the sample at a distance from the middle.
@@ -113,46 +99,97 @@ pub(super) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f
     ]
 }
 
-/// Components side by side, so that lanes run along samples and the compiler
-/// vectorises the whole formula. The number of samples is kept a variable on
-/// purpose: a constant one is unrolled first and then vectorised across the four
-/// components, at a quarter of the speed.
+/// The distances from the middle of a run's samples, a vector at a time.
+trait Distances<L> {
+    fn next(&mut self) -> L;
+}
+
+struct Frames<L> {
+    next: L,
+    step: L,
+}
+
+impl<L: Lanes> Distances<L> for Frames<L> {
+    #[inline(always)]
+    fn next(&mut self) -> L {
+        let own = self.next;
+        self.next = own + self.step;
+        own
+    }
+}
+
+struct Listed<'a>(&'a [f32]);
+
+impl<L: Lanes> Distances<L> for Listed<'_> {
+    #[inline(always)]
+    fn next(&mut self) -> L {
+        let (own, rest) = self.0.split_at(L::COUNT);
+        self.0 = rest;
+        L::load(own)
+    }
+}
+
 #[inline(always)]
-fn run<S: Evaluate>(
+fn run<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     count: usize,
-    distance: impl Fn(u32) -> f32,
-    room: &mut S::Room,
+    distances: impl Distances<L>,
     output: &mut [[f32; 4]],
 ) {
-    if count <= FEW {
-        for (j, rotation) in output[..count].iter_mut().enumerate() {
-            *rotation = one(segment, affine, distance(j as u32));
-        }
-        return;
+    if segment.is_canonical() {
+        vectors::<L, S, false>(segment, affine, count, distances, output);
+    } else {
+        vectors::<L, S, true>(segment, affine, count, distances, output);
     }
-    let constant = segment.constant();
-    for start in (0..count).step_by(S::Room::SAMPLES) {
-        let wanted = (count - start).min(S::Room::SAMPLES);
-        let whole = wanted.next_multiple_of(BLOCK);
-        let [x, y, z, w] = room.components(whole);
-        for j in 0..whole {
-            let parameter = distance(start as u32 + j as u32) * affine.scale + affine.offset;
-            let q = segment.evaluate(constant, parameter);
-            x[j] = canonical(q[0]);
-            y[j] = canonical(q[1]);
-            z[j] = canonical(q[2]);
-            w[j] = canonical(q[3]);
-        }
-        let rest = &mut output[start..];
-        let stored = if rest.len() < whole { wanted } else { whole };
-        let rotations = &mut rest[..stored];
-        let (x, y, z, w) = (&x[..stored], &y[..stored], &z[..stored], &w[..stored]);
-        for j in 0..stored {
-            rotations[j] = [x[j], y[j], z[j], w[j]];
-        }
+}
+
+/// Evaluated and put together a vector at a time.
+#[inline(always)]
+fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
+    segment: &S,
+    affine: Affine,
+    count: usize,
+    mut distances: impl Distances<L>,
+    output: &mut [[f32; 4]],
+) {
+    let constant = L::all(segment.constant());
+    let (scale, offset) = (L::all(affine.scale), L::all(affine.offset));
+    let whole = count.next_multiple_of(L::COUNT).min(output.len());
+    let mut vectors = output[..whole].chunks_exact_mut(L::COUNT);
+    for rotations in &mut vectors {
+        let parameter = distances.next() * scale + offset;
+        vector::<L, S, FILTER>(segment, constant, parameter, rotations);
     }
+    let rest = vectors.into_remainder();
+    if !rest.is_empty() {
+        let mut rotations = Rotations([[0.0; 4]; STEPS.len()]);
+        let parameter = distances.next() * scale + offset;
+        vector::<L, S, FILTER>(segment, constant, parameter, &mut rotations.0[..L::COUNT]);
+        rest.copy_from_slice(&rotations.0[..rest.len()]);
+    }
+}
+
+#[repr(align(64))]
+struct Rotations([[f32; 4]; STEPS.len()]);
+
+#[inline(always)]
+fn vector<L: Lanes, S: Evaluate, const FILTER: bool>(
+    segment: &S,
+    constant: L,
+    parameter: L,
+    rotations: &mut [[f32; 4]],
+) {
+    let mut q = segment.evaluate(constant, parameter);
+    if FILTER {
+        q = [
+            q[0].canonical(),
+            q[1].canonical(),
+            q[2].canonical(),
+            q[3].canonical(),
+        ];
+    }
+    L::store(q, rotations);
 }
 
 /// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.

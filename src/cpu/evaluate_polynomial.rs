@@ -1,60 +1,57 @@
 //! Twin of `shaders/evaluate_polynomial.wgsl`: the same names, the same order.
 
-use super::evaluate::{BLOCK, Evaluate, RoomFor};
+use super::evaluate::{COARSE, Evaluate};
+use super::lanes::Number;
 use crate::segment::PolynomialSegment;
 
 impl Evaluate for PolynomialSegment {
-    type Room = RoomFor<BLOCK>;
-
     #[inline(always)]
-    fn evaluate(&self, _: f32, s: f32) -> [f32; 4] {
+    fn evaluate<N: Number>(&self, _: N, s: N) -> [N; 4] {
         // Written out: closures are not always inlined.
-        let c = &self.coefficients;
-        let z = s * s;
-        let (mut even, mut odd) = (c[10], c[9]);
-        macro_rules! step {
-            ($sum:ident, $power:literal) => {
-                $sum = [
-                    $sum[0] * z + c[$power][0],
-                    $sum[1] * z + c[$power][1],
-                    $sum[2] * z + c[$power][2],
-                    $sum[3] * z + c[$power][3],
-                ];
+        macro_rules! component {
+            ($c:literal, $($power:literal)+) => {
+                component([$(N::all(self.coefficients[$power][$c])),+], s)
             };
         }
-        step!(even, 8);
-        step!(odd, 7);
-        step!(even, 6);
-        step!(odd, 5);
-        step!(even, 4);
-        step!(odd, 3);
-        step!(even, 2);
-        step!(odd, 1);
-        step!(even, 0);
         [
-            odd[0] * s + even[0],
-            odd[1] * s + even[1],
-            odd[2] * s + even[2],
-            odd[3] * s + even[3],
+            component!(0, 0 1 2 3 4 5 6 7 8 9 10),
+            component!(1, 0 1 2 3 4 5 6 7 8 9 10),
+            component!(2, 0 1 2 3 4 5 6 7 8 9 10),
+            component!(3, 0 1 2 3 4 5 6 7 8 9 10),
         ]
+    }
+
+    #[inline(always)]
+    fn is_canonical(&self) -> bool {
+        let [x, y, z, w] = self.coefficients[0].map(f32::abs);
+        let least = x.min(y).min(z).min(w);
+        least >= COARSE || self.is_coarse_or_zero()
     }
 }
 
-/// One component of a rotation, whose coefficients are asked for by their power.
+impl PolynomialSegment {
+    /// As [`Evaluate::is_canonical`], where some middle is small.
+    #[inline(never)]
+    fn is_coarse_or_zero(&self) -> bool {
+        let is_zero = |c: usize| {
+            self.coefficients
+                .iter()
+                .all(|power| power[c].to_bits() == 0)
+        };
+        (0..4).all(|c| self.coefficients[0][c].abs() >= COARSE || is_zero(c))
+    }
+}
+
+/// One component of a rotation, by the coefficients of 1, s, s², … s¹⁰.
 #[inline(always)]
-pub(super) fn component(coefficient: impl Fn(usize) -> f32, s: f32) -> f32 {
+pub(super) fn component<N: Number>(c: [N; 11], s: N) -> N {
     let z = s * s;
-    let step = |sum: f32, power: usize| sum * z + coefficient(power);
-    let mut even = coefficient(10);
-    let mut odd = coefficient(9);
-    even = step(even, 8);
-    odd = step(odd, 7);
-    even = step(even, 6);
-    odd = step(odd, 5);
-    even = step(even, 4);
-    odd = step(odd, 3);
-    even = step(even, 2);
-    odd = step(odd, 1);
-    even = step(even, 0);
-    odd * s + even
+    let zz = z * z;
+    let even_low = c[4] * z + c[2];
+    let even_high = c[8] * z + c[6];
+    let even = (c[10] * zz + even_high) * zz + even_low;
+    let odd_low = c[3] * z + c[1];
+    let odd_high = c[7] * z + c[5];
+    let odd = (c[9] * zz + odd_high) * zz + odd_low;
+    c[0] + (odd * s + even * z)
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::dispatch::InLanes;
-use super::evaluate::{Affine, BLOCK, Evaluate, canonical, one};
+use super::evaluate::{Affine, Evaluate, canonical, one};
 use crate::frame_clock::finite_scale;
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, NONE, PartRef, Source};
@@ -12,7 +12,10 @@ use crate::segment::{ArcSegment, PolynomialSegment, Segments};
 use crate::window::Window;
 
 /// Samples worked out together.
-const LANES: usize = 4 * BLOCK;
+const LANES: usize = 64;
+
+/// Multiples of this many: the lanes of the widest vector.
+const BLOCK: usize = 16;
 
 /// What a window of a clip is made of, where that is told by looking.
 pub(super) struct FewTimes<'a> {

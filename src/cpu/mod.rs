@@ -12,6 +12,7 @@ mod evaluate_arc;
 mod evaluate_polynomial;
 mod few;
 mod gentle;
+mod lanes;
 mod long;
 mod matrix;
 mod memory;

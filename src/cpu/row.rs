@@ -1,17 +1,23 @@
 //! The samples of one track: its runs, evaluated one behind the other. Compiled as
 //! one function for each vector width, so that nothing is called for a run.
 
-use super::evaluate::{Affine, CHUNK, Evaluate, FEW, Room, distances, frames, one};
+use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
+use super::lanes::Lanes;
+use std::marker::PhantomData;
+
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::numeric::round_f32;
 use crate::prepare::PartRef;
 use crate::schedule::{Distance, Emit, Run, RunSource};
 
+/// Samples whose distances are found out together.
+const CHUNK: usize = 64;
+
 /// The samples of one part of a track in a cycle, into `output`, which
 /// starts with the first of them.
 #[inline(always)]
-pub(super) fn row<S: Evaluate>(
+pub(super) fn row<L: Lanes, S: Evaluate>(
     PartRef { prepared, part }: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
@@ -29,29 +35,37 @@ pub(super) fn row<S: Evaluate>(
         };
         return prepared.runs(part, timeline, cycle, &mut row);
     }
-    let mut row = Row {
+    let mut row = Row::<L, S> {
         part: PartRef { prepared, part },
         segments,
         timeline,
         first,
         output,
-        // Its own, and not borrowed: the compiler must see that it is not the output.
-        room: S::Room::new(),
+        lanes: PhantomData,
     };
-    prepared.runs(part, timeline, cycle, &mut row)
+    if cycle.is_own() {
+        return prepared.own_runs(part, timeline, cycle.samples.clone(), &mut row);
+    }
+    // What finds a copy's runs is compiled once, not for each width.
+    let mut runs = Vec::new();
+    prepared.runs(part, timeline, cycle, &mut |run| runs.push(run))?;
+    for run in runs {
+        row.run(run);
+    }
+    Ok(())
 }
 
-struct Row<'a, S: Evaluate> {
+struct Row<'a, L, S> {
     part: PartRef<'a>,
     segments: &'a [S],
     timeline: &'a Timeline,
     /// The sample that `output` starts with.
     first: usize,
     output: &'a mut [[f32; 4]],
-    room: S::Room,
+    lanes: PhantomData<L>,
 }
 
-impl<S: Evaluate> Emit for Row<'_, S> {
+impl<L: Lanes, S: Evaluate> Emit for Row<'_, L, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let prepared = self.part.prepared;
@@ -62,33 +76,26 @@ impl<S: Evaluate> Emit for Row<'_, S> {
             }
             RunSource::Segment {
                 index,
-                distance: Distance::Frames { first },
+                distance,
                 scale,
                 offset,
             } => {
                 let segment = &self.segments[index as usize];
                 let affine = Affine { scale, offset };
-                frames(segment, affine, first, run.count, &mut self.room, output);
-            }
-            RunSource::Segment {
-                index,
-                distance: Distance::Seconds { middle },
-                scale,
-                offset,
-            } => {
-                let segment = &self.segments[index as usize];
-                let affine = Affine { scale, offset };
+                if let Distance::Frames { first } = distance
+                    && are_exact(first, run.count)
+                {
+                    frames::<L, S>(segment, affine, first, run.count, output);
+                    return;
+                }
                 let mut from_middle = [0.0; CHUNK];
                 for start in (0..run.count).step_by(CHUNK) {
                     let count = (run.count - start).min(CHUNK);
-                    let from_middle = &mut from_middle[..count];
-                    for (j, distance) in from_middle.iter_mut().enumerate() {
-                        let sample = run.sample + start + j;
-                        let time = self.timeline.time(self.part.part.track as usize, sample);
-                        *distance = round_f32(time - middle);
+                    for (j, own) in from_middle[..count].iter_mut().enumerate() {
+                        *own = self.part.distance(distance, self.timeline, &run, start + j);
                     }
                     let output = &mut output[start..];
-                    distances(segment, affine, from_middle, &mut self.room, output);
+                    distances::<L, S>(segment, affine, &from_middle, count, output);
                 }
             }
             RunSource::Exact { index, parameter } => {
@@ -96,6 +103,22 @@ impl<S: Evaluate> Emit for Row<'_, S> {
                 for (sample, rotation) in (run.sample..).zip(&mut output[..run.count]) {
                     *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
                 }
+            }
+        }
+    }
+}
+
+impl PartRef<'_> {
+    /// From the middle of its segment to the run's `j`th sample.
+    #[inline(always)]
+    fn distance(self, distance: Distance, timeline: &Timeline, run: &Run, j: usize) -> f32 {
+        match distance {
+            // An integer converts with one rounding, like the shader's sum of two exact
+            // halves.
+            Distance::Frames { first } => first.wrapping_add(j as i32) as f32,
+            Distance::Seconds { middle } => {
+                let time = timeline.time(self.part.track as usize, run.sample + j);
+                round_f32(time - middle)
             }
         }
     }
@@ -114,9 +137,9 @@ struct ShortRow<'a, S> {
 impl<S: Evaluate> Emit for ShortRow<'_, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let PartRef { prepared, part } = self.part;
+        let prepared = self.part.prepared;
         let output = &mut self.output[run.sample - self.first..][..run.count];
-        for (sample, rotation) in (run.sample..).zip(output) {
+        for (j, rotation) in output.iter_mut().enumerate() {
             *rotation = match run.source {
                 RunSource::Constant(index) => prepared.constants[index as usize],
                 RunSource::Segment {
@@ -125,22 +148,13 @@ impl<S: Evaluate> Emit for ShortRow<'_, S> {
                     scale,
                     offset,
                 } => {
-                    let distance = match distance {
-                        Distance::Frames { first } => {
-                            first.wrapping_add((sample - run.sample) as i32) as f32
-                        }
-                        Distance::Seconds { middle } => {
-                            round_f32(self.timeline.time(part.track as usize, sample) - middle)
-                        }
-                    };
-                    one(
-                        &self.segments[index as usize],
-                        Affine { scale, offset },
-                        distance,
-                    )
+                    let distance = self.part.distance(distance, self.timeline, &run, j);
+                    let segment = &self.segments[index as usize];
+                    one(segment, Affine { scale, offset }, distance)
                 }
                 RunSource::Exact { index, parameter } => {
-                    prepared.exact(index, parameter, self.timeline, part.track as usize, sample)
+                    let track = self.part.part.track as usize;
+                    prepared.exact(index, parameter, self.timeline, track, run.sample + j)
                 }
             };
         }

@@ -84,7 +84,7 @@ impl SampleBlock {
             let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
             for j in 0..LANES {
                 let own = arc_component(middle[j], tangent[j], squares[j]);
-                lanes[j] = canonical(component(|power| own[power], self.parameters[j]));
+                lanes[j] = canonical(component(own, self.parameters[j]));
             }
         }
         self.keep(&found);

@@ -1,5 +1,6 @@
 //! Twin of `shaders/sine_cosine.wgsl`: the same names, the same order.
 
+use super::lanes::Number;
 use crate::segment::shader::{
     COSINE_2, COSINE_4, COSINE_6, COSINE_8, COSINE_10, SHORT_COSINE_2, SHORT_COSINE_4,
     SHORT_COSINE_6, SHORT_COSINE_8, SHORT_SINE_3, SHORT_SINE_5, SHORT_SINE_7, SINE_3, SINE_5,
@@ -26,11 +27,14 @@ pub(crate) fn sine_and_fall(x: f32, z: f32) -> (f32, f32) {
 
 /// The same for |a| <= pi/4.
 #[inline(always)]
-pub(super) fn short_sine_and_fall(x: f32, z: f32) -> (f32, f32) {
-    let sine_tail = (SHORT_SINE_7 * z + SHORT_SINE_5) * z + SHORT_SINE_3;
+pub(super) fn short_sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
+    let zz = z * z;
+    let sine_low = N::all(SHORT_SINE_5) * z + N::all(SHORT_SINE_3);
+    let sine_tail = N::all(SHORT_SINE_7) * zz + sine_low;
     let sine = sine_tail * (z * x) + x;
-    let cosine_high = (SHORT_COSINE_8 * z + SHORT_COSINE_6) * z + SHORT_COSINE_4;
-    let fall = (cosine_high * z + SHORT_COSINE_2) * z;
+    let cosine_low = N::all(SHORT_COSINE_4) * z + N::all(SHORT_COSINE_2);
+    let cosine_high = N::all(SHORT_COSINE_8) * z + N::all(SHORT_COSINE_6);
+    let fall = (cosine_high * zz + cosine_low) * z;
     (sine, fall)
 }
 
