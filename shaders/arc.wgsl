@@ -29,12 +29,19 @@ fn arc(start: vec4f, end: vec4f) -> Segment {
     let half = (start + end) * 0.5;
     let difference = end - start;
     let x = square(difference) * 0.25;
-    let secant_high = ((SECANT_9 * x + SECANT_8) * x + SECANT_7) * x + SECANT_6;
-    let secant_mid = ((secant_high * x + SECANT_5) * x + SECANT_4) * x + SECANT_3;
-    let secant = ((secant_mid * x + SECANT_2) * x + SECANT_1) * x;
-    let sine_high = ((ARC_SINE_8 * x + ARC_SINE_7) * x + ARC_SINE_6) * x + ARC_SINE_5;
-    let sine_mid = ((sine_high * x + ARC_SINE_4) * x + ARC_SINE_3) * x + ARC_SINE_2;
-    let arc_sine = (sine_mid * x + ARC_SINE_1) * x;
+    // Neighbouring powers in pairs: chains of half as many operations.
+    let xx = x * x;
+    let secant_7 = SECANT_8 * x + SECANT_7;
+    let secant_5 = SECANT_6 * x + SECANT_5;
+    let secant_3 = SECANT_4 * x + SECANT_3;
+    let secant_1 = SECANT_2 * x + SECANT_1;
+    let secant_high = (SECANT_9 * xx + secant_7) * xx + secant_5;
+    let secant = ((secant_high * xx + secant_3) * xx + secant_1) * x;
+    let sine_7 = ARC_SINE_8 * x + ARC_SINE_7;
+    let sine_5 = ARC_SINE_6 * x + ARC_SINE_5;
+    let sine_3 = ARC_SINE_4 * x + ARC_SINE_3;
+    let sine_1 = ARC_SINE_2 * x + ARC_SINE_1;
+    let arc_sine = (((sine_7 * xx + sine_5) * xx + sine_3) * xx + sine_1) * x;
     return Segment(
         canonical(half * secant + half),
         canonical(difference * arc_sine + difference),

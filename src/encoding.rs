@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Quat, Vec3};
 
-use crate::cpu::{InLanes, axis_angle, euler, in_lanes, rows, to_half, to_snorm};
+use crate::cpu::{InLanes, Lanes, axis_angle, euler, in_lanes, rows, to_half, to_snorm};
 use crate::euler::EulerSequence;
 use crate::numeric::canonical;
 
@@ -205,7 +205,7 @@ struct Converted<'a>(Encoding, &'a [[f32; 4]], &'a mut [u8]);
 
 impl InLanes for Converted<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let Self(encoding, rotations, output) = self;
         let detail = encoding.detail();
         match encoding {
@@ -254,7 +254,7 @@ struct Halves<'a>(&'a [f32], &'a mut [u8]);
 
 impl InLanes for Halves<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
             bytes.copy_from_slice(&to_half(value).to_ne_bytes());
         }
@@ -266,7 +266,7 @@ struct WholeNumbers<'a>(&'a [f32], &'a mut [u8]);
 
 impl InLanes for WholeNumbers<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
             bytes.copy_from_slice(&to_snorm(value).to_ne_bytes());
         }

@@ -1,7 +1,7 @@
 //! What the tangent at a key is made of, where curves are prepared in f32 straight from
 //! keys: all that depends on times is here, in f64.
 
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::method::Ends;
 use crate::segment::Joint;
 use crate::segment::shader::{END, INNER, OUTSIDE};
@@ -112,7 +112,7 @@ struct Between<'a> {
 
 impl InLanes for Between<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let inner = self.times.len().saturating_sub(2);
         let (before, own, after) = (
             &self.times[..inner],

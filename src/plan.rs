@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Quat;
 
 use crate::clock::FramesError;
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::frame_clock::{FrameClock, finite_scale, in_frames};
 use crate::numeric::{round_f32, whole_number};
 use crate::schedule::COUNTABLE;
@@ -154,7 +154,7 @@ struct Boundaries {
 
 impl InLanes for Boundaries {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let Some(clock) = self.clock else { return };
         let mut frames = [0.0; LANES];
         let (mut firsts, mut on_frame) = ([0; LANES], [0; LANES]);

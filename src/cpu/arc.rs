@@ -1,7 +1,7 @@
 //! Twin of `shaders/arc.wgsl`: the same names, the same order.
 
-use super::evaluate::canonical;
 use super::evaluate_arc::square;
+use super::lanes::Number;
 use crate::segment::ArcSegment;
 use crate::segment::shader::{
     ARC_SINE_1, ARC_SINE_2, ARC_SINE_3, ARC_SINE_4, ARC_SINE_5, ARC_SINE_6, ARC_SINE_7, ARC_SINE_8,
@@ -9,36 +9,48 @@ use crate::segment::shader::{
 };
 
 /// The arc between two unit quaternions, at most pi/2 apart in R⁴.
-#[inline(always)]
 pub(crate) fn arc(start: [f32; 4], end: [f32; 4]) -> ArcSegment {
+    let (middle, tangent) = middle_and_tangent(start, end);
+    ArcSegment { middle, tangent }
+}
+
+/// The same in numbers of any kind.
+#[inline(always)]
+pub(crate) fn middle_and_tangent<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 4], [N; 4]) {
     let [ax, ay, az, aw] = start;
     let [bx, by, bz, bw] = end;
+    let one_half = N::all(0.5);
     let half = [
-        (ax + bx) * 0.5,
-        (ay + by) * 0.5,
-        (az + bz) * 0.5,
-        (aw + bw) * 0.5,
+        (ax + bx) * one_half,
+        (ay + by) * one_half,
+        (az + bz) * one_half,
+        (aw + bw) * one_half,
     ];
     let difference = [bx - ax, by - ay, bz - az, bw - aw];
-    let x = square(difference) * 0.25;
-    let secant_high = ((SECANT_9 * x + SECANT_8) * x + SECANT_7) * x + SECANT_6;
-    let secant_mid = ((secant_high * x + SECANT_5) * x + SECANT_4) * x + SECANT_3;
-    let secant = ((secant_mid * x + SECANT_2) * x + SECANT_1) * x;
-    let sine_high = ((ARC_SINE_8 * x + ARC_SINE_7) * x + ARC_SINE_6) * x + ARC_SINE_5;
-    let sine_mid = ((sine_high * x + ARC_SINE_4) * x + ARC_SINE_3) * x + ARC_SINE_2;
-    let arc_sine = (sine_mid * x + ARC_SINE_1) * x;
-    let lengthened = |q: [f32; 4], by: f32| {
-        [
-            canonical(q[0] * by + q[0]),
-            canonical(q[1] * by + q[1]),
-            canonical(q[2] * by + q[2]),
-            canonical(q[3] * by + q[3]),
-        ]
-    };
-    ArcSegment {
-        middle: lengthened(half, secant),
-        tangent: lengthened(difference, arc_sine),
-    }
+    let x = square(difference) * N::all(0.25);
+    let xx = x * x;
+    let secant_7 = N::all(SECANT_8) * x + N::all(SECANT_7);
+    let secant_5 = N::all(SECANT_6) * x + N::all(SECANT_5);
+    let secant_3 = N::all(SECANT_4) * x + N::all(SECANT_3);
+    let secant_1 = N::all(SECANT_2) * x + N::all(SECANT_1);
+    let secant_high = (N::all(SECANT_9) * xx + secant_7) * xx + secant_5;
+    let secant = ((secant_high * xx + secant_3) * xx + secant_1) * x;
+    let sine_7 = N::all(ARC_SINE_8) * x + N::all(ARC_SINE_7);
+    let sine_5 = N::all(ARC_SINE_6) * x + N::all(ARC_SINE_5);
+    let sine_3 = N::all(ARC_SINE_4) * x + N::all(ARC_SINE_3);
+    let sine_1 = N::all(ARC_SINE_2) * x + N::all(ARC_SINE_1);
+    let arc_sine = (((sine_7 * xx + sine_5) * xx + sine_3) * xx + sine_1) * x;
+    (lengthened(half, secant), lengthened(difference, arc_sine))
+}
+
+#[inline(always)]
+fn lengthened<N: Number>(q: [N; 4], by: N) -> [N; 4] {
+    [
+        (q[0] * by + q[0]).canonical(),
+        (q[1] * by + q[1]).canonical(),
+        (q[2] * by + q[2]).canonical(),
+        (q[3] * by + q[3]).canonical(),
+    ]
 }
 
 #[cfg(test)]

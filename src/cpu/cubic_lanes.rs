@@ -5,6 +5,7 @@
 use super::dispatch::InLanes;
 use super::evaluate::canonical;
 use super::gentle::{gentle, signed};
+use super::lanes::Lanes;
 use super::sample_lanes::LANES;
 use crate::joints::UNKNOWN;
 use crate::prepare::whole;
@@ -46,7 +47,7 @@ impl CubicBlock {
 
 impl InLanes for CubicBlock {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
         let mut wild = 0;
         let [before, start, end, after] = &self.keys;

@@ -15,6 +15,7 @@ use glam::Vec4;
 use eight::Eight;
 
 use super::evaluate::Evaluate;
+use super::lanes::Lanes;
 use super::row::row;
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
@@ -178,7 +179,8 @@ impl Kernels {
 /// Work over lanes: `run` is compiled for each vector width. Implementations are
 /// `#[inline(always)]`, and have no branches, calls or intrinsics in their loops.
 pub(crate) trait InLanes {
-    fn run(&mut self);
+    /// `L`: the vectors, for work that is written in them.
+    fn run<L: Lanes>(&mut self);
 }
 
 /// Does work over lanes with the widest vectors there are.
@@ -193,7 +195,7 @@ fn lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
         VectorWidth::Avx512 => avx512::in_lanes::<W>,
         #[cfg(target_arch = "x86_64")]
         VectorWidth::Avx2 => avx2::in_lanes::<W>,
-        _ => W::run,
+        _ => W::run::<Vec4>,
     };
     // SAFETY: the processor has the vectors of that width, which is the widest or a
     // narrowed one; the last is a safe function.
@@ -225,7 +227,7 @@ macro_rules! compiled_for {
 
             #[target_feature(enable = $features)]
             pub(super) fn in_lanes<W: InLanes>(work: &mut W) {
-                work.run();
+                work.run::<super::Eight>();
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {

@@ -189,7 +189,7 @@ fn vector<L: Lanes, S: Evaluate, const FILTER: bool>(
             q[3].canonical(),
         ];
     }
-    L::store(q, rotations);
+    L::store_rotations(q, rotations);
 }
 
 /// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.

@@ -13,17 +13,12 @@ impl Evaluate for ArcSegment {
 
     #[inline(always)]
     fn evaluate<N: Number>(&self, square: N, parameter: N) -> [N; 4] {
-        let z = parameter * parameter * square;
-        let (sine, fall) = short_sine_and_fall(parameter, z);
         let [mx, my, mz, mw] = self.middle;
         let [tx, ty, tz, tw] = self.tangent;
         // Written out: closures are not always inlined.
-        [
-            N::all(mx) + (N::all(mx) * fall + N::all(tx) * sine),
-            N::all(my) + (N::all(my) * fall + N::all(ty) * sine),
-            N::all(mz) + (N::all(mz) * fall + N::all(tz) * sine),
-            N::all(mw) + (N::all(mw) * fall + N::all(tw) * sine),
-        ]
+        let middle = [N::all(mx), N::all(my), N::all(mz), N::all(mw)];
+        let tangent = [N::all(tx), N::all(ty), N::all(tz), N::all(tw)];
+        on_arc(middle, tangent, square, parameter)
     }
 
     #[inline(always)]
@@ -37,7 +32,25 @@ impl Evaluate for ArcSegment {
     }
 }
 
+/// The rotation at a parameter of an arc.
 #[inline(always)]
-pub(super) fn square(q: [f32; 4]) -> f32 {
+pub(super) fn on_arc<N: Number>(
+    middle: [N; 4],
+    tangent: [N; 4],
+    square: N,
+    parameter: N,
+) -> [N; 4] {
+    let z = parameter * parameter * square;
+    let (sine, fall) = short_sine_and_fall(parameter, z);
+    [
+        middle[0] + (middle[0] * fall + tangent[0] * sine),
+        middle[1] + (middle[1] * fall + tangent[1] * sine),
+        middle[2] + (middle[2] * fall + tangent[2] * sine),
+        middle[3] + (middle[3] * fall + tangent[3] * sine),
+    ]
+}
+
+#[inline(always)]
+pub(super) fn square<N: Number>(q: [N; 4]) -> N {
     q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
 }

@@ -5,6 +5,7 @@
 
 use super::dispatch::InLanes;
 use super::evaluate::{Affine, Evaluate, canonical, one};
+use super::lanes::Lanes;
 use crate::frame_clock::finite_scale;
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, NONE, PartRef, Source};
@@ -48,7 +49,7 @@ enum One<'a> {
 
 impl InLanes for FewTimes<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let samples = self.window.samples.clone();
         let nothing = ArcSegment {
             middle: [0.0; 4],

@@ -1,21 +1,31 @@
 //! What the twins compute with: the number of one sample, or those of several in one vector.
 
-use std::ops::{Add, Mul};
+use std::ops::{Add, Mul, Sub};
 
 use glam::{Mat4, Vec4};
 
 use crate::segment::shader::TINY_BITS;
 
 /// A number of one sample, or of several. Whatever it is of, an operation rounds alike.
-pub(crate) trait Number: Copy + Add<Output = Self> + Mul<Output = Self> {
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
     /// The same for every sample.
     fn all(value: f32) -> Self;
+
+    /// Magnitudes below 2^-64 become +0.
+    fn canonical(self) -> Self;
 }
 
 impl Number for f32 {
     #[inline(always)]
     fn all(value: f32) -> Self {
         value
+    }
+
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        super::evaluate::canonical(self)
     }
 }
 
@@ -27,17 +37,35 @@ pub(crate) trait Lanes: Number {
     /// Of [`Lanes::COUNT`] samples.
     fn load(samples: &[f32]) -> Self;
 
-    /// Magnitudes below 2^-64 become +0.
-    fn canonical(self) -> Self;
+    /// To [`Lanes::COUNT`] samples.
+    fn store(self, samples: &mut [f32]);
+
+    /// `x y z w` of [`Lanes::COUNT`] rotations.
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4];
 
     /// Puts `x y z w` together, as [`Lanes::COUNT`] rotations.
-    fn store(components: [Self; 4], rotations: &mut [[f32; 4]]);
+    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]);
+
+    /// -1 where a number is less than 0, else 1.
+    fn sign(self) -> Self;
+
+    /// Whether any is at most `limit`.
+    fn any_at_most(self, limit: f32) -> bool;
+
+    /// Whether the magnitude of any is at most `limit`.
+    fn any_within(self, limit: f32) -> bool;
 }
 
 impl Number for Vec4 {
     #[inline(always)]
     fn all(value: f32) -> Self {
         Self::splat(value)
+    }
+
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        let tiny = self.abs().cmplt(Self::splat(f32::from_bits(TINY_BITS)));
+        Self::select(tiny, Self::ZERO, self)
     }
 }
 
@@ -50,20 +78,45 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
-        let tiny = self.abs().cmplt(Self::splat(f32::from_bits(TINY_BITS)));
-        Self::select(tiny, Self::ZERO, self)
+    fn store(self, samples: &mut [f32]) {
+        self.write_to_slice(samples);
     }
 
     #[inline(always)]
-    fn store([x, y, z, w]: [Self; 4], rotations: &mut [[f32; 4]]) {
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
+        let columns: &[[f32; 4]; 4] = rotations.first_chunk().expect("four rotations");
+        let rows = Mat4::from_cols_array_2d(columns).transpose();
+        [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
+    }
+
+    #[inline(always)]
+    fn store_rotations([x, y, z, w]: [Self; 4], rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(&Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d());
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        Self::select(self.cmplt(Self::ZERO), Self::NEG_ONE, Self::ONE)
+    }
+
+    #[inline(always)]
+    fn any_at_most(self, limit: f32) -> bool {
+        self.cmple(Self::splat(limit)).any()
+    }
+
+    #[inline(always)]
+    fn any_within(self, limit: f32) -> bool {
+        self.abs().any_at_most(limit)
     }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+
+    fn bits(numbers: &[f32]) -> Vec<u32> {
+        numbers.iter().map(|number| number.to_bits()).collect()
+    }
 
     /// Catches lanes that are put together in another order than they were loaded in, and a
     /// comparison that is off by one bit.
@@ -81,9 +134,24 @@ pub(crate) mod tests {
         let columns = [0, 1, 2, 3].map(samples);
         let components = [0, 1, 2, 3].map(|c| L::load(&columns[c]));
         let mut found = vec![[9.0; 4]; L::COUNT];
-        L::store(components, &mut found);
+        L::store_rotations(components, &mut found);
         let mut filtered = found.clone();
-        L::store(components.map(L::canonical), &mut filtered);
+        L::store_rotations(components.map(L::canonical), &mut filtered);
+        let loaded = L::load_rotations(&found);
+        for c in 0..4 {
+            let mut stored = vec![9.0; L::COUNT];
+            loaded[c].store(&mut stored);
+            assert_eq!(bits(&stored), bits(&columns[c]));
+            loaded[c].sign().store(&mut stored);
+            let signs = columns[c].iter().map(|&v| if v < 0.0 { -1.0 } else { 1.0 });
+            assert!(stored.iter().copied().eq(signs));
+            let least = columns[c]
+                .iter()
+                .fold(f32::MAX, |least, v| least.min(v.abs()));
+            assert!(loaded[c].any_within(least) && !loaded[c].any_within(least.next_down()));
+            let least = columns[c].iter().copied().fold(f32::MAX, f32::min);
+            assert!(loaded[c].any_at_most(least) && !loaded[c].any_at_most(least.next_down()));
+        }
         for k in 0..L::COUNT {
             for c in 0..4 {
                 let expected = columns[c][k];

@@ -32,13 +32,14 @@ mod store_euler;
 mod store_f16;
 mod store_snorm16;
 
-pub(crate) use arc::arc;
+pub(crate) use arc::{arc, middle_and_tangent};
 #[cfg(test)]
 pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
 pub(crate) use gentle::{gentle, signed};
+pub(crate) use lanes::{Lanes, Number};
 pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
 pub(crate) use mend::{LEFT_OUT, Row};

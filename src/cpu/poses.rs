@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::dispatch::{InLanes, in_lanes};
+use super::lanes::Lanes;
 use super::{pose_add, pose_blend, pose_mix, pose_world};
 use crate::segment::Link;
 
@@ -54,7 +55,7 @@ struct Task<'a, F> {
 
 impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         for (i, value) in self.output.iter_mut().enumerate() {
             *value = (self.pose)(self.first + i);
         }

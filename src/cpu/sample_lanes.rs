@@ -4,13 +4,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::dispatch::InLanes;
-use super::evaluate::{Evaluate, canonical};
+use super::evaluate::canonical;
+use super::evaluate_arc::{on_arc, square};
 use super::evaluate_polynomial::component;
+use super::lanes::{Lanes, Number};
 use crate::method::Form;
-use crate::prepare::{
-    ARC_LANES, any_turns, arc_component, arc_in_doubt, arc_in_lanes, arcs, whole,
-};
-use crate::segment::ArcSegment;
+use crate::prepare::{ARC_LANES, any_turns, arc_anyhow, arc_component, arc_in_lanes, arcs, whole};
 
 /// Samples, or intervals, worked out together.
 pub(super) const LANES: usize = ARC_LANES;
@@ -44,40 +43,38 @@ impl SampleBlock {
 
 impl InLanes for SampleBlock {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
         // Their signs are as stored.
         match self.form {
-            Form::Arc => self.arcs(),
-            Form::Polynomial => self.polynomials(),
+            Form::Arc => self.arcs::<L>(),
+            Form::Polynomial => self.polynomials::<L>(),
         }
     }
 }
 
 impl SampleBlock {
     #[inline(always)]
-    fn arcs(&mut self) {
-        let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
-        let mut in_doubt = [false; LANES];
-        let mut doubtful = 0;
-        for j in 0..whole(self.count) {
-            let lane = arc_in_lanes(self.from[j], self.to[j]);
-            [x[j], y[j], z[j], w[j]] = at(lane.arc, self.signs[j], self.parameters[j]);
-            in_doubt[j] = lane.is_in_doubt();
-            doubtful += u32::from(lane.is_in_doubt());
-        }
-        self.keep(&[x, y, z, w]);
-        if doubtful > 0 {
-            for lane in (0..self.count).filter(|&lane| in_doubt[lane]) {
-                let (arc, _) = arc_in_doubt(self.from[lane], self.to[lane]);
-                self.rotations[lane] = at(arc, self.signs[lane], self.parameters[lane]);
+    fn arcs<L: Lanes>(&mut self) {
+        for j in (0..self.count).step_by(L::COUNT) {
+            let arcs = arc_in_lanes::<L>(&self.from[j..], &self.to[j..]);
+            let sign = L::load(&self.signs[j..]);
+            let parameter = L::load(&self.parameters[j..]);
+            let found = at(arcs.middle, arcs.tangent, sign, parameter);
+            L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
+            if arcs.any_in_doubt {
+                for lane in j..j + L::COUNT {
+                    let (arc, _) = arc_anyhow(self.from[lane], self.to[lane]);
+                    let (sign, parameter) = (self.signs[lane], self.parameters[lane]);
+                    self.rotations[lane] = at(arc.middle, arc.tangent, sign, parameter);
+                }
             }
         }
     }
 
     #[inline(always)]
-    fn polynomials(&mut self) {
-        let arcs = arcs(&self.from, &self.to, self.count);
+    fn polynomials<L: Lanes>(&mut self) {
+        let arcs = arcs::<L>(&self.from, &self.to, self.count);
         let squares = arcs.squares();
         let mut found = [[0.0; LANES]; 4];
         for c in 0..4 {
@@ -103,19 +100,17 @@ impl SampleBlock {
 
 /// A rotation of an arc whose first key has that sign.
 #[inline(always)]
-fn at(ArcSegment { middle, tangent }: ArcSegment, sign: f32, parameter: f32) -> [f32; 4] {
+fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
     let [mx, my, mz, mw] = middle;
     let [tx, ty, tz, tw] = tangent;
-    let segment = ArcSegment {
-        middle: [mx * sign, my * sign, mz * sign, mw * sign],
-        tangent: [tx * sign, ty * sign, tz * sign, tw * sign],
-    };
-    let q = segment.evaluate(segment.constant(), parameter);
+    let middle = [mx * sign, my * sign, mz * sign, mw * sign];
+    let tangent = [tx * sign, ty * sign, tz * sign, tw * sign];
+    let q = on_arc(middle, tangent, square(tangent), parameter);
     [
-        canonical(q[0]),
-        canonical(q[1]),
-        canonical(q[2]),
-        canonical(q[3]),
+        q[0].canonical(),
+        q[1].canonical(),
+        q[2].canonical(),
+        q[3].canonical(),
     ]
 }
 
@@ -127,7 +122,7 @@ pub(crate) struct Turns<'a> {
 
 impl InLanes for Turns<'_> {
     #[inline(always)]
-    fn run(&mut self) {
-        self.any = any_turns(self.keys);
+    fn run<L: Lanes>(&mut self) {
+        self.any = any_turns::<L>(self.keys);
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::clock::{FramesError, Timeline};
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, Part, Prepared};
 use crate::schedule::{Distance, Emit, Run, RunSource};
@@ -107,7 +107,7 @@ struct Listing<'a> {
 
 impl InLanes for Listing<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         for part in self.parts {
             let mut list = List {
                 prepared: self.prepared,

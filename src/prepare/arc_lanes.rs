@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::branchless::{dot, unit};
-use crate::cpu::arc;
+use crate::cpu::{Lanes, Number, arc, middle_and_tangent};
 use crate::method::Path;
 use crate::segment::ArcSegment;
 
@@ -37,32 +37,27 @@ impl Default for ArcLanes {
 
 /// The arcs between the first `count` pairs of keys.
 #[inline(always)]
-pub(crate) fn arcs(from: &[[f32; 4]; LANES], to: &[[f32; 4]; LANES], count: usize) -> ArcLanes {
-    // Arrays of its own: the compiler must see that they do not overlap.
-    let [mut mx, mut my, mut mz, mut mw] = [[0.0; LANES]; 4];
-    let [mut tx, mut ty, mut tz, mut tw] = [[0.0; LANES]; 4];
-    let (mut flips, mut certain) = ([1.0; LANES], [1.0; LANES]);
-    let mut doubtful = 0;
-    for j in 0..whole(count) {
-        let lane = arc_in_lanes(from[j], to[j]);
-        [mx[j], my[j], mz[j], mw[j]] = lane.arc.middle;
-        [tx[j], ty[j], tz[j], tw[j]] = lane.arc.tangent;
-        flips[j] = lane.flip;
-        certain[j] = lane.certain;
-        doubtful += u32::from(lane.is_in_doubt());
-    }
-    let mut lanes = ArcLanes {
-        middles: [mx, my, mz, mw],
-        tangents: [tx, ty, tz, tw],
-        flips,
-    };
-    if doubtful > 0 {
-        for lane in (0..count).filter(|&lane| certain[lane] <= IN_DOUBT) {
-            let (arc, flip) = arc_in_doubt(from[lane], to[lane]);
-            lanes.flips[lane] = flip;
-            for c in 0..4 {
-                lanes.middles[c][lane] = arc.middle[c];
-                lanes.tangents[c][lane] = arc.tangent[c];
+pub(crate) fn arcs<L: Lanes>(
+    from: &[[f32; 4]; LANES],
+    to: &[[f32; 4]; LANES],
+    count: usize,
+) -> ArcLanes {
+    let mut lanes = ArcLanes::default();
+    for j in (0..count).step_by(L::COUNT) {
+        let vector = arc_in_lanes::<L>(&from[j..], &to[j..]);
+        for c in 0..4 {
+            vector.middle[c].store(&mut lanes.middles[c][j..j + L::COUNT]);
+            vector.tangent[c].store(&mut lanes.tangents[c][j..j + L::COUNT]);
+        }
+        vector.flip.store(&mut lanes.flips[j..j + L::COUNT]);
+        if vector.any_in_doubt {
+            for lane in j..j + L::COUNT {
+                let (arc, flip) = arc_anyhow(from[lane], to[lane]);
+                lanes.flips[lane] = flip;
+                for c in 0..4 {
+                    lanes.middles[c][lane] = arc.middle[c];
+                    lanes.tangents[c][lane] = arc.tangent[c];
+                }
             }
         }
     }
@@ -76,62 +71,56 @@ pub(crate) fn whole(count: usize) -> usize {
     count.next_multiple_of(16).min(LANES)
 }
 
-/// An arc, unless it is in doubt which.
-pub(crate) struct LaneArc {
-    pub(crate) arc: ArcSegment,
+/// Arcs, a lane to each.
+pub(crate) struct LaneArcs<L> {
+    pub(crate) middle: [L; 4],
+    pub(crate) tangent: [L; 4],
     /// -1 where the second key's sign is turned.
-    pub(crate) flip: f32,
-    /// How far the keys are from a right angle.
-    certain: f32,
+    pub(crate) flip: L,
+    /// Whether f32 leaves it in doubt for any which arc it is: [`arc_anyhow`] knows.
+    pub(crate) any_in_doubt: bool,
 }
 
-impl LaneArc {
-    #[inline(always)]
-    pub(crate) fn is_in_doubt(&self) -> bool {
-        self.certain <= IN_DOUBT
-    }
-}
-
-/// The arc between two keys, for lanes.
+/// The arcs between [`Lanes::COUNT`] pairs of keys.
 #[inline(always)]
-pub(crate) fn arc_in_lanes(from: [f32; 4], to: [f32; 4]) -> LaneArc {
+pub(crate) fn arc_in_lanes<L: Lanes>(from: &[[f32; 4]], to: &[[f32; 4]]) -> LaneArcs<L> {
+    let (from, to) = (L::load_rotations(from), L::load_rotations(to));
     let dot = inner(from, to);
-    let flip = if dot < 0.0 { -1.0 } else { 1.0 };
-    LaneArc {
-        arc: arc(
-            from,
-            [to[0] * flip, to[1] * flip, to[2] * flip, to[3] * flip],
-        ),
+    let flip = dot.sign();
+    let end = [to[0] * flip, to[1] * flip, to[2] * flip, to[3] * flip];
+    let (middle, tangent) = middle_and_tangent(from, end);
+    LaneArcs {
+        middle,
+        tangent,
         flip,
-        certain: dot.abs(),
+        any_in_doubt: dot.any_within(IN_DOUBT),
     }
 }
 
 /// The inner product in f32.
 #[inline(always)]
-fn inner(a: [f32; 4], b: [f32; 4]) -> f32 {
+fn inner<N: Number>(a: [N; 4], b: [N; 4]) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 }
 
-/// The arc between two keys that are nearly half a turn apart, and its second key's sign.
+/// The arc between two keys, and the second one's sign; in f64 where they are nearly half a
+/// turn apart.
 #[inline(never)]
-pub(crate) fn arc_in_doubt(from: [f32; 4], to: [f32; 4]) -> (ArcSegment, f32) {
-    let turns = dot(unit(from), unit(to)) < Path::Shortest.flips_below();
-    let flip = if turns { -1.0 } else { 1.0 };
+pub(crate) fn arc_anyhow(from: [f32; 4], to: [f32; 4]) -> (ArcSegment, f32) {
+    let flip = flip(from, to);
     (arc(from, to.map(|c| c * flip)), flip)
 }
 
 /// -1 where the shortest path from one key to the other turns the second one's sign.
 #[inline]
 pub(crate) fn flip(from: [f32; 4], to: [f32; 4]) -> f32 {
-    let dot = inner(from, to);
-    if dot.abs() <= IN_DOUBT {
-        arc_in_doubt(from, to).1
-    } else if dot < 0.0 {
-        -1.0
+    let inner = inner(from, to);
+    let turns = if inner.abs() <= IN_DOUBT {
+        dot(unit(from), unit(to)) < Path::Shortest.flips_below()
     } else {
-        1.0
-    }
+        inner < 0.0
+    };
+    if turns { -1.0 } else { 1.0 }
 }
 
 /// Whether the second key's sign is turned, or in doubt.
@@ -142,14 +131,25 @@ pub(crate) fn may_turn(from: [f32; 4], to: [f32; 4]) -> bool {
 
 /// Whether the sign of any key after the first of some is turned, or in doubt.
 #[inline(always)]
-pub(crate) fn any_turns(keys: &[[f32; 4]]) -> bool {
-    let intervals = keys.len().saturating_sub(1);
-    let (from, to) = (&keys[..intervals], &keys[keys.len() - intervals..]);
-    let mut turns = 0;
-    for j in 0..intervals {
-        turns |= u32::from(may_turn(from[j], to[j]));
+pub(crate) fn any_turns<L: Lanes>(keys: &[[f32; 4]]) -> bool {
+    let mut first = 0;
+    while first + L::COUNT < keys.len() {
+        let (from, to) = (&keys[first..], &keys[first + 1..]);
+        // Multiplied before they are put side by side: half as much to put.
+        let mut products = [[0.0; 4]; 8];
+        for j in 0..L::COUNT {
+            for c in 0..4 {
+                products[j][c] = from[j][c] * to[j][c];
+            }
+        }
+        let [x, y, z, w] = L::load_rotations(&products);
+        if (x + y + z + w).any_at_most(IN_DOUBT) {
+            return true;
+        }
+        first += L::COUNT;
     }
-    turns != 0
+    let rest = keys[first..].windows(2);
+    rest.into_iter().any(|pair| may_turn(pair[0], pair[1]))
 }
 
 impl ArcLanes {

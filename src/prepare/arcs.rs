@@ -10,7 +10,7 @@ use super::arc_lanes::{ArcLanes, Components, LANES, arcs};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
 use crate::branchless::{dot, unit};
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::method::{Ends, Interpolation, InterpolationError, Path};
 use crate::numeric::round_f32;
 use crate::segment::{ArcSegment, Segments};
@@ -47,8 +47,8 @@ impl ArcBlock {
 impl InLanes for ArcBlock {
     /// Works out every interval that waits.
     #[inline(always)]
-    fn run(&mut self) {
-        self.arcs = arcs(&self.from, &self.to, self.count);
+    fn run<L: Lanes>(&mut self) {
+        self.arcs = arcs::<L>(&self.from, &self.to, self.count);
     }
 }
 
@@ -57,7 +57,7 @@ struct Signed<'a>(&'a mut ArcBlock);
 
 impl InLanes for Signed<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let ArcBlock { signs, arcs, .. } = &*self.0;
         let (middles, tangents) = (signed(signs, &arcs.middles), signed(signs, &arcs.tangents));
         let mut segments = [ArcSegment::zeroed(); LANES];

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::cpu::{InLanes, gentle, in_lanes, signed};
+use crate::cpu::{InLanes, Lanes, gentle, in_lanes, signed};
 use crate::joints::{Joints, UNKNOWN};
 use crate::method::{Ends, Path};
 use crate::segment::shader::{INNER, LONGEST_STEP};
@@ -117,7 +117,7 @@ struct Chords<'a> {
 
 impl InLanes for Chords<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let (mut flips, mut own, mut near) = ([1.0; ROOM], [false; ROOM], [false; ROOM]);
         let Intervals { from, to, .. } = self.intervals;
         let turned = if self.lanes.may_flip { -1.0 } else { 1.0 };
@@ -144,7 +144,7 @@ struct JointLanes<'a> {
 
 impl InLanes for JointLanes<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let mut joints = self.lanes.joints;
         let durations = &self.intervals.durations;
         for j in 0..LANES {
@@ -161,7 +161,7 @@ struct Curves<'a> {
 
 impl InLanes for Curves<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
         let GentleLanes {

@@ -25,7 +25,7 @@ mod steps;
 mod vectors;
 
 pub(crate) use arc_lanes::{
-    LANES as ARC_LANES, any_turns, arc_in_doubt, arc_in_lanes, arcs, flip, may_turn, whole,
+    LANES as ARC_LANES, any_turns, arc_anyhow, arc_in_lanes, arcs, flip, may_turn, whole,
 };
 pub(crate) use clip_data::{ClipData, PartRef, Wanted};
 pub(crate) use curve::Curve;

@@ -5,7 +5,7 @@ use super::fit::{FitBlock, Samples, Tier};
 use super::intervals::LANES;
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use crate::branchless::{Quaternion, Vector, product, step};
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::method::{Axes, Quantity};
 use crate::scalar::Jet;
 
@@ -50,7 +50,7 @@ struct Fit<'a>(&'a mut FitBlock);
 
 impl InLanes for Fit<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
             Tier::Gentle => self.fit(&GENTLE_NODES),
             Tier::Full => self.fit(&FULL_NODES),

@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 
 use super::intervals::{Intervals, LANES, Lane, ROOM, at, energy, put};
 use crate::branchless::{self, Algebra, Anywhere, Near, Quaternion, Vector, product, scaled, sum};
-use crate::cpu::InLanes;
+use crate::cpu::{InLanes, Lanes};
 use crate::formula::Product;
 use crate::frame_clock::FrameClock;
 
@@ -18,7 +18,7 @@ pub(super) struct Steps<'a>(pub(super) &'a mut Intervals);
 
 impl InLanes for Steps<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let lane = [0.0; ROOM];
         // Outputs are arrays of its own, here and in every pass: the compiler must
         // see that they do not overlap what is read.
@@ -52,7 +52,7 @@ pub(super) struct FramesHeld<'a> {
 
 impl InLanes for FramesHeld<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let (mut from, mut to) = ([0.0; LANES], [0.0; LANES]);
         let Intervals { starts, ends, .. } = self.intervals;
         for j in 0..LANES {
@@ -135,7 +135,7 @@ pub(crate) struct KeyHandles<'a, R> {
 
 impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let lane = [0.0; ROOM];
         let (mut incoming, mut outgoing) = ([lane; 3], [lane; 3]);
         let mut holds = lane;
@@ -168,7 +168,7 @@ pub(crate) struct BetweenHandles<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for BetweenHandles<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let lane = [0.0; ROOM];
         let (mut bases, mut middles, mut lasts) = ([lane; 4], [lane; 3], [lane; 3]);
         let (mut energies, mut holds) = (lane, lane);
@@ -226,7 +226,7 @@ pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for ControlRotations<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let lane = [0.0; ROOM];
         let mut controls = [[lane; 4]; 4];
         let mut energies = lane;
@@ -253,7 +253,7 @@ pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for BetweenNeighbours<'_> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         let lane = [0.0; ROOM];
         let (mut bases, mut vectors) = ([lane; 4], [[lane; 3]; 3]);
         let (mut energies, mut holds) = (lane, lane);

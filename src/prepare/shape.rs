@@ -7,7 +7,7 @@ use super::intervals::LANES;
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::Expansion;
 use crate::branchless::Quaternion;
-use crate::cpu::{InLanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::formula::{
     DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
@@ -115,7 +115,7 @@ struct Fit<'a, S>(&'a mut FitBlock, PhantomData<S>);
 
 impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
-    fn run(&mut self) {
+    fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
             Tier::Gentle => self.fit(&GENTLE_NODES),
             Tier::Full => self.fit(&FULL_NODES),

@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::arc_lanes::{LANES, arcs};
-use crate::cpu::InLanes;
+use crate::cpu::{InLanes, Lanes};
 use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 use crate::segment::shader::{
@@ -86,8 +86,8 @@ impl SteadyBlock {
 
 impl InLanes for SteadyBlock {
     #[inline(always)]
-    fn run(&mut self) {
-        let arcs = arcs(&self.from, &self.to, self.count);
+    fn run<L: Lanes>(&mut self) {
+        let arcs = arcs::<L>(&self.from, &self.to, self.count);
         let squares = arcs.squares();
         let mut found = [[[0.0; LANES]; 4]; COEFFICIENTS];
         for c in 0..4 {

@@ -1,11 +1,12 @@
 //! Eight lanes of AVX2.
 
 use std::arch::x86_64::{
-    __m256, _CMP_NLT_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_castps_pd, _mm256_cmp_ps,
-    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setr_epi32, _mm256_unpackhi_pd,
+    __m256, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
+    _mm256_castps_pd, _mm256_cmp_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_ps,
+    _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
     _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps,
 };
-use std::ops::{Add, Mul};
+use std::ops::{Add, Mul, Sub};
 
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
@@ -27,6 +28,15 @@ impl Add for Eight {
     }
 }
 
+impl Sub for Eight {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+    }
+}
+
 impl Mul for Eight {
     type Output = Self;
 
@@ -40,6 +50,44 @@ impl Number for Eight {
     #[inline(always)]
     fn all(value: f32) -> Self {
         Self(unsafe { _mm256_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        let tiny = Self::all(f32::from_bits(TINY_BITS));
+        let magnitude = self.magnitude();
+        Self(unsafe {
+            let whole = _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude.0, tiny.0);
+            _mm256_and_ps(self.0, whole)
+        })
+    }
+}
+
+impl Eight {
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
+        Self(unsafe { _mm256_and_ps(self.0, magnitude.0) })
+    }
+
+    /// Four by four within each half.
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        // Written out: closures are not always inlined.
+        let rows = unsafe {
+            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
+            [
+                _mm256_unpacklo_pd(ab_low, cd_low),
+                _mm256_unpackhi_pd(ab_low, cd_low),
+                _mm256_unpacklo_pd(ab_high, cd_high),
+                _mm256_unpackhi_pd(ab_high, cd_high),
+            ]
+        };
+        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
+        [Self(e), Self(f), Self(g), Self(h)]
     }
 }
 
@@ -56,31 +104,49 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
+    fn store(self, samples: &mut [f32]) {
+        let stored = unsafe {
+            let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+            _mm256_permutevar8x32_ps(self.0, order)
+        };
+        samples.copy_from_slice(&bytemuck::cast::<_, [f32; 8]>(stored));
+    }
+
+    #[inline(always)]
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
+        let rotations: [[f32; 4]; 8] = *rotations.first_chunk().expect("eight rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(rotations);
+        Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    }
+
+    #[inline(always)]
+    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
+        let [a, b, c, d] = Self::transposed(components);
+        let pairs: [[f32; 4]; 8] = bytemuck::cast([a.0, b.0, c.0, d.0]);
+        rotations.copy_from_slice(&pairs);
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
         Self(unsafe {
-            let magnitude = _mm256_and_ps(self.0, _mm256_set1_ps(f32::from_bits(!(1 << 31))));
-            let tiny = _mm256_set1_ps(f32::from_bits(TINY_BITS));
-            _mm256_and_ps(self.0, _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude, tiny))
+            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
+            _mm256_blendv_ps(one.0, minus_one.0, below)
         })
     }
 
     #[inline(always)]
-    fn store([x, y, z, w]: [Self; 4], rotations: &mut [[f32; 4]]) {
-        // Written out: closures are not always inlined.
-        let pairs = unsafe {
-            let xy_low = _mm256_castps_pd(_mm256_unpacklo_ps(x.0, y.0));
-            let xy_high = _mm256_castps_pd(_mm256_unpackhi_ps(x.0, y.0));
-            let zw_low = _mm256_castps_pd(_mm256_unpacklo_ps(z.0, w.0));
-            let zw_high = _mm256_castps_pd(_mm256_unpackhi_ps(z.0, w.0));
-            [
-                _mm256_unpacklo_pd(xy_low, zw_low),
-                _mm256_unpackhi_pd(xy_low, zw_low),
-                _mm256_unpacklo_pd(xy_high, zw_high),
-                _mm256_unpackhi_pd(xy_high, zw_high),
-            ]
-        };
-        let pairs: [[f32; 4]; 8] = bytemuck::cast(pairs);
-        rotations.copy_from_slice(&pairs);
+    fn any_at_most(self, limit: f32) -> bool {
+        let limit = Self::all(limit);
+        unsafe {
+            let within = _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0);
+            _mm256_movemask_ps(within) != 0
+        }
+    }
+
+    #[inline(always)]
+    fn any_within(self, limit: f32) -> bool {
+        self.magnitude().any_at_most(limit)
     }
 }
 
