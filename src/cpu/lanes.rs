@@ -1,6 +1,6 @@
 //! What the twins compute with: the number of one sample, or those of several in one vector.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 use glam::{Mat4, Vec4};
 
@@ -8,7 +8,7 @@ use crate::segment::shader::TINY_BITS;
 
 /// A number of one sample, or of several. Whatever it is of, an operation rounds alike.
 pub(crate) trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// The same for every sample.
     fn all(value: f32) -> Self;
@@ -48,6 +48,11 @@ pub(crate) trait Lanes: Number {
 
     /// -1 where a number is less than 0, else 1.
     fn sign(self) -> Self;
+
+    fn magnitude(self) -> Self;
+
+    /// The larger of two numbers; `other` where one of them is none.
+    fn larger(self, other: Self) -> Self;
 
     /// Whether any is at most `limit`.
     fn any_at_most(self, limit: f32) -> bool;
@@ -97,6 +102,16 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn sign(self) -> Self {
         Self::select(self.cmplt(Self::ZERO), Self::NEG_ONE, Self::ONE)
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self::select(self.cmpgt(other), self, other)
     }
 
     #[inline(always)]

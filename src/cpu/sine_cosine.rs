@@ -17,12 +17,12 @@ pub(super) fn sine_cosine(angle: f32) -> (f32, f32) {
 /// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2, given by its square `z`:
 /// the sine, for `x = a`.
 #[inline(always)]
-pub(crate) fn sine_and_fall(x: f32, z: f32) -> (f32, f32) {
-    let sine_tail = ((SINE_9 * z + SINE_7) * z + SINE_5) * z + SINE_3;
-    let sine = sine_tail * (z * x) + x;
-    let cosine_tail = (((COSINE_10 * z + COSINE_8) * z + COSINE_6) * z + COSINE_4) * z + COSINE_2;
-    let fall = cosine_tail * z;
-    (sine, fall)
+pub(crate) fn sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
+    let sine_high = (N::all(SINE_9) * z + N::all(SINE_7)) * z + N::all(SINE_5);
+    let sine = (sine_high * z + N::all(SINE_3)) * (z * x) + x;
+    let cosine_high = (N::all(COSINE_10) * z + N::all(COSINE_8)) * z + N::all(COSINE_6);
+    let cosine_tail = (cosine_high * z + N::all(COSINE_4)) * z + N::all(COSINE_2);
+    (sine, cosine_tail * z)
 }
 
 /// The same for |a| <= pi/4.

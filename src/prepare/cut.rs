@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 
-use super::curve::Curve;
+use super::curve::{Curve, Piece};
 use super::fit::{FitBlock, Tier};
 use super::intervals::LANES;
 use super::shape::Shape;
@@ -15,19 +15,24 @@ pub(super) struct Cutter {
     quantity: Quantity,
     /// Made when there is something to cut.
     block: Option<Box<FitBlock>>,
+    /// The curves given since the last were taken.
+    curves: Vec<Curve>,
     waiting: Vec<Part>,
-    /// The parts of every curve given, in order of intervals and time.
     parts: Vec<Part>,
+    /// What those parts have become that a polynomial fits.
+    segments: Vec<PolynomialSegment>,
 }
 
 /// A part of a curve.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 pub(super) struct Part {
     /// The interval that the curve is of.
     pub(super) interval: usize,
-    pub(super) curve: Curve,
-    /// Nothing where even the finest does not fit.
-    pub(super) segment: Option<PolynomialSegment>,
+    /// Its place among the curves given.
+    curve: usize,
+    pub(super) piece: Piece,
+    /// Its place among the segments; nothing where even the finest does not fit.
+    segment: Option<usize>,
 }
 
 impl Cutter {
@@ -36,63 +41,92 @@ impl Cutter {
             shape,
             quantity,
             block: None,
+            curves: Vec::new(),
             waiting: Vec::new(),
             parts: Vec::new(),
+            segments: Vec::new(),
         }
     }
 
     /// Adds the curve of an interval: at least two parts will come of it.
     pub(super) fn push(&mut self, interval: usize, curve: Curve) {
-        for piece in curve.piece.halves() {
-            self.waiting.push(Part {
-                interval,
-                curve: Curve {
-                    piece,
-                    ..curve.clone()
-                },
-                segment: None,
-            });
-        }
+        self.push_pieces(interval, &curve.piece.halves());
+        self.curves.push(curve);
     }
 
     /// Adds the curve of an interval, to be cut where it does not fit whole.
     pub(super) fn push_whole(&mut self, interval: usize, curve: Curve) {
-        self.waiting.push(Part {
-            interval,
-            curve,
-            segment: None,
-        });
+        self.push_pieces(interval, &[curve.piece]);
+        self.curves.push(curve);
     }
 
-    /// The parts of the curves given since the last call.
-    pub(super) fn cut(&mut self) -> &[Part] {
-        self.parts.clear();
+    /// Of the curve that is given next.
+    fn push_pieces(&mut self, interval: usize, pieces: &[Piece]) {
+        self.waiting.extend(pieces.iter().map(|&piece| Part {
+            interval,
+            curve: self.curves.len(),
+            piece,
+            segment: None,
+        }));
+    }
+
+    /// Cuts the curves given.
+    pub(super) fn cut(&mut self) {
         while !self.waiting.is_empty() {
-            let first = self.waiting.len().saturating_sub(LANES);
-            let now = self.waiting.split_off(first);
-            let mut block = match self.block.take() {
-                Some(block) => block,
-                None => Box::new(FitBlock::new(self.shape, self.quantity, Tier::Full)),
-            };
+            let new = || Box::new(FitBlock::new(self.shape, self.quantity, Tier::Full));
+            let block = self.block.get_or_insert_with(new);
             block.clear();
-            now.iter().for_each(|part| block.push(&part.curve));
+            let first = self.waiting.len().saturating_sub(LANES);
+            for part in &self.waiting[first..] {
+                block.push(&self.curves[part.curve], part.piece);
+            }
             block.run();
-            for (lane, part) in now.into_iter().enumerate() {
+            let mut halves = Vec::new();
+            for (lane, part) in self.waiting.drain(first..).enumerate() {
                 if block.fits(lane) {
                     let mut segment = PolynomialSegment::zeroed();
                     block.write(lane, &mut segment);
-                    let segment = Some(segment);
-                    self.parts.push(Part { segment, ..part });
-                } else if part.curve.piece.is_finest() {
+                    let place = Some(self.segments.len());
+                    self.segments.push(segment);
+                    self.parts.push(Part {
+                        segment: place,
+                        ..part
+                    });
+                } else if part.piece.is_finest() {
                     self.parts.push(part);
                 } else {
-                    self.push(part.interval, part.curve);
+                    let half = |piece| Part { piece, ..part };
+                    halves.extend(part.piece.halves().map(half));
                 }
             }
-            self.block = Some(block);
+            self.waiting.append(&mut halves);
         }
         self.parts
-            .sort_unstable_by_key(|part| (part.interval, part.curve.piece.from));
+            .sort_unstable_by_key(|part| (part.interval, part.piece.from));
+    }
+
+    /// The parts of every curve given, in order of intervals and time.
+    pub(super) fn parts(&self) -> &[Part] {
         &self.parts
+    }
+
+    /// What a part has become.
+    pub(super) fn segment(&self, part: &Part) -> Option<PolynomialSegment> {
+        part.segment.map(|place| self.segments[place])
+    }
+
+    /// The part as a curve of its own.
+    pub(super) fn curve(&self, part: &Part) -> Curve {
+        Curve {
+            piece: part.piece,
+            ..self.curves[part.curve].clone()
+        }
+    }
+
+    /// Forgets the curves given, and their parts.
+    pub(super) fn clear(&mut self) {
+        self.curves.clear();
+        self.parts.clear();
+        self.segments.clear();
     }
 }

@@ -14,6 +14,7 @@ use super::motion;
 use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
 use super::pace::Pace;
 use super::shape::Shape;
+use crate::cpu::Lanes;
 use crate::formula::Numbers;
 use crate::method::Quantity;
 use crate::numeric::canonical;
@@ -143,7 +144,7 @@ impl FitBlock {
     }
 
     /// Adds a piece of a curve; the block is not full.
-    pub(super) fn push(&mut self, curve: &Curve) {
+    pub(super) fn push(&mut self, curve: &Curve, piece: Piece) {
         let lane = self.count;
         for (lanes, &number) in self.numbers.iter_mut().zip(&curve.numbers) {
             lanes[lane] = number;
@@ -152,7 +153,7 @@ impl FitBlock {
         if curve.pace.is_some() {
             self.paces.push(curve.pace.clone());
         }
-        self.push_piece(curve.piece);
+        self.push_piece(piece);
     }
 
     /// Adds the curve in a lane of `intervals`; the block is not full.
@@ -236,67 +237,84 @@ impl FitBlock {
 
     /// From the differences at the nodes to the coefficients.
     #[inline(always)]
-    pub(super) fn interpolate<const PAIRS: usize>(
+    pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
         &mut self,
         count: usize,
         nodes: &Nodes<PAIRS>,
-        Samples { middle, even, odd }: &Samples<PAIRS>,
+        samples: &Samples<PAIRS>,
     ) {
         let entire = self.is_entire();
-        let mut tails = [0.0; LANES];
-        let mut found_even = [[[0.0f32; LANES]; 4]; PAIRS];
-        let mut found_odd = [[[0.0f32; LANES]; 4]; PAIRS];
-        for c in 0..4 {
-            for lane in 0..count {
-                let mut means = [0.0; PAIRS];
-                let mut halves = [0.0; PAIRS];
-                for i in 0..PAIRS {
-                    for k in 0..PAIRS {
-                        means[i] += nodes.even[i][k] * even[k][c][lane];
-                        halves[i] += nodes.odd[i][k] * odd[k][c][lane];
-                    }
-                }
+        for lane in (0..count).step_by(L::COUNT) {
+            let lanes = lane..lane + L::COUNT;
+            let nothing = [L::all(0.0); 4];
+            let (mut even, mut odd) = ([nothing; PAIRS], [nothing; PAIRS]);
+            let mut tails = L::all(0.0);
+            for c in 0..4 {
+                let means: [L; PAIRS] = coefficients(&nodes.even, &samples.even, c, lane);
+                let halves: [L; PAIRS] = coefficients(&nodes.odd, &samples.odd, c, lane);
                 for power in 0..PAIRS {
-                    let mut e = 0.0;
-                    let mut o = 0.0;
-                    for i in power..PAIRS {
-                        e += EVEN_POWERS[i][power] * means[i];
-                        o += ODD_POWERS[i][power] * halves[i];
-                    }
-                    found_even[power][c][lane] = canonical(e);
-                    found_odd[power][c][lane] = canonical(o);
+                    even[power][c] = of_power(&EVEN_POWERS, &means, power).canonical();
+                    odd[power][c] = of_power(&ODD_POWERS, &halves, power).canonical();
                 }
-                let (last_even, last_odd) = (means[PAIRS - 1].abs(), halves[PAIRS - 1].abs());
-                let before_last = means[PAIRS - 2].abs() + halves[PAIRS - 2].abs();
+                let last_even: L = means[PAIRS - 1].magnitude();
+                let last_odd: L = halves[PAIRS - 1].magnitude();
+                let before_last = means[PAIRS - 2].magnitude() + halves[PAIRS - 2].magnitude();
                 let tail = if entire {
-                    last_even + 0.125 * last_odd
+                    last_even + L::all(0.125) * last_odd
                 } else {
-                    last_even + last_odd + 0.25 * before_last
+                    last_even + last_odd + L::all(0.25) * before_last
                 };
-                tails[lane] = if tail > tails[lane] {
-                    tail
-                } else {
-                    tails[lane]
-                };
+                tails = tail.larger(tails);
             }
-        }
-        self.tails = tails;
-        let stored = &mut self.coefficients;
-        let [x, y, z, w] = middle;
-        for lane in 0..count {
-            stored[0][lane] = [x[lane], y[lane], z[lane], w[lane]].map(canonical);
-        }
-        for power in 0..PAIRS {
-            store(&mut stored[2 * power + 1], &found_odd[power], count);
-            store(&mut stored[2 * power + 2], &found_even[power], count);
+            tails.store(&mut self.tails[lanes.clone()]);
+            let mut store = self.coefficients.iter_mut();
+            let [x, y, z, w] = &samples.middle;
+            let middle = [
+                L::load(&x[lane..]).canonical(),
+                L::load(&y[lane..]).canonical(),
+                L::load(&z[lane..]).canonical(),
+                L::load(&w[lane..]).canonical(),
+            ];
+            let stored = store.next().expect("the middle");
+            L::store_rotations(middle, &mut stored[lanes.clone()]);
+            for (odd, even) in odd.into_iter().zip(even) {
+                for powers in [odd, even] {
+                    let stored = store.next().expect("as many powers");
+                    L::store_rotations(powers, &mut stored[lanes.clone()]);
+                }
+            }
         }
     }
 }
 
-/// Components side by side to quaternions.
+/// Chebyshev coefficients of a component, from its samples.
 #[inline(always)]
-fn store(stored: &mut [[f32; 4]; LANES], [x, y, z, w]: &[Lane32; 4], count: usize) {
-    for lane in 0..count {
-        stored[lane] = [x[lane], y[lane], z[lane], w[lane]];
+fn coefficients<L: Lanes, const PAIRS: usize>(
+    nodes: &[[f32; PAIRS]; PAIRS],
+    samples: &[[Lane32; 4]; PAIRS],
+    component: usize,
+    lane: usize,
+) -> [L; PAIRS] {
+    let mut sums = [L::all(0.0); PAIRS];
+    for k in 0..PAIRS {
+        let sample = L::load(&samples[k][component][lane..]);
+        for i in 0..PAIRS {
+            sums[i] = sums[i] + L::all(nodes[i][k]) * sample;
+        }
     }
+    sums
+}
+
+/// The coefficient of a power, from those of Chebyshev polynomials.
+#[inline(always)]
+fn of_power<L: Lanes, const PAIRS: usize>(
+    powers: &[[f32; 5]; 5],
+    coefficients: &[L; PAIRS],
+    power: usize,
+) -> L {
+    let mut sum = L::all(0.0);
+    for i in power..PAIRS {
+        sum = sum + L::all(powers[i][power]) * coefficients[i];
+    }
+    sum
 }

@@ -184,7 +184,8 @@ impl Fitting {
             in_lanes(&mut **block);
             block.write(polynomials(prepared));
         }
-        let mut parts = self.cutter.cut();
+        self.cutter.cut();
+        let mut parts = self.cutter.parts();
         for (interval, Fitted { place, source }) in self.intervals.drain(..).enumerate() {
             let first_span = prepared.spans.len();
             let Place { start, key, .. } = place;
@@ -199,10 +200,10 @@ impl Fitting {
                     let is_own = |part: &&CurvePart| part.interval == interval;
                     let own = parts.iter().take_while(is_own).count();
                     for part in parts.split_off(..own).unwrap_or_default() {
-                        let (from, _) = part.curve.piece.extent();
+                        let (from, _) = part.piece.extent();
                         let start = start + (place.end - start) * from;
                         let key = if from == 0.0 { key } else { NONE };
-                        let source = prepared.part_source(part, &mut spare);
+                        let source = prepared.part_source(&self.cutter, part, &mut spare);
                         prepared.push_span(start, source, key);
                     }
                 }
@@ -212,13 +213,19 @@ impl Fitting {
             let start = if is_first { first_span } else { spans.start };
             *spans = start..prepared.spans.len();
         }
+        self.cutter.clear();
     }
 }
 
 impl Prepared {
-    fn part_source(&mut self, part: &CurvePart, spare: &mut Option<u32>) -> Source {
-        let Some(segment) = part.segment else {
-            self.exact.push(part.curve.clone());
+    fn part_source(
+        &mut self,
+        cutter: &Cutter,
+        part: &CurvePart,
+        spare: &mut Option<u32>,
+    ) -> Source {
+        let Some(segment) = cutter.segment(part) else {
+            self.exact.push(cutter.curve(part));
             return Source::Exact(self.exact.len() as u32 - 1);
         };
         let segments = polynomials(self);

@@ -52,22 +52,22 @@ impl InLanes for Fit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
-            Tier::Gentle => self.fit(&GENTLE_NODES),
-            Tier::Full => self.fit(&FULL_NODES),
+            Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
+            Tier::Full => self.fit::<L, _>(&FULL_NODES),
         }
     }
 }
 
 impl Fit<'_> {
     #[inline(always)]
-    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
         let count = self.0.whole();
         let mut samples = Samples::new();
         let mut scales = [1.0; LANES];
         for (lane, scale) in scales[..count].iter_mut().enumerate() {
             *scale = sample(self.0, lane, nodes, &mut samples);
         }
-        self.0.interpolate(count, nodes, &samples);
+        self.0.interpolate::<L, PAIRS>(count, nodes, &samples);
         self.0.scale(&scales);
     }
 }

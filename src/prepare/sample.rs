@@ -7,18 +7,20 @@ use super::intervals::LANES;
 use super::nodes::Nodes;
 use super::shape::Sampling;
 use crate::branchless::{self, Algebra, Near, product, scaled};
-use crate::cpu::sine_and_fall;
+use crate::cpu::{Lanes, Number, sine_and_fall};
 use crate::formula::Product;
 
-/// A cubic about the middle of its piece, expanded: with `c_j` the cosine of the j-th
-/// angle and `s_j` its sine divided by the length of its vector,
-/// `q = Σ terms[4a+2b+c] {c,s}_1 {c,s}_2 {c,s}_3`.
-pub(super) struct Expanded {
-    pub(super) terms: [[Lane32; 4]; 8],
+/// Cubics about the middle of their pieces: `q = q_0 exp(v_1 B_1) exp(v_2 B_2) exp(v_3 B_3)`.
+pub(super) struct Middles {
+    /// What the rotations before each vector, and behind the last, have made of it there.
+    bases: [[Lane32; 4]; 3],
+    /// The rotations by the second and by the third vector alone.
+    turns: [[Lane32; 4]; 2],
+    vectors: [[Lane32; 3]; 3],
     /// The squares of the three vectors' lengths.
-    pub(super) squares: [Lane32; 3],
+    squares: [Lane32; 3],
     /// Coefficients of s, s² and s³ in the three basis functions.
-    pub(super) powers: [[Lane32; 3]; 3],
+    powers: [[Lane32; 3]; 3],
 }
 
 /// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
@@ -26,31 +28,37 @@ pub(super) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
     #[inline(always)]
-    fn sample<const PAIRS: usize>(
+    fn sample<L: Lanes, const PAIRS: usize>(
         block: &mut FitBlock,
         count: usize,
         nodes: &Nodes<PAIRS>,
         samples: &mut Samples<PAIRS>,
     ) {
         let lane = [0.0; LANES];
-        let mut expanded = Expanded {
-            terms: [[lane; 4]; 8],
+        let mut middles = Middles {
+            bases: [[lane; 4]; 3],
+            turns: [[lane; 4]; 2],
+            vectors: [[lane; 3]; 3],
             squares: [lane; 3],
             powers: [[lane; 3]; 3],
         };
-        block.expand::<OWN_BASIS>(count, &mut expanded);
-        expanded.sample(count, nodes, samples);
+        block.at_middles::<OWN_BASIS>(count, &mut middles);
+        for lane in (0..count).step_by(L::COUNT) {
+            Expanded::<L>::new(&middles, lane).sample(lane, nodes, samples);
+        }
     }
 }
 
 impl FitBlock {
     #[inline(always)]
-    fn expand<const OWN_BASIS: bool>(&mut self, count: usize, expanded: &mut Expanded) {
-        let Expanded {
-            terms,
+    fn at_middles<const OWN_BASIS: bool>(&mut self, count: usize, found: &mut Middles) {
+        let Middles {
+            bases,
+            turns,
+            vectors,
             squares,
             powers,
-        } = expanded;
+        } = found;
         let mut reaches = [0.0; LANES];
         // What each rotation has reached at the middle.
         let mut reached = [[[0.0; LANES]; 4]; 3];
@@ -104,7 +112,6 @@ impl FitBlock {
             }
         }
         self.reaches = reaches;
-        let mut bases = [[[0.0; LANES]; 4]; 2];
         for lane in 0..count {
             let turn = |j: usize| {
                 let [x, y, z, w]: &[Lane64; 4] = &reached[j];
@@ -117,41 +124,15 @@ impl FitBlock {
             for c in 0..4 {
                 bases[0][c][lane] = first[c] as f32;
                 bases[1][c][lane] = second[c] as f32;
-                terms[0][c][lane] = third[c] as f32;
+                bases[2][c][lane] = third[c] as f32;
+                turns[0][c][lane] = reached[1][c][lane] as f32;
+                turns[1][c][lane] = reached[2][c][lane] as f32;
             }
         }
-        for lane in 0..count {
-            let quaternion = |lanes: &[Lane32; 4]| {
-                let [x, y, z, w] = lanes;
-                [x[lane], y[lane], z[lane], w[lane]]
-            };
-            let turn = |j: usize| {
-                let [x, y, z, w]: &[Lane64; 4] = &reached[j];
-                [x[lane], y[lane], z[lane], w[lane]].map(|c| c as f32)
-            };
-            let vector = |j: usize| {
-                let v = &rest[3 * j..][..3];
-                [v[0][lane], v[1][lane], v[2][lane]].map(|c| c as f32)
-            };
-            let (v1, v2, v3) = (vector(0), vector(1), vector(2));
-            let (r2, r3) = (turn(1), turn(2));
-            let to_third = about(quaternion(&terms[0]), v3);
-            let second = product32(about(quaternion(&bases[1]), v2), r3);
-            let first = product32(about(quaternion(&bases[0]), v1), r2);
-            let first_second = product32(about(first, v2), r3);
-            let first = product32(first, r3);
-            let all = [
-                to_third,
-                second,
-                about(second, v3),
-                first,
-                about(first, v3),
-                first_second,
-                about(first_second, v3),
-            ];
-            for i in 0..7 {
-                for c in 0..4 {
-                    terms[i + 1][c][lane] = all[i][c];
+        for j in 0..3 {
+            for c in 0..3 {
+                for lane in 0..count {
+                    vectors[j][c][lane] = rest[3 * j + c][lane] as f32;
                 }
             }
         }
@@ -160,7 +141,7 @@ impl FitBlock {
 
 /// The Hamilton product `a b` in f32.
 #[inline(always)]
-fn product32(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+fn product32<N: Number>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     [
         a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
         a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
@@ -171,7 +152,7 @@ fn product32(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
 
 /// `a v`, `v` a vector.
 #[inline(always)]
-fn about(a: [f32; 4], v: [f32; 3]) -> [f32; 4] {
+fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     [
         a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
         a[3] * v[1] - a[0] * v[2] + a[2] * v[0],
@@ -180,66 +161,101 @@ fn about(a: [f32; 4], v: [f32; 3]) -> [f32; 4] {
     ]
 }
 
-impl Expanded {
+/// Cubics about the middle of their pieces, expanded, a lane to each: with `c_j` the cosine
+/// of the j-th angle and `s_j` its sine divided by the length of its vector,
+/// `q = Σ terms[4a+2b+c] {c,s}_1 {c,s}_2 {c,s}_3`.
+struct Expanded<L> {
+    terms: [[L; 4]; 8],
+    squares: [L; 3],
+    powers: [[L; 3]; 3],
+}
+
+impl<L: Lanes> Expanded<L> {
+    /// The cubics from `lane` on.
     #[inline(always)]
-    pub(super) fn sample<const PAIRS: usize>(
+    fn new(middles: &Middles, lane: usize) -> Self {
+        let Middles {
+            bases,
+            turns,
+            vectors,
+            squares,
+            powers,
+        } = middles;
+        // Written out: closures are not always inlined.
+        let (r2, r3) = (load4(&turns[0], lane), load4(&turns[1], lane));
+        let v1: [L; 3] = load3(&vectors[0], lane);
+        let (v2, v3) = (load3(&vectors[1], lane), load3(&vectors[2], lane));
+        let third = load4(&bases[2], lane);
+        let second = product32(about(load4(&bases[1], lane), v2), r3);
+        let first = product32(about(load4(&bases[0], lane), v1), r2);
+        let first_second = product32(about(first, v2), r3);
+        let first = product32(first, r3);
+        Self {
+            terms: [
+                third,
+                about(third, v3),
+                second,
+                about(second, v3),
+                first,
+                about(first, v3),
+                first_second,
+                about(first_second, v3),
+            ],
+            squares: load3(squares, lane),
+            powers: [
+                load3(&powers[0], lane),
+                load3(&powers[1], lane),
+                load3(&powers[2], lane),
+            ],
+        }
+    }
+
+    /// Samples them at every node.
+    #[inline(always)]
+    fn sample<const PAIRS: usize>(
         &self,
-        count: usize,
+        lane: usize,
         nodes: &Nodes<PAIRS>,
         Samples { middle, even, odd }: &mut Samples<PAIRS>,
     ) {
-        *middle = self.terms[0];
-        for (k, &node) in nodes.at.iter().enumerate() {
-            let mut before = [[0.0; LANES]; 4];
-            for lane in 0..count {
-                let difference = self.difference(lane, -node);
-                for c in 0..4 {
-                    before[c][lane] = difference[c];
-                }
-            }
-            for lane in 0..count {
-                let difference = self.difference(lane, node);
-                for c in 0..4 {
-                    even[k][c][lane] = (difference[c] + before[c][lane]) * 0.5;
-                    odd[k][c][lane] = (difference[c] - before[c][lane]) * 0.5;
-                }
+        let half = L::all(0.5);
+        let lanes = lane..lane + L::COUNT;
+        for c in 0..4 {
+            self.terms[0][c].store(&mut middle[c][lanes.clone()]);
+        }
+        for k in 0..PAIRS {
+            let before = self.difference(L::all(-nodes.at[k]));
+            let after = self.difference(L::all(nodes.at[k]));
+            for c in 0..4 {
+                ((after[c] + before[c]) * half).store(&mut even[k][c][lanes.clone()]);
+                ((after[c] - before[c]) * half).store(&mut odd[k][c][lanes.clone()]);
             }
         }
     }
 
     /// `q(s) - q(0)`.
     #[inline(always)]
-    fn difference(&self, lane: usize, s: f32) -> [f32; 4] {
-        let mut sines = [0.0; 3];
-        let mut falls = [0.0; 3];
-        for j in 0..3 {
-            let [linear, quadratic, cubic] = [
-                self.powers[0][j][lane],
-                self.powers[1][j][lane],
-                self.powers[2][j][lane],
-            ];
-            let weight = ((cubic * s + quadratic) * s + linear) * s;
-            (sines[j], falls[j]) = sine_and_fall(weight, self.squares[j][lane] * (weight * weight));
-        }
+    fn difference(&self, s: L) -> [L; 4] {
+        let (s1, f1) = self.turn(0, s);
+        let (s2, f2) = self.turn(1, s);
+        let (s3, f3) = self.turn(2, s);
         // With cosines as 1 + fall, nothing is lost where the angles are small.
-        let [s1, s2, s3] = sines;
-        let [f1, f2, f3] = falls;
         let both = f2 + f3 + f2 * f3;
         let cs = s3 + f2 * s3;
         let sc = s2 + s2 * f3;
         let ss = s2 * s3;
-        let cc = 1.0 + both;
-        let mut difference = [0.0; 4];
+        let cc = L::all(1.0) + both;
+        let mut difference = self.terms[0];
         for c in 0..4 {
             let terms = [
-                self.terms[0][c][lane],
-                self.terms[1][c][lane],
-                self.terms[2][c][lane],
-                self.terms[3][c][lane],
-                self.terms[4][c][lane],
-                self.terms[5][c][lane],
-                self.terms[6][c][lane],
-                self.terms[7][c][lane],
+                self.terms[0][c],
+                self.terms[1][c],
+                self.terms[2][c],
+                self.terms[3][c],
+                self.terms[4][c],
+                self.terms[5][c],
+                self.terms[6][c],
+                self.terms[7][c],
             ];
             let rest = terms[1] * cs + terms[2] * sc + terms[3] * ss;
             let even = terms[0] * both + rest;
@@ -248,4 +264,31 @@ impl Expanded {
         }
         difference
     }
+
+    /// Sine over length, and cosine less 1, of the j-th angle.
+    #[inline(always)]
+    fn turn(&self, j: usize, s: L) -> (L, L) {
+        let [linear, quadratic, cubic] = [self.powers[0][j], self.powers[1][j], self.powers[2][j]];
+        let weight = ((cubic * s + quadratic) * s + linear) * s;
+        sine_and_fall(weight, self.squares[j] * (weight * weight))
+    }
+}
+
+#[inline(always)]
+fn load3<L: Lanes>([x, y, z]: &[Lane32; 3], lane: usize) -> [L; 3] {
+    [
+        L::load(&x[lane..]),
+        L::load(&y[lane..]),
+        L::load(&z[lane..]),
+    ]
+}
+
+#[inline(always)]
+fn load4<L: Lanes>([x, y, z, w]: &[Lane32; 4], lane: usize) -> [L; 4] {
+    [
+        L::load(&x[lane..]),
+        L::load(&y[lane..]),
+        L::load(&z[lane..]),
+        L::load(&w[lane..]),
+    ]
 }

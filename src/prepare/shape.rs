@@ -98,7 +98,7 @@ impl Shape {
 
 /// A way to sample the curves of a block.
 pub(super) trait Sampling: 'static {
-    fn sample<const PAIRS: usize>(
+    fn sample<L: Lanes, const PAIRS: usize>(
         block: &mut FitBlock,
         count: usize,
         nodes: &Nodes<PAIRS>,
@@ -117,19 +117,19 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
-            Tier::Gentle => self.fit(&GENTLE_NODES),
-            Tier::Full => self.fit(&FULL_NODES),
+            Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
+            Tier::Full => self.fit::<L, _>(&FULL_NODES),
         }
     }
 }
 
 impl<S: Sampling> Fit<'_, S> {
     #[inline(always)]
-    fn fit<const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
         let count = self.0.whole();
         let mut samples = Samples::new();
-        S::sample(self.0, count, nodes, &mut samples);
-        self.0.interpolate(count, nodes, &samples);
+        S::sample::<L, PAIRS>(self.0, count, nodes, &mut samples);
+        self.0.interpolate::<L, PAIRS>(count, nodes, &samples);
     }
 }
 
@@ -138,7 +138,7 @@ struct Directly<F>(PhantomData<F>);
 
 impl<F: Formula> Sampling for Directly<F> {
     #[inline(always)]
-    fn sample<const PAIRS: usize>(
+    fn sample<L: Lanes, const PAIRS: usize>(
         block: &mut FitBlock,
         count: usize,
         nodes: &Nodes<PAIRS>,

@@ -2,11 +2,11 @@
 
 use std::arch::x86_64::{
     __m256, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
-    _mm256_castps_pd, _mm256_cmp_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_ps,
-    _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
-    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps,
+    _mm256_castps_pd, _mm256_cmp_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
+    _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps,
+    _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
@@ -37,6 +37,16 @@ impl Sub for Eight {
     }
 }
 
+impl Neg for Eight {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let sign = Self::all(-0.0);
+        Self(unsafe { _mm256_xor_ps(self.0, sign.0) })
+    }
+}
+
 impl Mul for Eight {
     type Output = Self;
 
@@ -64,12 +74,6 @@ impl Number for Eight {
 }
 
 impl Eight {
-    #[inline(always)]
-    fn magnitude(self) -> Self {
-        let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
-        Self(unsafe { _mm256_and_ps(self.0, magnitude.0) })
-    }
-
     /// Four by four within each half.
     #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
@@ -133,6 +137,17 @@ impl Lanes for Eight {
             let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
             _mm256_blendv_ps(one.0, minus_one.0, below)
         })
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
+        Self(unsafe { _mm256_and_ps(self.0, magnitude.0) })
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
     }
 
     #[inline(always)]
