@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::cpu::{InLanes, Lanes, gentle, in_lanes, signed};
+use crate::cpu::{Gentle, InLanes, Lanes, gentle, in_lanes, signed};
 use crate::joints::{Joints, UNKNOWN};
 use crate::method::{Ends, Path};
 use crate::segment::shader::{INNER, LONGEST_STEP};
@@ -12,6 +12,9 @@ use crate::segment::{Joint, PolynomialSegment};
 
 /// Lanes of the widest vectors.
 const VECTOR: usize = 16;
+
+/// So few curves are worked out one by one: most lanes would be for nothing.
+const FEW: usize = 6;
 
 /// The curves of a block's intervals.
 pub(super) struct GentleLanes {
@@ -74,10 +77,20 @@ impl GentleLanes {
 
     /// Prepares them; the signs of the intervals' first keys are known.
     pub(super) fn prepare(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
-        in_lanes(&mut JointLanes {
-            lanes: self,
-            intervals,
-        });
+        let own = stretches.iter().flat_map(Stretch::lanes);
+        let near: Vec<usize> = own.filter(|&lane| self.near[lane]).collect();
+        let are_few = near.len() <= FEW;
+        if are_few {
+            let durations = &intervals.durations;
+            for key in near.iter().flat_map(|&lane| [lane, lane + 1]) {
+                self.joints[key] = self.rule.between(durations[key - 1], durations[key]);
+            }
+        } else {
+            in_lanes(&mut JointLanes {
+                lanes: self,
+                intervals,
+            });
+        }
         for stretch in stretches.iter().filter(|_| !self.is_loop) {
             let end = match stretch.all {
                 1 => UNKNOWN,
@@ -90,10 +103,42 @@ impl GentleLanes {
                 self.joints[lane + 1] = end;
             }
         }
-        in_lanes(&mut Curves {
-            lanes: self,
-            intervals,
-        });
+        if !are_few {
+            in_lanes(&mut Curves {
+                lanes: self,
+                intervals,
+            });
+            return;
+        }
+        for lane in near {
+            let curve = self.curve(intervals, lane - 1);
+            for (powers, power) in self.powers.iter_mut().zip(curve.powers) {
+                powers[lane] = power;
+            }
+            self.holds[lane] = curve.holds;
+        }
+    }
+
+    /// The curve of lane `j + 1`.
+    #[inline(always)]
+    fn curve(&self, intervals: &Intervals, j: usize) -> Gentle {
+        let Intervals {
+            from, to, signs, ..
+        } = intervals;
+        let flips = &self.flips;
+        let own = signs[j + 1] as f32;
+        let sign_before = own * flips[j];
+        let sign_end = own * flips[j + 1];
+        let sign_after = sign_end * flips[j + 2];
+        let (first, last) = (self.joints[j + 1], self.joints[j + 2]);
+        let start = signed(from[j + 1], own);
+        let end = signed(to[j + 1], sign_end);
+        let before = signed(from[j], sign_before);
+        let after = signed(to[j + 2], sign_after);
+        // Where there is no neighbour, the key again.
+        let before = either(first.kind == INNER, before, start);
+        let after = either(last.kind == INNER, after, end);
+        gentle([before, start, end, after], first, last)
     }
 
     /// Whether a lane has its curve.
@@ -164,30 +209,10 @@ impl InLanes for Curves<'_> {
     fn run<L: Lanes>(&mut self) {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
-        let GentleLanes {
-            flips,
-            joints,
-            wanted,
-            ..
-        } = &*self.lanes;
-        let Intervals {
-            from, to, signs, ..
-        } = self.intervals;
         // The lane before each is context, at least.
-        for j in 0..*wanted.min(&LANES) {
-            let own = signs[j + 1] as f32;
-            let sign_before = own * flips[j];
-            let sign_end = own * flips[j + 1];
-            let sign_after = sign_end * flips[j + 2];
-            let (first, last) = (joints[j + 1], joints[j + 2]);
-            let start = signed(from[j + 1], own);
-            let end = signed(to[j + 1], sign_end);
-            let before = signed(from[j], sign_before);
-            let after = signed(to[j + 2], sign_after);
-            // Where there is no neighbour, the key again.
-            let before = either(first.kind == INNER, before, start);
-            let after = either(last.kind == INNER, after, end);
-            let curve = gentle([before, start, end, after], first, last);
+        let lanes = &*self.lanes;
+        for j in 0..lanes.wanted.min(LANES) {
+            let curve = lanes.curve(self.intervals, j);
             for power in 0..7 {
                 for c in 0..4 {
                     powers[power][c][j + 1] = curve.powers[power][c];
