@@ -140,7 +140,7 @@ impl FitBlock {
     /// Lanes to work out: whole vectors, or those left over would be done one by one.
     #[inline(always)]
     pub(super) fn whole(&self) -> usize {
-        self.count.next_multiple_of(16).min(LANES)
+        self.count.next_multiple_of(8).min(LANES)
     }
 
     /// Adds a piece of a curve; the block is not full.
