@@ -72,6 +72,10 @@ if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --all-targets --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --quiet
-cargo test --release --test cost
+# As releases are built, but with the tests' dependencies: those are built once.
+own=profile.dev.package.tumble
+CARGO_INCREMENTAL=0 cargo test --test cost --config "$own.opt-level=3" \
+    --config "$own.codegen-units=16" --config "$own.overflow-checks=false" \
+    --config "$own.debug-assertions=false"
 # Twenty seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
 FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test

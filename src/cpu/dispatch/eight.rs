@@ -11,8 +11,14 @@ use std::ops::{Add, Mul, Neg, Sub};
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
-// SAFETY of every block here: only functions that are compiled for AVX2 use this type, and
-// those run where the processor has it (`Kernels::new`).
+/// What only processors with AVX2 do.
+macro_rules! avx2 {
+    ($($work:tt)*) => {
+        // SAFETY: functions that are compiled for AVX2 alone use `Eight`, and those run where
+        // the processor has it (`Kernels::new`, `lanes_of`).
+        unsafe { $($work)* }
+    };
+}
 
 /// Samples 0 2 4 6 in one half and 1 3 5 7 in the other: so two neighbours lie side by side
 /// when each half has been transposed, and the halves need not be exchanged.
@@ -24,7 +30,7 @@ impl Add for Eight {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(unsafe { _mm256_add_ps(self.0, other.0) })
+        Self(avx2!(_mm256_add_ps(self.0, other.0)))
     }
 }
 
@@ -33,7 +39,7 @@ impl Sub for Eight {
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+        Self(avx2!(_mm256_sub_ps(self.0, other.0)))
     }
 }
 
@@ -43,7 +49,7 @@ impl Neg for Eight {
     #[inline(always)]
     fn neg(self) -> Self {
         let sign = Self::all(-0.0);
-        Self(unsafe { _mm256_xor_ps(self.0, sign.0) })
+        Self(avx2!(_mm256_xor_ps(self.0, sign.0)))
     }
 }
 
@@ -52,21 +58,21 @@ impl Mul for Eight {
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+        Self(avx2!(_mm256_mul_ps(self.0, other.0)))
     }
 }
 
 impl Number for Eight {
     #[inline(always)]
     fn all(value: f32) -> Self {
-        Self(unsafe { _mm256_set1_ps(value) })
+        Self(avx2!(_mm256_set1_ps(value)))
     }
 
     #[inline(always)]
     fn canonical(self) -> Self {
         let tiny = Self::all(f32::from_bits(TINY_BITS));
         let magnitude = self.magnitude();
-        Self(unsafe {
+        Self(avx2! {
             let whole = _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude.0, tiny.0);
             _mm256_and_ps(self.0, whole)
         })
@@ -78,7 +84,7 @@ impl Eight {
     #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
-        let rows = unsafe {
+        let rows = avx2! {
             let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
@@ -101,7 +107,7 @@ impl Lanes for Eight {
     #[inline(always)]
     fn load(samples: &[f32]) -> Self {
         let samples: [f32; 8] = *samples.first_chunk().expect("eight samples");
-        Self(unsafe {
+        Self(avx2! {
             let order = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
             _mm256_permutevar8x32_ps(bytemuck::cast(samples), order)
         })
@@ -109,7 +115,7 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn store(self, samples: &mut [f32]) {
-        let stored = unsafe {
+        let stored = avx2! {
             let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
             _mm256_permutevar8x32_ps(self.0, order)
         };
@@ -133,7 +139,7 @@ impl Lanes for Eight {
     #[inline(always)]
     fn sign(self) -> Self {
         let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
-        Self(unsafe {
+        Self(avx2! {
             let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
             _mm256_blendv_ps(one.0, minus_one.0, below)
         })
@@ -142,18 +148,18 @@ impl Lanes for Eight {
     #[inline(always)]
     fn magnitude(self) -> Self {
         let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
-        Self(unsafe { _mm256_and_ps(self.0, magnitude.0) })
+        Self(avx2!(_mm256_and_ps(self.0, magnitude.0)))
     }
 
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
-        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+        Self(avx2!(_mm256_max_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn any_at_most(self, limit: f32) -> bool {
         let limit = Self::all(limit);
-        unsafe {
+        avx2! {
             let within = _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0);
             _mm256_movemask_ps(within) != 0
         }
