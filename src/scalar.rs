@@ -3,7 +3,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::branchless::{arc_tangent, sine_cosine};
+use crate::branchless::{arc_tangent, near_arc_square, near_waves, sine_cosine};
 
 /// A number that depends on time.
 pub(crate) trait Scalar:
@@ -52,6 +52,61 @@ impl Scalar for f64 {
         // What is no curve any more shall still be a number.
         let root = self.sqrt();
         1.0 / if root > 1e-150 { root } else { 1e-150 }
+    }
+}
+
+/// As f64, for lanes: by polynomials alone, without a range reduction, a root or a division
+/// for each angle. NaN, which stays, where an angle is more than pi/2.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near(pub(crate) f64);
+
+impl Add for Near {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0)
+    }
+}
+
+impl Sub for Near {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0)
+    }
+}
+
+impl Mul for Near {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0)
+    }
+}
+
+impl Scalar for Near {
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        Self(value)
+    }
+
+    #[inline(always)]
+    fn waves(self) -> (Self, Self) {
+        let (sinc, cosine) = near_waves(self.0);
+        (Self(sinc), Self(cosine))
+    }
+
+    #[inline(always)]
+    fn arc_square(self) -> Self {
+        Self(near_arc_square(self.0))
+    }
+
+    #[inline(always)]
+    fn reciprocal_root(self) -> Self {
+        Self(self.0.reciprocal_root())
     }
 }
 

@@ -11,7 +11,7 @@ use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::formula::{
     DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
-use crate::scalar::Jet;
+use crate::scalar::{Jet, Near};
 
 /// A formula, and how its curves are sampled.
 pub(crate) struct Shape {
@@ -142,29 +142,71 @@ impl<F: Formula> Sampling for Directly<F> {
         block: &mut FitBlock,
         count: usize,
         nodes: &Nodes<PAIRS>,
-        Samples { middle, even, odd }: &mut Samples<PAIRS>,
+        samples: &mut Samples<PAIRS>,
     ) {
+        let Samples { middle, even, odd } = samples;
         let mut middles = [[0.0; LANES]; 4];
+        let mut doubts = [0.0; LANES];
         for lane in 0..count {
-            let rotation = F::rotation(&block.numbers_of(lane), block.middles[lane]);
+            let numbers = block.numbers_of(lane);
+            let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane]));
+            let rotation = [x.0, y.0, z.0, w.0];
             for c in 0..4 {
                 middles[c][lane] = rotation[c];
                 middle[c][lane] = rotation[c] as f32;
             }
+            doubts[lane] = doubt(rotation);
         }
         for (k, &node) in nodes.at.iter().enumerate() {
             let node = f64::from(node);
             for lane in 0..count {
                 let numbers = block.numbers_of(lane);
                 let reach = node * block.widths[lane];
-                let before = F::rotation(&numbers, block.middles[lane] - reach);
-                let after = F::rotation(&numbers, block.middles[lane] + reach);
+                let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane] - reach));
+                let before = [x.0, y.0, z.0, w.0];
+                let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane] + reach));
+                let after = [x.0, y.0, z.0, w.0];
                 for c in 0..4 {
                     let middle = middles[c][lane];
                     even[k][c][lane] = (((after[c] - middle) + (before[c] - middle)) * 0.5) as f32;
                     odd[k][c][lane] = ((after[c] - before[c]) * 0.5) as f32;
                 }
+                doubts[lane] += doubt(before) + doubt(after);
             }
+        }
+        for lane in (0..count).filter(|&lane| doubts[lane].is_nan()) {
+            sample_anywhere::<F, PAIRS>(block, lane, nodes, samples);
+        }
+    }
+}
+
+/// NaN where any of a rotation's components is none, or not finite; else 0.
+#[inline(always)]
+fn doubt([x, y, z, w]: Quaternion) -> f64 {
+    (x + y + z + w) * 0.0
+}
+
+/// Samples a lane whose angles are too long for [`Near`].
+#[inline(never)]
+fn sample_anywhere<F: Formula, const PAIRS: usize>(
+    block: &FitBlock,
+    lane: usize,
+    nodes: &Nodes<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<PAIRS>,
+) {
+    let numbers = block.numbers_of(lane);
+    let between: Quaternion = F::rotation(&numbers, block.middles[lane]);
+    for c in 0..4 {
+        middle[c][lane] = between[c] as f32;
+    }
+    for (k, &node) in nodes.at.iter().enumerate() {
+        let reach = f64::from(node) * block.widths[lane];
+        let before: Quaternion = F::rotation(&numbers, block.middles[lane] - reach);
+        let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
+        for c in 0..4 {
+            let mean = ((after[c] - between[c]) + (before[c] - between[c])) * 0.5;
+            even[k][c][lane] = mean as f32;
+            odd[k][c][lane] = ((after[c] - before[c]) * 0.5) as f32;
         }
     }
 }
