@@ -3,10 +3,9 @@
 
 use std::ops::Range;
 
-use bytemuck::Zeroable;
 use glam::Quat;
 
-use super::arc_lanes::{ArcLanes, Components, LANES, arcs};
+use super::arc_lanes::{LANES, arc_anyhow, arc_in_lanes};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
 use crate::branchless::{dot, unit};
@@ -18,16 +17,16 @@ use crate::tracks::Track;
 
 /// Intervals that wait for their block, and what has become of them.
 pub(crate) struct ArcBlock {
-    /// Plain numbers: a vector type would keep the loop from being vectorised.
     from: [[f32; 4]; LANES],
     to: [[f32; 4]; LANES],
     /// Whether each starts a track.
     is_first: [bool; LANES],
     count: usize,
-    /// The sign of each interval's first key after those before it in its track.
-    signs: [f32; LANES],
-    arcs: ArcLanes,
-    segments: [ArcSegment; LANES],
+    /// -1 where the second key's sign is turned.
+    flips: [f32; LANES],
+    /// As if each interval's first key counted as stored.
+    middles: [[f32; 4]; LANES],
+    tangents: [[f32; 4]; LANES],
 }
 
 impl ArcBlock {
@@ -37,9 +36,9 @@ impl ArcBlock {
             to: [[0.0; 4]; LANES],
             is_first: [false; LANES],
             count: 0,
-            signs: [1.0; LANES],
-            arcs: ArcLanes::default(),
-            segments: [ArcSegment::zeroed(); LANES],
+            flips: [1.0; LANES],
+            middles: [[0.0; 4]; LANES],
+            tangents: [[0.0; 4]; LANES],
         }
     }
 }
@@ -48,38 +47,22 @@ impl InLanes for ArcBlock {
     /// Works out every interval that waits.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        self.arcs = arcs::<L>(&self.from, &self.to, self.count);
-    }
-}
-
-/// Gives every lane its sign.
-struct Signed<'a>(&'a mut ArcBlock);
-
-impl InLanes for Signed<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let ArcBlock { signs, arcs, .. } = &*self.0;
-        let (middles, tangents) = (signed(signs, &arcs.middles), signed(signs, &arcs.tangents));
-        let mut segments = [ArcSegment::zeroed(); LANES];
-        for j in 0..LANES {
-            segments[j] = ArcSegment {
-                middle: middles[j],
-                tangent: tangents[j],
-            };
+        for j in (0..self.count).step_by(L::COUNT) {
+            let lanes = j..j + L::COUNT;
+            let arcs = arc_in_lanes::<L>(&self.from[j..], &self.to[j..]);
+            L::store_rotations(arcs.middle, &mut self.middles[lanes.clone()]);
+            L::store_rotations(arcs.tangent, &mut self.tangents[lanes.clone()]);
+            arcs.flip.store(&mut self.flips[lanes.clone()]);
+            if arcs.any_in_doubt {
+                for lane in lanes {
+                    let (arc, flip) = arc_anyhow(self.from[lane], self.to[lane]);
+                    self.middles[lane] = arc.middle;
+                    self.tangents[lane] = arc.tangent;
+                    self.flips[lane] = flip;
+                }
+            }
         }
-        self.0.segments = segments;
     }
-}
-
-/// A lane's components together, in the lane's sign.
-#[inline(always)]
-fn signed(signs: &[f32; LANES], [x, y, z, w]: &Components) -> [[f32; 4]; LANES] {
-    let mut signed = [[0.0; 4]; LANES];
-    for j in 0..LANES {
-        let sign = signs[j];
-        signed[j] = [x[j] * sign, y[j] * sign, z[j] * sign, w[j] * sign];
-    }
-    signed
 }
 
 /// Prepares arcs; its block is made once for many tracks.
@@ -229,21 +212,23 @@ impl ArcPreparation {
 
     fn flush(&mut self, prepared: &mut Prepared) {
         in_lanes(&mut self.block);
-        let block = &mut self.block;
-        let count = block.count;
-        for lane in 0..count {
-            if block.is_first[lane] {
-                self.sign = 1.0;
-            }
-            block.signs[lane] = self.sign;
-            self.sign *= block.arcs.flips[lane];
-        }
-        in_lanes(&mut Signed(block));
         let Segments::Arc(segments) = &mut prepared.segments else {
             unreachable!("the method's form")
         };
-        segments.extend_from_slice(&block.segments[..count]);
-        block.count = 0;
+        let block = &mut self.block;
+        let count = std::mem::take(&mut block.count);
+        let lanes = block.is_first.iter().zip(&block.flips);
+        let arcs = block.middles.iter().zip(&block.tangents);
+        segments.extend(lanes.zip(arcs).take(count).map(
+            |((&is_first, flip), (&middle, &tangent))| {
+                let sign = if is_first { 1.0 } else { self.sign };
+                self.sign = sign * flip;
+                ArcSegment {
+                    middle: middle.map(|c| c * sign),
+                    tangent: tangent.map(|c| c * sign),
+                }
+            },
+        ));
     }
 }
 
@@ -270,9 +255,11 @@ mod tests {
             block.from[9] = [0.0, 0.0, 0.0, 1.0];
             block.count = LANES - 3;
             in_lanes(&mut block);
-            in_lanes(&mut Signed(&mut block));
-            let bits: Vec<u32> = bytemuck::cast_slice(&block.segments).to_vec();
-            (bits, block.arcs.flips.map(f32::to_bits))
+            let bits = [block.middles, block.tangents].map(|all| {
+                let components: &[f32] = all.as_flattened();
+                components.iter().map(|c| c.to_bits()).collect::<Vec<_>>()
+            });
+            (bits, block.flips.map(f32::to_bits))
         };
         let results = at_every_width(filled);
         let (_, expected) = &results[0];
