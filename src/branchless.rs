@@ -458,7 +458,7 @@ mod tests {
             }
             assert!((sinc * x - libm::sin(x)).abs() < 2e-14, "{x}");
             assert!((cosine - libm::cos(x)).abs() < 2e-14, "{x}");
-            assert!(x > 1.5707 || (square - x * x).abs() <= 5e-14 * x * x, "{x}");
+            assert!(x > 1.57 || (square - x * x).abs() <= 5e-14 * x * x, "{x}");
         }
         assert!(near_waves(f64::NAN).0.is_nan() && near_arc_square(f64::NAN).is_nan());
     }

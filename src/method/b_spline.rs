@@ -27,8 +27,8 @@ pub const B_SPLINE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 670.0,
-        rotation: 2.7,
+        key: 310.0,
+        rotation: 3.0,
     },
     reference: reference::Kind::BSpline,
     curves: Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing))),

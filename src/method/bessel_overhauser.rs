@@ -24,8 +24,8 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 370.0,
-        rotation: 2.3,
+        key: 270.0,
+        rotation: 2.8,
     },
     reference: reference::Kind::BesselOverhauser,
     curves: Curves::Smooth(

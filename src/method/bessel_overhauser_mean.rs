@@ -25,8 +25,8 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2200.0,
-        rotation: 2.7,
+        key: 2400.0,
+        rotation: 3.2,
     },
     reference: reference::Kind::BesselOverhauserMean,
     curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone()),

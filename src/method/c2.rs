@@ -35,8 +35,8 @@ pub const C2: Method = Method {
     ends: Ends::Secant,
     path: None,
     cost: Cost {
-        key: 1500.0,
-        rotation: 2.7,
+        key: 1400.0,
+        rotation: 3.2,
     },
     reference: reference::Kind::C2,
     curves: Curves::Smooth(

@@ -24,8 +24,8 @@ pub const CATMULL_ROM: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 330.0,
-        rotation: 2.3,
+        key: 190.0,
+        rotation: 2.6,
     },
     reference: reference::Kind::CatmullRom,
     curves: Curves::Smooth(

@@ -27,8 +27,8 @@ pub const GLTF_CUBIC: Method = Method {
     ends: Ends::Parabolic,
     path: Some(Path::AsAuthored),
     cost: Cost {
-        key: 930.0,
-        rotation: 3.2,
+        key: 1400.0,
+        rotation: 3.8,
     },
     reference: reference::Kind::GltfCubic,
     curves: Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers))),

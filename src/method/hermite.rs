@@ -25,8 +25,8 @@ pub const HERMITE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 420.0,
-        rotation: 2.4,
+        key: 220.0,
+        rotation: 2.8,
     },
     reference: reference::Kind::Hermite,
     curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers))),

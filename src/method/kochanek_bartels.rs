@@ -28,8 +28,8 @@ pub const KOCHANEK_BARTELS: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2200.0,
-        rotation: 2.7,
+        key: 2400.0,
+        rotation: 3.2,
     },
     reference: reference::Kind::KochanekBartels,
     curves: Curves::Smooth(

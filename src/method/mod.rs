@@ -215,7 +215,7 @@ impl fmt::Display for Continuity {
 }
 
 /// What a method costs on one thread, nanoseconds: for comparisons between methods, as
-/// measured on a machine with AVX-512 for steps up to 85° (`cargo bench`).
+/// measured on a machine with AVX2 for steps up to 85° (`cargo bench`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Preparing a key.

@@ -23,8 +23,8 @@ pub const NLERP: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 430.0,
-        rotation: 2.3,
+        key: 300.0,
+        rotation: 2.8,
     },
     reference: reference::Kind::Nlerp,
     curves: Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>)),

@@ -23,8 +23,8 @@ pub const SHOEMAKE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 3400.0,
-        rotation: 3.2,
+        key: 4500.0,
+        rotation: 4.1,
     },
     reference: reference::Kind::Shoemake,
     curves: Curves::Smooth(Smooth::new(

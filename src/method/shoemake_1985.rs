@@ -22,8 +22,8 @@ pub const SHOEMAKE_1985: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2100.0,
-        rotation: 2.7,
+        key: 1600.0,
+        rotation: 2.8,
     },
     reference: reference::Kind::Shoemake1985,
     curves: Curves::Smooth(Smooth::new(

@@ -22,8 +22,8 @@ pub const SHOEMAKE_2: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2300.0,
-        rotation: 2.7,
+        key: 2100.0,
+        rotation: 3.1,
     },
     reference: reference::Kind::Shoemake2,
     curves: Curves::Smooth(Smooth::new(

@@ -20,8 +20,8 @@ pub const SLERP: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 50.0,
-        rotation: 1.3,
+        key: 10.0,
+        rotation: 1.7,
     },
     reference: reference::Kind::Slerp,
     curves: Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves)),

@@ -21,8 +21,8 @@ pub const SQUAD: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 1300.0,
-        rotation: 2.7,
+        key: 960.0,
+        rotation: 2.9,
     },
     reference: reference::Kind::Squad,
     curves: Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>)),

@@ -19,8 +19,8 @@ pub const STEP: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 40.0,
-        rotation: 0.8,
+        key: 3.4,
+        rotation: 0.87,
     },
     reference: reference::Kind::Step,
     curves: Curves::Steps,
