@@ -5,7 +5,11 @@
 //!
 //! Plain arrays, `x y z w`: a vector type would keep such a loop scalar.
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
+mod near;
+
+use std::f64::consts::{FRAC_2_PI, PI, TAU};
+
+pub(crate) use near::{Algebra, Anywhere, Near, near_arc_square, near_waves};
 
 use crate::numeric::nearest_whole;
 
@@ -213,210 +217,6 @@ pub(crate) fn log_near(q: Quaternion, near: Vector) -> Vector {
     sum(principal, scaled(axis, turns * TAU))
 }
 
-/// The exponentials and logarithms that a method's rule is made of. Two of them:
-/// [`Near`] for vector lanes, and [`Anywhere`] for the lanes where it does not hold,
-/// so that a lane's result depends on nothing but its own numbers.
-pub(crate) trait Algebra {
-    /// See [`exp`].
-    fn exp(&mut self, a: Vector) -> Quaternion;
-    /// See [`log`].
-    fn log(&mut self, q: Quaternion) -> Vector;
-    /// See [`log_toward`].
-    fn log_toward(&mut self, q: Quaternion, axis: Vector) -> Vector;
-    /// See [`log_near`].
-    fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector;
-    /// The logarithm of a step, of which `near` is [`Near`]'s.
-    fn log_of_step(&mut self, step: Quaternion, near: Vector) -> Vector;
-}
-
-/// Everything, at its price: square roots, divisions and a range reduction for each.
-pub(crate) struct Anywhere;
-
-impl Algebra for Anywhere {
-    fn exp(&mut self, a: Vector) -> Quaternion {
-        exp(a)
-    }
-
-    fn log(&mut self, q: Quaternion) -> Vector {
-        log(q)
-    }
-
-    fn log_toward(&mut self, q: Quaternion, axis: Vector) -> Vector {
-        log_toward(q, axis)
-    }
-
-    fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector {
-        log_near(q, near)
-    }
-
-    // A wild tangent multiplies the error of a step's logarithm.
-    fn log_of_step(&mut self, step: Quaternion, _: Vector) -> Vector {
-        log(step)
-    }
-}
-
-/// Half-angles up to pi/2, by polynomials alone: within 1e-12.
-pub(crate) struct Near {
-    /// 1 as long as every argument was within the range, else 0.
-    pub(crate) holds: f64,
-}
-
-/// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x²,
-/// for x² up to (pi/2)²; from Chebyshev nodes, within 1e-14.
-const SINC: [f64; 8] = [
-    -0.16666666666666666,
-    0.008333333333333316,
-    -0.00019841269841254974,
-    2.7557319219163234e-06,
-    -2.5052107616996182e-08,
-    1.6058977312464087e-10,
-    -7.643970296798572e-13,
-    2.7314447669863995e-15,
-];
-const COSINE: [f64; 8] = [
-    -0.5,
-    0.04166666666666634,
-    -0.0013888888888860709,
-    2.4801587292446213e-05,
-    -2.755731776732053e-07,
-    2.0876630867422994e-09,
-    -1.1464689885720029e-11,
-    4.6276759850181716e-14,
-];
-
-/// Coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), 0 <= u <= 1;
-/// from Chebyshev nodes, within 2e-13.
-const ANGLE_BY_SINE: [f64; 16] = [
-    0.33333333333323145,
-    0.13333333338545655,
-    0.05714285273367023,
-    0.025396972243716957,
-    0.011541454567945548,
-    0.005354794564180442,
-    0.002303232007023121,
-    0.0020294613243775988,
-    -0.002299261701744184,
-    0.007084543299936568,
-    -0.01167216603593313,
-    0.014729870371061547,
-    -0.012790174455014925,
-    0.007523633800038208,
-    -0.0026627390137634916,
-    0.0004471863705142663,
-];
-
-/// Coefficients of `(x²/(4v) - 1) / v` in powers of v = sin²(x/2), 0 <= v <= 1/2; from
-/// Chebyshev nodes, within 2e-14.
-const ARC_SQUARE: [f64; 16] = [
-    0.3333333333333248,
-    0.17777777778646958,
-    0.11428571281491674,
-    0.0812699392744085,
-    0.06156464672038421,
-    0.04878479785200423,
-    0.038802305491039815,
-    0.04249007813202197,
-    -0.03286201942043849,
-    0.3178655219003784,
-    -0.995493633787061,
-    2.55548525027655,
-    -4.432709056716552,
-    5.255149819411587,
-    -3.7386429057520805,
-    1.276311607352811,
-];
-
-/// `1 + x (c₀ + c₁ x + …)`, four coefficients at a time: a chain of a quarter as many
-/// operations. Their number is a multiple of four.
-#[inline(always)]
-fn one_plus<const N: usize>(c: &[f64; N], x: f64) -> f64 {
-    let square = x * x;
-    let fourth = square * square;
-    let mut sum = 0.0;
-    for i in (0..N / 4).rev() {
-        let low = c[4 * i + 1] * x + c[4 * i];
-        let high = c[4 * i + 3] * x + c[4 * i + 2];
-        sum = sum * fourth + (high * square + low);
-    }
-    sum * x + 1.0
-}
-
-/// `x / sin(x)` for `u = 1 - cos(x)`, 0 <= x <= pi/2: an angle from its sine without
-/// an arc function.
-#[inline(always)]
-pub(crate) fn angle_by_sine(u: f64) -> f64 {
-    one_plus(&ANGLE_BY_SINE, u)
-}
-
-/// `sin(x)/x` and `cos(x)` by `x²`, which is at most (pi/2)²; else NaN.
-#[inline(always)]
-pub(crate) fn near_waves(square: f64) -> (f64, f64) {
-    let doubt = near_or_nan(square, FRAC_PI_2 * FRAC_PI_2);
-    let (sinc, cosine) = (one_plus(&SINC, square), one_plus(&COSINE, square));
-    (sinc + doubt, cosine + doubt)
-}
-
-/// `x²` by `sin²(x/2)`, which is at most 1/2; else NaN.
-#[inline(always)]
-pub(crate) fn near_arc_square(v: f64) -> f64 {
-    4.0 * v * one_plus(&ARC_SQUARE, v) + near_or_nan(v, 0.5)
-}
-
-/// 0 up to a limit, else NaN.
-#[inline(always)]
-fn near_or_nan(value: f64, limit: f64) -> f64 {
-    if value <= limit { 0.0 } else { f64::NAN }
-}
-
-impl Near {
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self { holds: 1.0 }
-    }
-
-    #[inline(always)]
-    fn check(&mut self, value: f64, limit: f64) {
-        // Written so that NaN does not pass.
-        self.holds = if value <= limit { self.holds } else { 0.0 };
-    }
-}
-
-impl Algebra for Near {
-    #[inline(always)]
-    fn exp(&mut self, a: Vector) -> Quaternion {
-        let z = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
-        self.check(z, FRAC_PI_2 * FRAC_PI_2);
-        let sinc = one_plus(&SINC, z);
-        let cosine = one_plus(&COSINE, z);
-        [sinc * a[0], sinc * a[1], sinc * a[2], cosine]
-    }
-
-    #[inline(always)]
-    fn log(&mut self, q: Quaternion) -> Vector {
-        let u = 1.0 - q[3];
-        self.check(u, 1.0);
-        scaled([q[0], q[1], q[2]], angle_by_sine(u))
-    }
-
-    #[inline(always)]
-    fn log_toward(&mut self, q: Quaternion, _: Vector) -> Vector {
-        self.log(q)
-    }
-
-    #[inline(always)]
-    fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector {
-        // No other branch is nearer.
-        let z = near[0] * near[0] + near[1] * near[1] + near[2] * near[2];
-        self.check(z, 1.5 * 1.5);
-        self.log(q)
-    }
-
-    #[inline(always)]
-    fn log_of_step(&mut self, _: Quaternion, near: Vector) -> Vector {
-        near
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -445,28 +245,6 @@ mod tests {
         }
     }
 
-    /// Catches a wrong digit in a polynomial, and one used beyond its range.
-    #[test]
-    fn near_waves_and_squares_are_those_of_libm_or_nan() {
-        for i in 0..=20_000 {
-            let x = f64::from(i) * 1e-4;
-            let ((sinc, cosine), square) = (near_waves(x * x), near_arc_square(v_of(x)));
-            if x > FRAC_PI_2 {
-                assert!(sinc.is_nan() && cosine.is_nan(), "{x}");
-                assert!(x < 1.571 || square.is_nan(), "{x}");
-                continue;
-            }
-            assert!((sinc * x - libm::sin(x)).abs() < 2e-14, "{x}");
-            assert!((cosine - libm::cos(x)).abs() < 2e-14, "{x}");
-            assert!(x > 1.57 || (square - x * x).abs() <= 5e-14 * x * x, "{x}");
-        }
-        assert!(near_waves(f64::NAN).0.is_nan() && near_arc_square(f64::NAN).is_nan());
-    }
-
-    fn v_of(x: f64) -> f64 {
-        libm::sin(x / 2.0) * libm::sin(x / 2.0)
-    }
-
     #[test]
     fn exp_undoes_log_on_every_branch() {
         let direction = scaled([2.0, -1.0, 0.5], 1.0 / length([2.0, -1.0, 0.5]));
@@ -483,28 +261,5 @@ mod tests {
         }
         assert_eq!(log([0.0, 0.0, 0.0, -1.0]), [PI, 0.0, 0.0]);
         assert_eq!(log([0.0, 0.0, 0.0, 1.0]), [0.0; 3]);
-    }
-
-    /// Catches a wrong digit in a polynomial, and one used beyond its range.
-    #[test]
-    fn near_is_anywhere_or_says_that_it_does_not_hold() {
-        let direction = scaled([1.0, 2.0, -2.0], 1.0 / 3.0);
-        for i in 0..=20_000 {
-            let angle = f64::from(i) * 1e-4;
-            let a = scaled(direction, angle);
-            let mut near = Near::new();
-            let (q, back) = (near.exp(a), near.log(exp(a)));
-            assert_eq!(near.holds == 1.0, angle <= FRAC_PI_2, "{angle}");
-            if near.holds == 1.0 {
-                let error = (0..4).map(|c| (q[c] - exp(a)[c]).abs()).fold(0.0, f64::max);
-                assert!(error < 1e-14, "{angle}: {error}");
-                let error = length(sum(back, scaled(a, -1.0)));
-                assert!(error <= 1e-12 * angle, "{angle}: {error}");
-            }
-        }
-        let mut near = Near::new();
-        near.exp([f64::NAN; 3]);
-        near.exp([0.0; 3]);
-        assert_eq!(near.holds, 0.0);
     }
 }

@@ -664,6 +664,34 @@ fn a_gap_too_long_is_named_by_its_key() {
     }
 }
 
+/// Where a segment's middle is more than 2^24 frames away f32 has not every whole number:
+/// the same bits on both sides of that, and across it.
+#[test]
+fn frames_far_from_their_segments_middle_have_the_same_bits() {
+    let mut random = Random(86);
+    let mut set = TrackSet::new();
+    for _ in 0..3 {
+        let keys: Vec<Quat> = (0..4).map(|_| random.rotation().as_quat()).collect();
+        set.push("", &[0.0, 1e6, 2e6, 3e6], &keys).unwrap();
+    }
+    let limit = (3e7 - 16_777_216.0) / 60.0; // of the first segment
+    for start in [10.0, limit - 3.0, 1e6 - limit - 3.0, 5e5] {
+        let frames = Frames::fps(60).between(start, start + 6.0);
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            let expected = cpu().evaluate(&set, method, &frames).unwrap();
+            for width in VectorWidth::available() {
+                let narrow = engine(&Device::Cpu, |options| options.vector_width = Some(width));
+                let found = narrow.evaluate(&set, method, &frames).unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), "a width");
+            }
+            for vulkan in vulkan_engines(|_| {}) {
+                let found = vulkan.evaluate(&set, method, &frames).unwrap();
+                assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
+            }
+        }
+    }
+}
+
 /// Tracks of two keys alone take a way of their own on the CPU, and have polynomials that
 /// nobody fitted: the same bits as by segments, at every width, and near the reference.
 #[test]

@@ -198,3 +198,90 @@ pub(super) fn canonical(q: f32) -> f32 {
     let magnitude = q.to_bits() & 0x7fff_ffff;
     if magnitude < TINY_BITS { 0.0 } else { q }
 }
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use super::*;
+    use crate::segment::{ArcSegment, PolynomialSegment};
+
+    /// Both signs, magnitudes about 2^-40 and below, and zero.
+    fn hostile(random: &mut Rng) -> f32 {
+        let sign = if random.bool() { 1.0 } else { -1.0 };
+        match random.u32(0..8) {
+            0 => 0.0,
+            1 => sign * random.f32(),
+            2 => sign * (1.0 + random.f32()) * 2.0f32.powi(random.i32(-140..-38)),
+            _ => sign * (1.0 + random.f32()) * 2.0f32.powi(random.i32(-43..-38)),
+        }
+    }
+
+    fn four(random: &mut Rng) -> [f32; 4] {
+        std::array::from_fn(|_| crate::numeric::canonical(hostile(random)))
+    }
+
+    /// How many components of some samples are changed by [`canonical`].
+    fn changed<S: Evaluate>(segment: &S, random: &mut Rng) -> usize {
+        let mut changed = 0;
+        for _ in 0..32 {
+            let parameter = (random.f32() - 0.5) * 2.0f32.powi(-random.i32(0..30));
+            let q = segment.evaluate(segment.constant(), parameter);
+            let differs = |c: &f32| canonical(*c).to_bits() != c.to_bits();
+            changed += q.iter().filter(|c| differs(c)).count();
+        }
+        changed
+    }
+
+    /// Catches a limit that is too low: a component whose terms cancel would keep what
+    /// other devices put to zero.
+    #[test]
+    fn segments_that_say_so_have_no_tiny_components() {
+        let random = &mut Rng::with_seed(1);
+        let (mut canonical, mut others) = (0, 0);
+        for _ in 0..20_000 {
+            let arc = ArcSegment {
+                middle: four(random),
+                tangent: four(random),
+            };
+            let polynomial = PolynomialSegment {
+                coefficients: std::array::from_fn(|_| four(random)),
+            };
+            for (is_canonical, changed) in [
+                (arc.is_canonical(), changed(&arc, random)),
+                (polynomial.is_canonical(), changed(&polynomial, random)),
+            ] {
+                assert!(!is_canonical || changed == 0);
+                canonical += usize::from(is_canonical);
+                others += usize::from(changed > 0);
+            }
+        }
+        assert!(canonical > 300 && others > 1000, "{canonical} {others}");
+    }
+
+    /// As near to the limit as it gets: what is left of two numbers that nearly cancel.
+    #[test]
+    fn the_limit_is_where_terms_cancel_to_a_tiny_rest() {
+        let nearly_zero = |middle: f32| {
+            let mut coefficients = [[0.0; 4]; 11];
+            coefficients[0] = [middle; 4];
+            coefficients[1] = [-2.0 * middle.next_up(); 4];
+            PolynomialSegment { coefficients }
+        };
+        let at_limit = nearly_zero(COARSE);
+        assert!(at_limit.is_canonical());
+        assert_eq!(at_limit.evaluate(0.0, 0.5), [-(2.0f32.powi(-63)); 4]);
+        let below = nearly_zero(COARSE * 0.125);
+        assert!(!below.is_canonical());
+        assert_eq!(below.evaluate(0.0, 0.5), [-(2.0f32.powi(-66)); 4]);
+        assert_eq!(canonical(-(2.0f32.powi(-66))).to_bits(), 0);
+    }
+
+    /// Catches whole numbers that f32 does not have, in a run far from its middle.
+    #[test]
+    fn distances_are_stepped_only_where_they_are_exact() {
+        assert!(are_exact(-(1 << 24), 100) && are_exact((1 << 24) - 108, 100));
+        assert!(!are_exact(-(1 << 24) - 1, 100) && !are_exact((1 << 24) - 107, 100));
+        assert!(!are_exact(0, 1 << 24) && !are_exact(i32::MAX, 1));
+    }
+}
