@@ -1,7 +1,7 @@
 //! Twin of `shaders/arc.wgsl`: the same names, the same order.
 
 use super::evaluate_arc::square;
-use super::lanes::Number;
+use super::lanes::{Number, canonical};
 use crate::segment::ArcSegment;
 use crate::segment::shader::{
     ARC_SINE_1, ARC_SINE_2, ARC_SINE_3, ARC_SINE_4, ARC_SINE_5, ARC_SINE_6, ARC_SINE_7, ARC_SINE_8,
@@ -45,12 +45,12 @@ pub(crate) fn middle_and_tangent<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 
 
 #[inline(always)]
 fn lengthened<N: Number>(q: [N; 4], by: N) -> [N; 4] {
-    [
-        (q[0] * by + q[0]).canonical(),
-        (q[1] * by + q[1]).canonical(),
-        (q[2] * by + q[2]).canonical(),
-        (q[3] * by + q[3]).canonical(),
-    ]
+    canonical([
+        q[0] * by + q[0],
+        q[1] * by + q[1],
+        q[2] * by + q[2],
+        q[3] * by + q[3],
+    ])
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! A few explicit times of each of many tracks, as a crowd's poses are: a sample to a lane,
 //! and no run for each.
-// Loops over lanes index many arrays at once.
-#![allow(clippy::needless_range_loop)]
 
 use super::dispatch::InLanes;
-use super::evaluate::{Affine, Evaluate, canonical, one};
-use super::lanes::Lanes;
+use super::evaluate::{Affine, one};
+use super::evaluate_arc::{on_arc, square};
+use super::lanes::{Lanes, canonical};
 use crate::frame_clock::finite_scale;
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, NONE, PartRef, Source};
@@ -14,9 +13,6 @@ use crate::window::Window;
 
 /// Samples worked out together.
 const LANES: usize = 64;
-
-/// Multiples of this many: the lanes of the widest vector.
-const BLOCK: usize = 16;
 
 /// What a window of a clip is made of, where that is told by looking.
 pub(super) struct FewTimes<'a> {
@@ -33,7 +29,8 @@ pub(super) struct FewTimes<'a> {
 
 /// Samples of arcs that wait.
 struct Block {
-    arcs: [ArcSegment; LANES],
+    middles: [[f32; 4]; LANES],
+    tangents: [[f32; 4]; LANES],
     parameters: [f32; LANES],
     /// In the output.
     places: [usize; LANES],
@@ -51,12 +48,9 @@ impl InLanes for FewTimes<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let samples = self.window.samples.clone();
-        let nothing = ArcSegment {
-            middle: [0.0; 4],
-            tangent: [0.0; 4],
-        };
         let mut block = Block {
-            arcs: [nothing; LANES],
+            middles: [[0.0; 4]; LANES],
+            tangents: [[0.0; 4]; LANES],
             parameters: [0.0; LANES],
             places: [0; LANES],
             count: 0,
@@ -75,12 +69,13 @@ impl InLanes for FewTimes<'_> {
                         self.output[place] = one(segment, affine, distance);
                     }
                     Some(One::Arc(segment, parameter)) => {
-                        block.arcs[block.count] = *segment;
+                        block.middles[block.count] = segment.middle;
+                        block.tangents[block.count] = segment.tangent;
                         block.parameters[block.count] = parameter;
                         block.places[block.count] = place;
                         block.count += 1;
                         if block.count == LANES {
-                            block.flush(self.output);
+                            block.flush::<L>(self.output);
                         }
                     }
                     None => {
@@ -90,24 +85,23 @@ impl InLanes for FewTimes<'_> {
                 }
             }
         }
-        block.flush(self.output);
+        block.flush::<L>(self.output);
     }
 }
 
 impl Block {
     #[inline(always)]
-    fn flush(&mut self, output: &mut [[f32; 4]]) {
-        let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
-        for j in 0..self.count.next_multiple_of(BLOCK) {
-            let arc = &self.arcs[j];
-            let q = arc.evaluate(arc.constant(), self.parameters[j]);
-            x[j] = canonical(q[0]);
-            y[j] = canonical(q[1]);
-            z[j] = canonical(q[2]);
-            w[j] = canonical(q[3]);
+    fn flush<L: Lanes>(&mut self, output: &mut [[f32; 4]]) {
+        let mut rotations = [[0.0; 4]; LANES];
+        for j in (0..self.count).step_by(L::COUNT) {
+            let middle = L::load_rotations(&self.middles[j..]);
+            let tangent = L::load_rotations(&self.tangents[j..]);
+            let parameter = L::load(&self.parameters[j..]);
+            let found = on_arc(middle, tangent, square(tangent), parameter);
+            L::store_rotations(canonical(found), &mut rotations[j..j + L::COUNT]);
         }
-        for j in 0..self.count {
-            output[self.places[j]] = [x[j], y[j], z[j], w[j]];
+        for (&place, rotation) in self.places[..self.count].iter().zip(rotations) {
+            output[place] = rotation;
         }
         self.count = 0;
     }

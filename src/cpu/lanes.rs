@@ -29,6 +29,12 @@ impl Number for f32 {
     }
 }
 
+/// [`Number::canonical`] of every component.
+#[inline(always)]
+pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
+    [x.canonical(), y.canonical(), z.canonical(), w.canonical()]
+}
+
 /// The numbers of several consecutive samples, in an order of their own.
 pub(crate) trait Lanes: Number {
     /// How many.

@@ -1,10 +1,10 @@
 //! The samples of one track: its runs, evaluated one behind the other. Compiled as
 //! one function for each vector width, so that nothing is called for a run.
 
-use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
-use super::lanes::Lanes;
 use std::marker::PhantomData;
 
+use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
+use super::lanes::Lanes;
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::numeric::round_f32;

@@ -7,7 +7,7 @@ use super::dispatch::InLanes;
 use super::evaluate::canonical;
 use super::evaluate_arc::{on_arc, square};
 use super::evaluate_polynomial::component;
-use super::lanes::{Lanes, Number};
+use super::lanes::{self, Lanes, Number};
 use crate::method::Form;
 use crate::prepare::{ARC_LANES, any_turns, arc_anyhow, arc_component, arc_in_lanes, arcs, whole};
 
@@ -105,13 +105,7 @@ fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 
     let [tx, ty, tz, tw] = tangent;
     let middle = [mx * sign, my * sign, mz * sign, mw * sign];
     let tangent = [tx * sign, ty * sign, tz * sign, tw * sign];
-    let q = on_arc(middle, tangent, square(tangent), parameter);
-    [
-        q[0].canonical(),
-        q[1].canonical(),
-        q[2].canonical(),
-        q[3].canonical(),
-    ]
+    lanes::canonical(on_arc(middle, tangent, square(tangent), parameter))
 }
 
 /// [`any_turns`].

@@ -21,8 +21,6 @@ const IN_DOUBT: f32 = 1e-5;
 pub(crate) struct ArcLanes {
     pub(crate) middles: Components,
     pub(crate) tangents: Components,
-    /// -1 where the second key's sign is turned.
-    pub(crate) flips: [f32; LANES],
 }
 
 impl Default for ArcLanes {
@@ -30,7 +28,6 @@ impl Default for ArcLanes {
         Self {
             middles: [[0.0; LANES]; 4],
             tangents: [[0.0; LANES]; 4],
-            flips: [1.0; LANES],
         }
     }
 }
@@ -49,11 +46,9 @@ pub(crate) fn arcs<L: Lanes>(
             vector.middle[c].store(&mut lanes.middles[c][j..j + L::COUNT]);
             vector.tangent[c].store(&mut lanes.tangents[c][j..j + L::COUNT]);
         }
-        vector.flip.store(&mut lanes.flips[j..j + L::COUNT]);
         if vector.any_in_doubt {
             for lane in j..j + L::COUNT {
-                let (arc, flip) = arc_anyhow(from[lane], to[lane]);
-                lanes.flips[lane] = flip;
+                let (arc, _) = arc_anyhow(from[lane], to[lane]);
                 for c in 0..4 {
                     lanes.middles[c][lane] = arc.middle[c];
                     lanes.tangents[c][lane] = arc.tangent[c];
