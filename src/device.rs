@@ -87,7 +87,8 @@ impl std::fmt::Debug for Device {
 /// How results of a Vulkan device reach the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Transfer {
-    /// In place where the device shares the host's memory, else staged.
+    /// In place where the device shares the host's memory, else staged. Software devices
+    /// work on the caller's own memory where they can, without a copy.
     #[default]
     Automatic,
     /// The kernel writes into memory that the host reads.

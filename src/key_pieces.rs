@@ -5,6 +5,7 @@ mod written;
 
 use std::ops::Range;
 
+use glam::Quat;
 use rayon::prelude::*;
 
 use crate::clock::{Ticks, Timeline};
@@ -16,6 +17,7 @@ use crate::method::{Ends, Interpolation, Path};
 use crate::plan::Stretch;
 use crate::rotations::Layout;
 use crate::tracks::TrackSet;
+pub(crate) use written::Keys;
 use written::turned;
 
 /// Rows of one piece: workgroups along y.
@@ -68,6 +70,12 @@ impl<'a> KeyJob<'a> {
             Straight::Cubics(joints) => Some(joints),
             Straight::Arcs | Straight::Pairs => None,
         }
+    }
+
+    /// All keys of the set, where kernels can read them as they are stored: joints lie as
+    /// the keys of a piece do.
+    pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
+        self.joints().is_none().then_some(self.set.keys())
     }
 
     /// Works out on the CPU what the device left 0, because it turns too much.

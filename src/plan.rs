@@ -76,10 +76,6 @@ impl<'a> FramePlan<'a> {
         self.times = &[];
         let (from, to) = (window.start as i64, window.end as i64);
         let last = times.len() - 1;
-        let held = |key: usize| Sample {
-            key: HELD | key as u32,
-            parameter: 0.0,
-        };
         self.samples.clear();
         self.samples.resize(window.len(), held(0));
         self.boundaries.clock = Some(clock);
@@ -188,42 +184,73 @@ fn within(frame: f64) -> f64 {
     if below > -FAR { below } else { -FAR }
 }
 
-/// Where a time lies among keys; `near` is the key to look at first.
-#[inline]
-pub(crate) fn time_sample(starts: &[f64], time: f64, near: usize) -> Sample {
-    let last = starts.len() - 1;
-    let held = |key: usize| Sample {
-        key: HELD | key as u32,
-        parameter: 0.0,
-    };
-    if time >= starts[last] {
-        return held(last);
+/// Where times lie among keys. What an interval makes of them is kept for the next time in
+/// one that is as long: many tracks share theirs, and a division takes longer than to look.
+pub(crate) struct TimePlan {
+    start: f64,
+    end: f64,
+    middle: f64,
+    scale: f32,
+}
+
+impl TimePlan {
+    pub(crate) fn new() -> Self {
+        Self {
+            start: f64::NAN,
+            end: f64::NAN,
+            middle: 0.0,
+            scale: 0.0,
+        }
     }
-    if time < starts[0] {
-        return held(0);
+
+    /// Where a time lies among keys; `near` is the key to look at first.
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> Sample {
+        let last = starts.len() - 1;
+        let holds = |key: usize| starts[key] <= time && time < starts[key + 1];
+        // Times mostly increase: there and next before searching.
+        let key = if near < last && holds(near) {
+            near
+        } else if time >= starts[last] {
+            return held(last);
+        } else if time < starts[0] {
+            return held(0);
+        } else if near + 1 < last && holds(near + 1) {
+            near + 1
+        } else {
+            starts.partition_point(|&start| start <= time) - 1
+        };
+        let start = starts[key];
+        if time == start {
+            return held(key);
+        }
+        Sample {
+            key: key as u32,
+            parameter: self.parameter(start, starts[key + 1], time),
+        }
     }
-    let holds = |key: usize| starts[key] <= time && time < starts[key + 1];
-    // Times mostly increase: there and next before searching.
-    let key = if near < last && holds(near) {
-        near
-    } else if near + 1 < last && holds(near + 1) {
-        near + 1
-    } else {
-        starts.partition_point(|&start| start <= time) - 1
-    };
-    if time == starts[key] {
-        return held(key);
-    }
-    Sample {
-        key: key as u32,
-        parameter: time_parameter(starts[key], starts[key + 1], time),
+
+    /// The parameter of a time between two keys.
+    #[inline(always)]
+    fn parameter(&mut self, start: f64, end: f64, time: f64) -> f32 {
+        if self.start != start || self.end != end {
+            let seconds = end - start;
+            *self = Self {
+                start,
+                end,
+                middle: start + seconds * 0.5,
+                scale: finite_scale(1.0 / seconds),
+            };
+        }
+        round_f32(time - self.middle) * self.scale + 0.0
     }
 }
 
-/// The parameter of a time between two keys.
+/// A sample that is a key itself.
 #[inline(always)]
-fn time_parameter(start: f64, end: f64, time: f64) -> f32 {
-    let seconds = end - start;
-    let middle = start + seconds * 0.5;
-    round_f32(time - middle) * finite_scale(1.0 / seconds) + 0.0
+fn held(key: usize) -> Sample {
+    Sample {
+        key: HELD | key as u32,
+        parameter: 0.0,
+    }
 }

@@ -241,6 +241,11 @@ impl TrackSet {
         (times, &self.keys[first_key..first_key + len])
     }
 
+    /// The keys of all tracks, one behind the other.
+    pub(crate) fn keys(&self) -> &[Quat] {
+        &self.keys
+    }
+
     /// How many keys tracks that follow one another have: those of all lie one behind the
     /// other.
     pub(crate) fn keys_of(&self, tracks: Range<usize>) -> usize {

@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
+use glam::Quat;
 use program::{Run, command, finish, sample_folder, succeed};
 use rayon::prelude::*;
-use support::{first_difference, hostile_set, lavapipe, vulkan_devices};
+use support::{dense_set, first_difference, hostile_set, lavapipe, vulkan_devices};
 use tumble::{Device, Engine, EngineOptions, Error, Frames, Layout, Transfer, VulkanError, method};
 
 const OUT_OF_HOST_MEMORY: i32 = -1;
@@ -424,6 +425,17 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
             faults.push(format!("{call},{result},1,1000000"));
         }
     }
+    // The caller's memory does not come back before what works on it has ended.
+    let last = log.calls["vkWaitForFences"];
+    let waits = format!("vkWaitForFences,-1,{last},1 vkDeviceWaitIdle,-2,1,3");
+    let (run, log) = loader.run_command(child(), &[("FAULTS", &waits)]);
+    assert_eq!(
+        (run.code, &log.left),
+        (0, &BTreeMap::new()),
+        "{}",
+        run.words
+    );
+    assert_eq!(log.calls["vkDeviceWaitIdle"], 4, "{log:?}");
     // Not even waiting for everything works, so that nothing may be destroyed.
     let idle = "vkWaitForFences,-1,1,1000000 vkDeviceWaitIdle,-2,1,1000000";
     let (run, log) = loader.run_command(child(), &[("FAULTS", idle)]);
@@ -463,10 +475,32 @@ fn library_work() {
                 None
             );
         }
-        Ok(())
+        lent_work(devices[0].clone())
     };
     let outcome = work();
     if std::env::var_os("WANTED").is_some() {
         outcome.unwrap();
     }
+}
+
+/// More than a megabyte of keys and of results, which software devices work on where they
+/// are: straight from keys, and by segments.
+fn lent_work(device: Device) -> Result<(), Error> {
+    let (cpu, engine) = (Engine::new(Device::Cpu)?, Engine::new(device)?);
+    let (dense, frames) = dense_set(70, 1100, 0.0);
+    let expected = cpu.evaluate(&dense, method::SLERP, &frames)?;
+    let mut found = vec![Quat::IDENTITY; expected.as_quats().len()];
+    engine.evaluate_into(
+        &dense,
+        method::SLERP,
+        &frames,
+        Layout::TrackMajor,
+        &mut found,
+    )?;
+    assert_eq!(first_difference(expected.as_quats(), &found), None);
+    found.fill(Quat::IDENTITY);
+    let clip = engine.upload(&dense, method::SLERP)?;
+    clip.evaluate_into(&frames, Layout::TrackMajor, &mut found)?;
+    assert_eq!(first_difference(expected.as_quats(), &found), None);
+    Ok(())
 }

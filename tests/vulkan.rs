@@ -4,10 +4,12 @@
 mod application;
 mod support;
 
-use support::{first_difference, hostile_set, vulkan_devices};
+use bytemuck::Pod;
+use glam::Quat;
+use support::{dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Reads, Skeleton, Transfer,
-    VulkanBuffer, VulkanError, method,
+    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Reads, Skeleton, TrackSet,
+    Transfer, VulkanBuffer, VulkanError, method,
 };
 
 #[test]
@@ -174,4 +176,94 @@ fn results_stay_in_an_applications_own_buffer() {
     let result =
         unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, Encoding::F32, nowhere) };
     assert!(result.is_err());
+}
+
+/// Catches a store beside the caller's memory, which software devices write where it is, and
+/// what is left out there: at any place in its pages, in windows, mended, in every encoding.
+#[test]
+fn the_callers_memory_gets_the_result_and_nothing_else() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let set = hostile_set(5, 256);
+    let frames = Frames::fps(60).between(0.0, 9.0);
+    for engine in vulkan_engines(|_| {}) {
+        for (turn, method) in [method::SLERP, method::C2].into_iter().enumerate() {
+            let expected_of = cpu.upload(&set, method).unwrap();
+            let clip = engine.upload(&set, method).unwrap();
+            let layout = [Layout::TrackMajor, Layout::FrameMajor][turn];
+            let expected = expected_of.evaluate_as(&frames, layout).unwrap();
+            assert!(expected.as_quats().len() > 1 << 16, "too few to lend");
+            for beside in [1, 3, 256 + turn] {
+                assert_between(&SENTINEL, beside, expected.as_quats(), |output| {
+                    clip.evaluate_into(&frames, layout, output).unwrap();
+                });
+            }
+            for encoding in Encoding::KINDS {
+                let expected = (expected_of.evaluate_encoded(&frames, layout, encoding)).unwrap();
+                for beside in [encoding.bytes(), 16, 4099] {
+                    assert_between(&0xa5, beside, &expected, |output| {
+                        clip.evaluate_encoded_into(&frames, layout, encoding, output)
+                            .unwrap();
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The same straight from keys, which are read where they are unless one turns the sign.
+#[test]
+fn the_callers_keys_are_read_where_they_are() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let of_two = |turned: f64| {
+        let (pairs, _) = dense_set(1, 140_000, turned);
+        let mut set = TrackSet::new();
+        for keys in pairs.track(0).keys.chunks(2) {
+            set.push("", &[0.0, 1.0], keys).unwrap();
+        }
+        let times: Vec<f64> = (0..70_000).map(|t| f64::from(t % 1000) * 0.00101).collect();
+        (set, Frames::at_each(times))
+    };
+    let cases = [
+        ("many", dense_set(70, 1100, 0.0)),
+        ("many, some turned", dense_set(70, 1100, 1e-4)),
+        ("long", dense_set(1, 90_000, 0.0)),
+        ("long, some turned", dense_set(1, 90_000, 1e-4)),
+        ("pairs", of_two(0.0)),
+        ("pairs, some turned", of_two(0.01)),
+    ];
+    for engine in vulkan_engines(|_| {}) {
+        for (what, (set, frames)) in &cases {
+            for method in [method::SLERP, method::CATMULL_ROM] {
+                let layout = Layout::TrackMajor;
+                let expected = cpu.evaluate(set, method, frames).unwrap();
+                assert!(
+                    expected.as_quats().len() > 1 << 16,
+                    "{what}: too few to lend"
+                );
+                assert_between(&SENTINEL, 5, expected.as_quats(), |output| {
+                    let done = engine.evaluate_into(set, method, frames, layout, output);
+                    done.unwrap_or_else(|error| panic!("{what}, {method}: {error}"));
+                });
+            }
+        }
+    }
+}
+
+/// What no result is.
+const SENTINEL: Quat = Quat::from_xyzw(7.0, 7.0, 7.0, 7.0);
+
+/// That `work` writes what is expected, and nothing `beside` it on either side.
+fn assert_between<T: Pod>(outside: &T, beside: usize, expected: &[T], work: impl FnOnce(&mut [T])) {
+    let mut all = vec![*outside; expected.len() + 2 * beside];
+    work(&mut all[beside..][..expected.len()]);
+    let (before, rest) = all.split_at(beside);
+    let (found, after) = rest.split_at(expected.len());
+    let bytes = |values: &[T]| bytemuck::cast_slice::<T, u8>(values).to_vec();
+    assert!(bytes(found) == bytes(expected), "beside {beside}");
+    for values in [before, after] {
+        assert!(
+            bytes(values) == bytes(&vec![*outside; beside]),
+            "beside {beside}"
+        );
+    }
 }

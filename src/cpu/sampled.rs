@@ -18,7 +18,7 @@ use crate::engine::Error;
 use crate::frame_clock::FrameClock;
 use crate::joints::{Joints, TrackJoints};
 use crate::method::{Form, Interpolation, InterpolationError, Path};
-use crate::plan::{FramePlan, Stretch, time_sample};
+use crate::plan::{FramePlan, Stretch, TimePlan};
 use crate::prepare::flip;
 use crate::segment::shader::{HELD, INNER, LONGEST_STEP};
 use crate::segment::{Joint, Sample};
@@ -80,6 +80,7 @@ pub(super) struct Sampled<'a> {
     interpolation: &'a Interpolation,
     block: Block<'a>,
     plan: FramePlan<'a>,
+    time_plan: TimePlan,
     /// The sign of the track's first key.
     sign: f32,
     /// The sign of every key, where any of them differ.
@@ -108,6 +109,7 @@ impl<'a> Sampled<'a> {
             interpolation,
             block,
             plan: FramePlan::new(),
+            time_plan: TimePlan::new(),
             sign: 1.0,
             signs: Vec::new(),
             is_left_out: false,
@@ -264,9 +266,9 @@ impl<'a> Sampled<'a> {
             all: self.sign,
             each: &self.signs,
         };
-        let mut near = 0;
+        let (mut near, plan) = (0, &mut self.time_plan);
         let mut next = |time: f64| {
-            let sample = time_sample(stretch.times, time, near);
+            let sample = plan.sample(stretch.times, time, near);
             near = (sample.key & !HELD) as usize;
             sample
         };

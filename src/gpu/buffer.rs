@@ -60,26 +60,9 @@ impl Buffer {
     ) -> Result<Self, VulkanError> {
         let size = size.max(16).next_multiple_of(16);
         let is_texels = device.reads_texels && residence != Residence::Readback;
-        let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
-            | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
-        if is_texels {
-            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
-        }
-        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
-        // SAFETY: the device is alive, here and below; what is created is destroyed
-        // in `drop`, also when a later step fails.
-        let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
-        let mut buffer = Self {
-            device: Arc::clone(device),
-            raw,
-            view: vk::BufferView::null(),
-            memory: vk::DeviceMemory::null(),
-            mapped: None,
-            size,
-        };
+        let mut buffer = Self::without_memory(device, size, is_texels, None)?;
         // SAFETY: the buffer was just created.
-        let needs = unsafe { device.raw.get_buffer_memory_requirements(raw) };
+        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
         let (required, preferred) = residence.properties();
         let memory_type = device
             .physical
@@ -88,22 +71,7 @@ impl Buffer {
         let allocate = vk::MemoryAllocateInfo::default()
             .allocation_size(needs.size)
             .memory_type_index(memory_type);
-        // SAFETY: a valid size and memory type.
-        buffer.memory =
-            unsafe { device.raw.allocate_memory(&allocate, None) }.named("vkAllocateMemory")?;
-        // SAFETY: fresh memory of a type that the buffer allows.
-        unsafe { device.raw.bind_buffer_memory(raw, buffer.memory, 0) }
-            .named("vkBindBufferMemory")?;
-        if is_texels {
-            let info = vk::BufferViewCreateInfo::default()
-                .buffer(raw)
-                .format(vk::Format::R32G32B32A32_UINT)
-                .range(vk::WHOLE_SIZE);
-            // SAFETY: the buffer has memory, is made for this use and not longer than a
-            // view may be.
-            buffer.view = unsafe { device.raw.create_buffer_view(&info, None) }
-                .named("vkCreateBufferView")?;
-        }
+        buffer.give_memory(&allocate, is_texels, name)?;
         if residence != Residence::Device {
             let flags = vk::MemoryMapFlags::empty();
             // SAFETY: the memory is host-visible and not mapped yet.
@@ -115,9 +83,108 @@ impl Buffer {
             .named("vkMapMemory")?;
             buffer.mapped = NonNull::new(pointer.cast());
         }
-        device.name(raw, name);
-        device.name(buffer.memory, name);
         Ok(buffer)
+    }
+
+    /// Around pages of this process's memory; nothing where the device cannot take them.
+    ///
+    /// # Safety
+    /// They must be there as long as the buffer is, and as anything works on it.
+    pub(super) unsafe fn around(
+        device: &Arc<LogicalDevice>,
+        name: &str,
+        pages: NonNull<u8>,
+        size: u64,
+    ) -> Option<Self> {
+        const KIND: vk::ExternalMemoryHandleTypeFlags =
+            vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
+        let borrows = device.borrows.as_ref()?;
+        let pages = pages.as_ptr().cast();
+        let mut properties = vk::MemoryHostPointerPropertiesEXT::default();
+        // SAFETY: the extension is enabled, and the pages are there.
+        let known = unsafe {
+            let call = borrows.fp().get_memory_host_pointer_properties_ext;
+            call(borrows.device(), KIND, pages, &raw mut properties)
+        };
+        known
+            .result()
+            .named("vkGetMemoryHostPointerPropertiesEXT")
+            .ok()?;
+        let is_texels = device.reads_texels;
+        let mut buffer = Self::without_memory(device, size, is_texels, Some(KIND)).ok()?;
+        // SAFETY: the buffer was just created.
+        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
+        let (required, preferred) = Residence::Readback.properties();
+        let allowed = needs.memory_type_bits & properties.memory_type_bits;
+        let memory_type = device.physical.memory_type(allowed, required, preferred)?;
+        let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
+            .handle_type(KIND)
+            .host_pointer(pages);
+        let allocate = vk::MemoryAllocateInfo::default()
+            .allocation_size(size)
+            .memory_type_index(memory_type)
+            .push_next(&mut import);
+        let fits = needs.size <= size;
+        (fits && buffer.give_memory(&allocate, is_texels, name).is_ok()).then_some(buffer)
+    }
+
+    fn without_memory(
+        device: &Arc<LogicalDevice>,
+        size: u64,
+        is_texels: bool,
+        external: Option<vk::ExternalMemoryHandleTypeFlags>,
+    ) -> Result<Self, VulkanError> {
+        let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        if is_texels {
+            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
+        }
+        let mut kinds = vk::ExternalMemoryBufferCreateInfo::default()
+            .handle_types(external.unwrap_or_default());
+        let mut info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        if external.is_some() {
+            info = info.push_next(&mut kinds);
+        }
+        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // in `drop`, also when a later step fails.
+        let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
+        Ok(Self {
+            device: Arc::clone(device),
+            raw,
+            view: vk::BufferView::null(),
+            memory: vk::DeviceMemory::null(),
+            mapped: None,
+            size,
+        })
+    }
+
+    fn give_memory(
+        &mut self,
+        allocate: &vk::MemoryAllocateInfo<'_>,
+        is_texels: bool,
+        name: &str,
+    ) -> Result<(), VulkanError> {
+        let device = &self.device.raw;
+        // SAFETY: a valid size and memory type.
+        self.memory =
+            unsafe { device.allocate_memory(allocate, None) }.named("vkAllocateMemory")?;
+        // SAFETY: fresh memory of a type that the buffer allows.
+        unsafe { device.bind_buffer_memory(self.raw, self.memory, 0) }
+            .named("vkBindBufferMemory")?;
+        if is_texels {
+            let info = vk::BufferViewCreateInfo::default()
+                .buffer(self.raw)
+                .format(vk::Format::R32G32B32A32_UINT)
+                .range(vk::WHOLE_SIZE);
+            // SAFETY: the buffer has memory, is made for this use and not longer than a
+            // view may be.
+            self.view =
+                unsafe { device.create_buffer_view(&info, None) }.named("vkCreateBufferView")?;
+        }
+        self.device.name(self.raw, name);
+        self.device.name(self.memory, name);
+        Ok(())
     }
 
     /// Size in bytes.

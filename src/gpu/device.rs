@@ -3,11 +3,12 @@
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
 use super::error::{Named, VulkanError};
-use super::physical::PhysicalDevice;
+use super::physical::{DeviceKind, PhysicalDevice};
 use crate::device::Reads;
 
 /// An opened device, destroyed with its last user unless it was handed in.
@@ -18,6 +19,8 @@ pub(super) struct LogicalDevice {
     pub(super) reads_texels: bool,
     queue: Mutex<vk::Queue>,
     names: Option<ext::debug_utils::Device>,
+    /// Where it may work on the caller's memory.
+    pub(super) borrows: Option<ext::external_memory_host::Device>,
     owned: bool,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
@@ -30,10 +33,16 @@ impl LogicalDevice {
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
         let controls = physical.float_controls_extension;
-        let extensions: Vec<_> = controls
+        let mut extensions: Vec<_> = controls
             .then_some(khr::shader_float_controls::NAME.as_ptr())
             .into_iter()
             .collect();
+        // Software devices work in threads of this process: waiting for them has an end, and
+        // nothing of them works on memory that was given back.
+        let borrows = physical.info.kind == DeviceKind::Cpu && physical.lent_alignment.is_some();
+        if borrows {
+            extensions.push(ext::external_memory_host::NAME.as_ptr());
+        }
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
@@ -43,7 +52,8 @@ impl LogicalDevice {
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
         // SAFETY: one queue of this family was just created.
         let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
-        Ok(Self::wrap(physical, raw, queue, reads, true))
+        let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
+        Ok(Self::wrap(physical, raw, queue, reads, borrows, true))
     }
 
     /// An application's device; it stays the application's to destroy.
@@ -53,7 +63,7 @@ impl LogicalDevice {
         queue: vk::Queue,
         reads: Reads,
     ) -> Arc<Self> {
-        Self::wrap(physical, raw, queue, reads, false)
+        Self::wrap(physical, raw, queue, reads, None, false)
     }
 
     fn wrap(
@@ -61,6 +71,7 @@ impl LogicalDevice {
         raw: ash::Device,
         queue: vk::Queue,
         reads: Reads,
+        borrows: Option<ext::external_memory_host::Device>,
         owned: bool,
     ) -> Arc<Self> {
         let instance = &physical.instance;
@@ -74,6 +85,7 @@ impl LogicalDevice {
             physical,
             queue,
             names,
+            borrows,
             owned,
             hung,
         })
@@ -112,6 +124,17 @@ impl LogicalDevice {
         match unsafe { self.raw.device_wait_idle() } {
             Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST) => {}
             Err(_) => self.mark_hung(),
+        }
+    }
+
+    /// Waits for everything, however long it takes.
+    pub(super) fn wait_in_any_case(&self) {
+        let _queue = self.queue();
+        // SAFETY: as in `wait_until_idle`.
+        while let Err(error) = unsafe { self.raw.device_wait_idle() }
+            && error != vk::Result::ERROR_DEVICE_LOST
+        {
+            std::thread::sleep(Duration::from_millis(10)); // memory may come back
         }
     }
 

@@ -8,6 +8,7 @@ use glam::Quat;
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
+use super::lent::Lent;
 use super::mapped::{FreeBuffers, MappedQuats};
 use super::physical::{DeviceKind, PhysicalDevice};
 use super::pipeline::{KERNELS, POSES, Pipeline, SAMPLED};
@@ -43,6 +44,8 @@ pub(crate) struct VulkanEngine {
     pub(super) key_slots: Mutex<Vec<KeySlot>>,
     /// Results are written in place, or copied out of the device's own memory.
     pub(super) in_place: bool,
+    /// Kernels work on the caller's memory where they can.
+    pub(super) lends: bool,
     /// Rotations of one window.
     window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
@@ -131,6 +134,7 @@ impl VulkanEngine {
             key_pipelines: Mutex::default(),
             key_slots: Mutex::default(),
             in_place,
+            lends: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes,
             clip_bytes: options.memory.map(|budget| budget / 2),
@@ -323,7 +327,11 @@ impl VulkanEngine {
         window: &Window,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        self.run(job, window, Target::Slice(output))
+        let target = match self.lends {
+            true => Lent::to_write(&self.device, output, job.encoding.bytes()),
+            false => Err(output),
+        };
+        self.run(job, window, target.map_or_else(Target::Slice, Target::Lent))
     }
 
     /// Evaluates into a buffer of the caller's device, where it stays.

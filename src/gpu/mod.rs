@@ -9,6 +9,7 @@ mod engine;
 mod error;
 mod handles;
 mod instance;
+mod lent;
 mod mapped;
 mod opened;
 mod pass;

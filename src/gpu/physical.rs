@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ash::{khr, vk};
+use ash::{ext, khr, vk};
 use serde::Serialize;
 
 use super::error::{Named, VulkanError};
@@ -79,6 +79,8 @@ pub(crate) struct PhysicalDevice {
     pub(super) float_controls_extension: bool,
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     max_texel_buffer_elements: u32,
+    /// What memory must be aligned to that the device is to work on where it is, bytes.
+    pub(super) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
 }
 
@@ -136,7 +138,12 @@ impl PhysicalDevice {
         let mut controls = vk::PhysicalDeviceFloatControlsProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut lent = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance);
+        let borrows = has(ext::external_memory_host::NAME);
+        if borrows {
+            all = all.push_next(&mut lent);
+        }
         if reports_controls {
             all = all.push_next(&mut controls);
         }
@@ -188,6 +195,7 @@ impl PhysicalDevice {
             float_controls_extension: reports_controls && !core_1_2,
             memory,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
+            lent_alignment: borrows.then_some(lent.min_imported_host_pointer_alignment),
             info,
         }))
     }

@@ -67,6 +67,9 @@ impl VulkanEngine {
             let finished = slot.finish(job.encoding, &mut target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
         }
+        if let (Target::Lent(memory), Ok(())) = (&mut target, &result) {
+            memory.has_come_back();
+        }
         if stopwatch.is_slow() {
             self.halve_windows(); // those of the next call
         }
@@ -100,6 +103,7 @@ impl VulkanEngine {
             .max(1);
         let start = match target {
             Target::Buffer(_) => window.start as u64 * rotation,
+            Target::Lent(memory) => memory.start() as u64 + window.start as u64 * rotation,
             Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
             Target::Slice(_) => 0,
         };
@@ -152,6 +156,7 @@ impl VulkanEngine {
         }
         let rotations = match (target, &slot.rotations) {
             (Target::Buffer(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
+            (Target::Lent(memory), _) => Binding::stretch(memory.raw(), aligned, size),
             (Target::External(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
             (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),

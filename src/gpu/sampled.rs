@@ -10,12 +10,15 @@ use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::engine::{SLOTS, VulkanEngine};
 use super::error::VulkanError;
+use super::lent::Lent;
 use super::pipeline::{Exactness, Pipeline, SampledKernel};
-use super::slot::{Slot, Stopwatch, copy};
+use super::slot::{Slot, Stopwatch, Target, copy};
 use super::submission::{Access, Binding, Submission};
+use glam::Quat;
+
 use crate::cpu::Straight;
 use crate::engine::Error;
-use crate::key_pieces::{KeyJob, KeyPiece};
+use crate::key_pieces::{KeyJob, KeyPiece, Keys};
 use crate::segment::shader::{ROWS_EACH, ROWS_WORKGROUP};
 
 /// What one piece in flight needs; the submission comes first, so that it is waited for
@@ -26,10 +29,29 @@ pub(super) struct KeySlot {
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
     joints: Option<Buffer>,
-    /// Where the result of the piece in flight goes.
+    /// Where the result of the piece in flight goes, bytes.
     output: Range<usize>,
     /// As [`Slot::compiled`].
     compiled: bool,
+}
+
+/// Memory of the caller's.
+struct Borrowed<'a> {
+    /// The set's keys, where kernels may read them there.
+    keys: Option<Lent<'a>>,
+    target: Target<'a>,
+}
+
+impl Borrowed<'_> {
+    /// See [`Lent::has_come_back`].
+    fn has_come_back(&mut self) {
+        if let Some(keys) = &mut self.keys {
+            keys.has_come_back();
+        }
+        if let Target::Lent(output) = &mut self.target {
+            output.has_come_back();
+        }
+    }
 }
 
 impl VulkanEngine {
@@ -46,13 +68,35 @@ impl VulkanEngine {
         while slots.len() < SLOTS {
             slots.push(KeySlot::new(&self.device)?);
         }
+        let each = size_of::<Quat>();
+        // A piece's result may begin anywhere.
+        let alignment = self
+            .device
+            .physical
+            .info
+            .min_storage_buffer_offset_alignment;
+        let lends = self.lends && alignment <= each as u64;
+        let output = bytemuck::cast_slice_mut(output);
+        let mut lent = Borrowed {
+            keys: (job.keys().filter(|_| lends && self.device.reads_texels))
+                .and_then(|keys| Lent::to_read(&self.device, bytemuck::cast_slice(keys)))
+                .filter(|keys| keys.start().is_multiple_of(each)),
+            target: match lends {
+                true => Lent::to_write(&self.device, output, each)
+                    .map_or_else(Target::Slice, Target::Lent),
+                false => Target::Slice(output),
+            },
+        };
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
-        let mut result = self.submit_pieces(job, &mut slots, &mut next, output, &mut stopwatch);
+        let mut result = self.submit_pieces(job, &mut slots, &mut next, &mut lent, &mut stopwatch);
         // Also after an error: what was submitted uses the slots' buffers.
         for i in 1..=SLOTS {
-            let finished = slots[(next + i) % SLOTS].finish(output, &mut stopwatch);
+            let finished = slots[(next + i) % SLOTS].finish(&mut lent.target, &mut stopwatch);
             result = result.and(finished.map_err(Error::from));
+        }
+        if result.is_ok() {
+            lent.has_come_back();
         }
         if stopwatch.is_slow() {
             self.halve_windows(); // those of the next call
@@ -69,7 +113,7 @@ impl VulkanEngine {
         job: &KeyJob<'_>,
         slots: &mut [KeySlot],
         next: &mut usize,
-        output: &mut [[f32; 4]],
+        lent: &mut Borrowed<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), Error> {
         let kernel = match job.straight {
@@ -89,12 +133,12 @@ impl VulkanEngine {
             };
             *next = (*next + 1) % SLOTS;
             let slot = &mut slots[*next];
-            slot.finish(output, stopwatch)?;
+            slot.finish(&mut lent.target, stopwatch)?;
             let writing = Instant::now();
-            slot.start(&self.device, &pipeline, &piece)?;
-            stopwatch.timings.work_lists += writing.elapsed();
-            slot.output = start..start + piece.rotation_count();
+            slot.output = start..start + piece.rotation_count() * size_of::<Quat>();
             start = slot.output.end;
+            slot.start(&self.device, &pipeline, &piece, lent)?;
+            stopwatch.timings.work_lists += writing.elapsed();
         }
     }
 
@@ -134,8 +178,22 @@ impl KeySlot {
         device: &Arc<LogicalDevice>,
         pipeline: &Pipeline,
         piece: &KeyPiece<'_, '_>,
+        lent: &Borrowed<'_>,
     ) -> Result<(), Error> {
-        let [key_bytes, sample_bytes, rotation_bytes, joint_bytes] = piece.bytes();
+        let [mut key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
+        let lent_keys = lent.keys.as_ref().filter(|_| !piece.turns());
+        if lent_keys.is_some() {
+            key_bytes = 0;
+        }
+        let place = match &lent.target {
+            Target::Lent(memory) if !self.output.is_empty() => {
+                rotation_bytes = 0;
+                let start = memory.start() + self.output.start;
+                let size = self.output.len() as u64;
+                Some(Binding::stretch(memory.raw(), start as u64, size))
+            }
+            _ => None,
+        };
         let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
             Slot::grow(device, buffer, bytes as u64, residence)
         };
@@ -152,14 +210,17 @@ impl KeySlot {
             unreachable!("grown above");
         };
         piece.write(
-            bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes)),
+            match lent_keys {
+                Some(keys) => Keys::Lent(keys.start() / size_of::<Quat>()),
+                None => Keys::Copied(bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes))),
+            },
             bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
             bytemuck::cast_slice_mut(joints.bytes_mut(0..joint_bytes)),
         )?;
         let bindings = [
-            Binding::whole(keys),
+            lent_keys.map_or_else(|| Binding::whole(keys), Lent::binding),
             Binding::whole(samples),
-            Binding::whole(rotations),
+            place.unwrap_or_else(|| Binding::whole(rotations)),
             Binding::whole(joints),
         ];
         let bindings = &bindings[..pipeline.bindings.count as usize];
@@ -180,17 +241,16 @@ impl KeySlot {
     /// Waits for the piece in flight, if any, and brings its results home.
     fn finish(
         &mut self,
-        output: &mut [[f32; 4]],
+        target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
         if let Some(spent) = self.submission.wait()? {
             stopwatch.ran(spent, self.compiled);
         }
         let copying = Instant::now();
-        let own: &mut [u8] =
-            bytemuck::cast_slice_mut(&mut output[std::mem::take(&mut self.output)]);
-        if let Some(rotations) = self.rotations.as_ref().filter(|_| !own.is_empty()) {
-            copy(own, rotations.bytes(0..own.len()));
+        let own = std::mem::take(&mut self.output);
+        if let (Target::Slice(output), Some(rotations)) = (target, &self.rotations) {
+            copy(&mut output[own.clone()], rotations.bytes(0..own.len()));
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())

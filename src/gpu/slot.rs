@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
+use super::lent::Lent;
 use super::submission::{Spent, Submission};
 use super::work_list::{GroupWork, WorkChunk};
 use crate::device::Timings;
@@ -84,6 +85,8 @@ impl Stopwatch {
 pub(super) enum Target<'a> {
     /// Straight into a mapped buffer.
     Buffer(&'a mut Buffer),
+    /// Straight into the caller's memory.
+    Lent(Lent<'a>),
     /// Through a window's own buffer into the caller's memory.
     Slice(&'a mut [u8]),
     /// Into a buffer of the caller's.
@@ -192,6 +195,7 @@ impl Slot {
         let all = window.start * rotation..(window.start + window.len()) * rotation;
         let output: &mut [u8] = match target {
             Target::Buffer(buffer) => buffer.bytes_mut(all),
+            Target::Lent(memory) => memory.bytes_mut(all),
             Target::External(_) => &mut [],
             Target::Slice(slice) => {
                 let output = &mut slice[all];

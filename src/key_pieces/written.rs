@@ -1,5 +1,7 @@
 //! What a kernel reads of a piece: its keys with their signs, where the samples lie, and joints.
 
+use std::ops::Range;
+
 use glam::Quat;
 use rayon::prelude::*;
 
@@ -8,7 +10,7 @@ use crate::clock::{FramesError, Ticks};
 use crate::cpu::{Turns, in_lanes};
 use crate::frame_clock::FrameClock;
 use crate::joints::TrackJoints;
-use crate::plan::{FramePlan, Stretch, time_sample};
+use crate::plan::{FramePlan, Stretch, TimePlan};
 use crate::prepare::{flip, may_turn};
 use crate::segment::shader::{HELD, TURNED};
 use crate::segment::{Joint, Rows, Sample};
@@ -41,13 +43,29 @@ impl KeyPiece<'_, '_> {
         ]
     }
 
+    /// Whether any of its keys is turned by those before it, or may be.
+    pub(crate) fn turns(&self) -> bool {
+        let set = self.job.set;
+        self.tasks.par_iter().any(|task| match &task.what {
+            What::Part(part) => part.sign < 0.0 || any_turns(part.stretch.keys),
+            What::Tracks(tracks) => {
+                let mut tracks = tracks.clone();
+                tracks.any(|index| any_turns(set.times_and_keys(index).1))
+            }
+        })
+    }
+
     /// Writes what the kernel reads.
     pub(crate) fn write(
         &self,
-        mut keys: &mut [[u32; 4]],
+        keys: Keys<'_>,
         mut samples: &mut [Sample],
         mut joints: &mut [Joint],
     ) -> Result<(), FramesError> {
+        let (mut keys, lent) = match keys {
+            Keys::Copied(keys) => (keys, None),
+            Keys::Lent(first) => (&mut [][..], Some(first)),
+        };
         let mut first_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
@@ -56,7 +74,7 @@ impl KeyPiece<'_, '_> {
                 1 => (task.samples, task.keys.min(joints.len())),
                 _ => (samples.len(), joints.len()),
             };
-            let (own_keys, other_keys) = keys.split_at_mut(task.keys);
+            let (own_keys, other_keys) = keys.split_at_mut(task.keys.min(keys.len()));
             let (own_samples, other_samples) = samples.split_at_mut(told);
             let (own_joints, other_joints) = joints.split_at_mut(joined);
             (keys, samples, joints) = (other_keys, other_samples, other_joints);
@@ -65,23 +83,26 @@ impl KeyPiece<'_, '_> {
                 samples: own_samples,
                 joints: own_joints,
                 next_key: first_key,
+                lent,
             };
             places.push((task, written));
             first_key += task.keys;
         }
         let ends = self.job.interpolation.ends;
         let rule = self.job.joints();
-        let new = || {
-            (
-                FramePlan::new(),
-                rule.map(|rule| TrackJoints::new(rule, ends)),
-            )
+        let new = || Known {
+            frames: FramePlan::new(),
+            times: TimePlan::new(),
+            joints: rule.map(|rule| TrackJoints::new(rule, ends)),
         };
         places
             .into_par_iter()
             .try_for_each_init(new, |known, (task, mut written)| {
                 match &task.what {
                     What::Part(part) => self.write_part(part, known, &mut written)?,
+                    What::Tracks(tracks) if self.is_times_alone(&written) => {
+                        self.write_times(tracks.clone(), known, &mut written);
+                    }
                     What::Tracks(tracks) => {
                         for index in tracks.clone() {
                             self.write_part(&self.job.track(index), known, &mut written)?;
@@ -95,22 +116,32 @@ impl KeyPiece<'_, '_> {
     fn write_part<'p>(
         &self,
         part: &Part<'p>,
-        (plan, joints): &mut (FramePlan<'p>, Option<TrackJoints<'p>>),
+        known: &mut Known<'p>,
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
-        let first_key = written.next_key;
         let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
-        let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
-        own.copy_from_slice(keys);
-        turned(&part.stretch, part.sign, |key| own[key][0] |= TURNED);
-        written.keys = others;
+        let first_key = match written.lent {
+            Some(first) => {
+                let Stretch {
+                    index, first_key, ..
+                } = part.stretch;
+                first + self.job.set.keys_of(0..index) + first_key
+            }
+            None => {
+                let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
+                own.copy_from_slice(keys);
+                turned(&part.stretch, part.sign, |key| own[key][0] |= TURNED);
+                written.keys = others;
+                written.next_key
+            }
+        };
         if !written.samples.is_empty() {
             let all = std::mem::take(&mut written.samples);
             let (own, others) = all.split_at_mut(part.window.len());
-            self.write_samples(part, first_key as u32, own, plan)?;
+            self.write_samples(part, first_key as u32, own, known)?;
             written.samples = others;
         }
-        if let (Some(joints), false) = (joints, written.joints.is_empty()) {
+        if let (Some(joints), false) = (&mut known.joints, written.joints.is_empty()) {
             let all = std::mem::take(&mut written.joints);
             let (own, others) = all.split_at_mut(keys.len());
             let Stretch {
@@ -131,7 +162,7 @@ impl KeyPiece<'_, '_> {
         part: &Part<'p>,
         first_key: u32,
         samples: &mut [Sample],
-        plan: &mut FramePlan<'p>,
+        known: &mut Known<'p>,
     ) -> Result<(), FramesError> {
         let KeyJob { set, timeline, .. } = self.job;
         let index = part.stretch.index;
@@ -139,7 +170,7 @@ impl KeyPiece<'_, '_> {
             Ticks::Frames { rate, start } => {
                 let all = set.times_and_keys(index).0;
                 let clock = FrameClock::new(*rate, *start, all[all.len() - 1]);
-                let found = plan.samples(part.stretch, clock, &part.window)?;
+                let found = known.frames.samples(part.stretch, clock, &part.window)?;
                 for (sample, found) in samples.iter_mut().zip(found) {
                     *sample = Sample {
                         key: found.key + first_key,
@@ -149,48 +180,101 @@ impl KeyPiece<'_, '_> {
             }
             Ticks::Times { times, stride } => {
                 let times = &times[index * stride..][..samples.len()];
-                let mut near = 0;
-                for (sample, &time) in samples.iter_mut().zip(times) {
-                    let found = time_sample(part.stretch.times, time, near);
-                    near = (found.key & !HELD) as usize;
-                    *sample = Sample {
-                        key: found.key + first_key,
-                        ..found
-                    };
-                }
+                known
+                    .times
+                    .write(part.stretch.times, times, first_key, samples);
             }
         }
         Ok(())
     }
+
+    /// Whether samples are explicit times, and all that is to be written.
+    fn is_times_alone(&self, written: &Written<'_>) -> bool {
+        let in_times = matches!(self.job.timeline.ticks, Ticks::Times { .. });
+        in_times && written.lent.is_some() && written.joints.is_empty()
+    }
+
+    /// The samples of whole tracks, which may be many with a sample each.
+    fn write_times(&self, tracks: Range<usize>, known: &mut Known<'_>, written: &mut Written<'_>) {
+        let KeyJob { set, timeline, .. } = self.job;
+        let (Ticks::Times { times, stride }, Some(first)) = (&timeline.ticks, written.lent) else {
+            return;
+        };
+        let mut first_key = (first + set.keys_of(0..tracks.start)) as u32;
+        for (index, samples) in tracks.zip(written.samples.chunks_mut(timeline.len())) {
+            let (starts, keys) = set.times_and_keys(index);
+            let times = &times[index * stride..][..samples.len()];
+            known.times.write(starts, times, first_key, samples);
+            first_key += keys.len() as u32;
+        }
+    }
 }
 
-/// What a thread has still to write, and what it has found.
+impl TimePlan {
+    /// Where times lie among keys, the first of which has the place `first_key`.
+    #[inline(always)]
+    fn write(&mut self, starts: &[f64], times: &[f64], first_key: u32, samples: &mut [Sample]) {
+        let mut near = 0;
+        for (sample, &time) in samples.iter_mut().zip(times) {
+            let found = self.sample(starts, time, near);
+            near = (found.key & !HELD) as usize;
+            *sample = Sample {
+                key: found.key + first_key,
+                ..found
+            };
+        }
+    }
+}
+
+/// Where a kernel reads the keys of a piece.
+pub(crate) enum Keys<'w> {
+    /// Here, with their signs.
+    Copied(&'w mut [[u32; 4]]),
+    /// Where they are stored; the set's first one has this place. None is turned.
+    Lent(usize),
+}
+
+/// What a thread finds out, and keeps for the next track.
+struct Known<'p> {
+    frames: FramePlan<'p>,
+    times: TimePlan,
+    /// Those of cubics.
+    joints: Option<TrackJoints<'p>>,
+}
+
+/// What a thread has still to write.
 struct Written<'w> {
     keys: &'w mut [[u32; 4]],
     samples: &'w mut [Sample],
     joints: &'w mut [Joint],
     /// The place of the next key among the piece's.
     next_key: usize,
+    /// The place of the set's first key, where keys are read as they are stored.
+    lent: Option<usize>,
 }
 
 /// To look at so many keys one by one takes no longer than to call what looks at lanes.
 const FEW: usize = 4;
 
+/// Whether the sign of any key after the first is turned, or may be.
+#[inline]
+fn any_turns(keys: &[Quat]) -> bool {
+    let keys: &[[f32; 4]] = bytemuck::cast_slice(keys);
+    if keys.len() > FEW {
+        let mut turns = Turns { keys, any: false };
+        in_lanes(&mut turns);
+        return turns.any;
+    }
+    (keys.windows(2)).any(|pair| may_turn(pair[0], pair[1]))
+}
+
 /// Calls `turn` for each key whose sign those before it turn, where the first one's is
 /// given; the sign of the last.
 pub(super) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
-    let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-    let any = if keys.len() > FEW {
-        let mut turns = Turns { keys, any: false };
-        in_lanes(&mut turns);
-        turns.any
-    } else {
-        let mut pairs = keys.windows(2);
-        pairs.any(|pair| may_turn(pair[0], pair[1]))
-    };
-    if !any && first > 0.0 {
+    if first > 0.0 && !any_turns(stretch.keys) {
         return first;
     }
+    let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
     let mut sign = first;
     for (i, key) in keys.iter().enumerate() {
         if i > 0 {

@@ -175,6 +175,7 @@ fallible! {
     vkCreateDebugUtilsMessengerEXT(instance, info, allocator, out) creates;
     vkCreateBuffer(device, info, allocator, out) creates;
     vkCreateBufferView(device, info, allocator, out) creates;
+    vkGetMemoryHostPointerPropertiesEXT(device, kind, pointer, out) asks;
     vkBindBufferMemory(device, buffer, memory, offset) asks;
     vkMapMemory(device, memory, offset, size, flags, out) asks;
     vkCreateCommandPool(device, info, allocator, out) creates;

@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Device, Engine, EngineOptions, Reads, Tcb, TrackSet};
+use tumble::{Device, Engine, EngineOptions, Frames, Reads, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.
@@ -172,4 +172,24 @@ pub fn first_difference(a: &[Quat], b: &[Quat]) -> Option<usize> {
     assert_eq!(a.len(), b.len());
     let bits = |q: &Quat| q.to_array().map(f32::to_bits);
     a.iter().zip(b).position(|(a, b)| bits(a) != bits(b))
+}
+
+/// Tracks of keys near each other, 100 a second, all at the same times; each key with the
+/// other sign with that probability. And 91 frames a second, from the first key to the last.
+pub fn dense_set(tracks: usize, keys: usize, turned: f64) -> (TrackSet, Frames) {
+    let mut random = Random(9);
+    let times: Vec<f64> = (0..keys).map(|k| k as f64 * 0.01).collect();
+    let mut all = Vec::new();
+    for _ in 0..tracks {
+        let mut rotation = random.rotation();
+        for _ in 0..keys {
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.05));
+            let sign = if random.unit() < turned { -1.0 } else { 1.0 };
+            rotation = (rotation * turn).normalize() * sign;
+            all.push(rotation.as_quat());
+        }
+    }
+    let set = TrackSet::with_shared_times(&times, &all).expect("unit keys in order");
+    let end = times.last().copied().unwrap_or(0.0);
+    (set, Frames::fps(91).between(0.0, end))
 }
