@@ -49,6 +49,12 @@ pub(crate) trait Lanes: Number {
     /// `x y z w` of [`Lanes::COUNT`] rotations.
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4];
 
+    /// The same of rotations that lie anywhere: the first [`Lanes::COUNT`] of the `places`.
+    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
+
+    /// The inner products of [`Lanes::COUNT`] pairs of rotations.
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self;
+
     /// Puts `x y z w` together, as [`Lanes::COUNT`] rotations.
     fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]);
 
@@ -96,8 +102,33 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
         let columns: &[[f32; 4]; 4] = rotations.first_chunk().expect("four rotations");
-        let rows = Mat4::from_cols_array_2d(columns).transpose();
-        [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
+        rows(Mat4::from_cols_array_2d(columns))
+    }
+
+    #[inline(always)]
+    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
+        let [a, b, c, d]: [u32; 4] = *places.first_chunk().expect("four places");
+        let columns = [
+            rotations[a as usize],
+            rotations[b as usize],
+            rotations[c as usize],
+            rotations[d as usize],
+        ];
+        rows(Mat4::from_cols_array_2d(&columns))
+    }
+
+    #[inline(always)]
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
+        let from: &[[f32; 4]; 4] = from.first_chunk().expect("four rotations");
+        let to: &[[f32; 4]; 4] = to.first_chunk().expect("four rotations");
+        // Multiplied before they are put side by side: half as much to put.
+        let [x, y, z, w] = rows(Mat4::from_cols(
+            Self::from(from[0]) * Self::from(to[0]),
+            Self::from(from[1]) * Self::from(to[1]),
+            Self::from(from[2]) * Self::from(to[2]),
+            Self::from(from[3]) * Self::from(to[3]),
+        ));
+        x + y + z + w
     }
 
     #[inline(always)]
@@ -131,6 +162,12 @@ impl Lanes for Vec4 {
     }
 }
 
+#[inline(always)]
+fn rows(columns: Mat4) -> [Vec4; 4] {
+    let rows = columns.transpose();
+    [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -159,6 +196,23 @@ pub(crate) mod tests {
         let mut filtered = found.clone();
         L::store_rotations(components.map(L::canonical), &mut filtered);
         let loaded = L::load_rotations(&found);
+        let backward: Vec<u32> = (0..L::COUNT as u32).rev().collect();
+        let gathered = L::gather_rotations(&found, &backward);
+        let mut again = vec![[9.0; 4]; L::COUNT];
+        L::store_rotations(gathered, &mut again);
+        again.reverse();
+        assert_eq!(bits(again.as_flattened()), bits(found.as_flattened()));
+        let (numbers, ones) = (
+            vec![[1.0, 20.0, 300.0, 4000.0]; L::COUNT],
+            vec![[1.0; 4]; L::COUNT],
+        );
+        for k in 0..L::COUNT {
+            let mut from = numbers.clone();
+            from[k][0] = -4321.0;
+            assert!(L::inner(&from, &ones).any_at_most(-1.0));
+            assert!(L::inner(&ones, &from).any_at_most(-1.0));
+        }
+        assert!(!L::inner(&numbers, &ones).any_at_most(4320.0));
         for c in 0..4 {
             let mut stored = vec![9.0; L::COUNT];
             loaded[c].store(&mut stored);

@@ -10,13 +10,15 @@ use super::evaluate_polynomial::component;
 use super::lanes::{self, Lanes, Number};
 use crate::method::Form;
 use crate::prepare::{ARC_LANES, any_turns, arc_anyhow, arc_component, arc_in_lanes, arcs, whole};
+use crate::segment::Sample;
+use crate::segment::shader::HELD;
 
 /// Samples, or intervals, worked out together.
 pub(super) const LANES: usize = ARC_LANES;
 
 /// Samples that wait, one behind the other in the result.
 pub(super) struct SampleBlock {
-    form: Form,
+    pub(super) form: Form,
     /// The keys beside each; the same one twice where the sample is that key.
     pub(super) from: [[f32; 4]; LANES],
     pub(super) to: [[f32; 4]; LANES],
@@ -56,18 +58,21 @@ impl InLanes for SampleBlock {
 impl SampleBlock {
     #[inline(always)]
     fn arcs<L: Lanes>(&mut self) {
+        let mut arcs = Arcs::<L>::new();
         for j in (0..self.count).step_by(L::COUNT) {
-            let arcs = arc_in_lanes::<L>(&self.from[j..], &self.to[j..]);
-            let sign = L::load(&self.signs[j..]);
-            let parameter = L::load(&self.parameters[j..]);
-            let found = at(arcs.middle, arcs.tangent, sign, parameter);
-            L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
-            if arcs.any_in_doubt {
-                for lane in j..j + L::COUNT {
-                    let (arc, _) = arc_anyhow(self.from[lane], self.to[lane]);
-                    let (sign, parameter) = (self.signs[lane], self.parameters[lane]);
-                    self.rotations[lane] = at(arc.middle, arc.tangent, sign, parameter);
-                }
+            let from = L::load_rotations(&self.from[j..]);
+            arcs.put(j, from, L::load_rotations(&self.to[j..]));
+        }
+        for j in (0..self.count).step_by(L::COUNT) {
+            let (sign, parameter) = (L::load(&self.signs[j..]), L::load(&self.parameters[j..]));
+            let rotations = &mut self.rotations[j..j + L::COUNT];
+            L::store_rotations(arcs.at(j, sign, parameter), rotations);
+        }
+        if arcs.any_in_doubt {
+            for lane in 0..self.count {
+                let (arc, _) = arc_anyhow(self.from[lane], self.to[lane]);
+                let (sign, parameter) = (self.signs[lane], self.parameters[lane]);
+                self.rotations[lane] = at(arc.middle, arc.tangent, sign, parameter);
             }
         }
     }
@@ -98,14 +103,101 @@ impl SampleBlock {
     }
 }
 
+/// The arcs of a block, in vectors. First all of them are made and then all rotations: a
+/// processor looks ahead a vector or two, and one that goes all the way is a long chain to
+/// wait for.
+struct Arcs<L> {
+    middles: [[L; 4]; LANES / 4],
+    tangents: [[L; 4]; LANES / 4],
+    any_in_doubt: bool,
+}
+
+impl<L: Lanes> Arcs<L> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            middles: [[L::all(0.0); 4]; LANES / 4],
+            tangents: [[L::all(0.0); 4]; LANES / 4],
+            any_in_doubt: false,
+        }
+    }
+
+    /// The arcs of a vector whose first lane is `lane`.
+    #[inline(always)]
+    fn put(&mut self, lane: usize, from: [L; 4], to: [L; 4]) {
+        let arcs = arc_in_lanes(from, to);
+        self.middles[lane / L::COUNT] = arcs.middle;
+        self.tangents[lane / L::COUNT] = arcs.tangent;
+        self.any_in_doubt |= arcs.any_in_doubt;
+    }
+
+    /// Their rotations.
+    #[inline(always)]
+    fn at(&self, lane: usize, sign: L, parameter: L) -> [L; 4] {
+        let vector = lane / L::COUNT;
+        at(self.middles[vector], self.tangents[vector], sign, parameter)
+    }
+}
+
 /// A rotation of an arc whose first key has that sign.
 #[inline(always)]
 fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
-    let [mx, my, mz, mw] = middle;
-    let [tx, ty, tz, tw] = tangent;
-    let middle = [mx * sign, my * sign, mz * sign, mw * sign];
-    let tangent = [tx * sign, ty * sign, tz * sign, tw * sign];
-    lanes::canonical(on_arc(middle, tangent, square(tangent), parameter))
+    let [x, y, z, w] = on_arc(middle, tangent, square(tangent), parameter);
+    // With the other sign, every operation gives what it gives, with the other sign.
+    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
+}
+
+/// Samples of one track on arcs, in one sign, straight into the result.
+pub(super) struct ArcRun<'a> {
+    pub(super) samples: &'a [Sample],
+    pub(super) keys: &'a [[f32; 4]],
+    pub(super) sign: f32,
+    pub(super) output: &'a mut [[f32; 4]],
+    /// How many are worked out: whole vectors.
+    pub(super) done: usize,
+}
+
+impl InLanes for ArcRun<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let whole = self.samples.len() / L::COUNT * L::COUNT;
+        let samples = self.samples[..whole].chunks(LANES);
+        let mut arcs = Arcs::<L>::new();
+        let (mut from, mut to, mut parameters) = ([0; LANES], [0; LANES], [0.0; LANES]);
+        for (samples, rotations) in samples.zip(self.output.chunks_mut(LANES)) {
+            let count = samples.len();
+            let mut any = 0;
+            for (j, sample) in samples.iter().enumerate() {
+                any |= sample.key;
+                from[j] = sample.key & !HELD;
+                // Behind the last key there is none.
+                to[j] = from[j] + u32::from(sample.key & HELD == 0);
+                parameters[j] = sample.parameter;
+            }
+            arcs.any_in_doubt = false;
+            for j in (0..count).step_by(L::COUNT) {
+                let start = L::gather_rotations(self.keys, &from[j..]);
+                arcs.put(j, start, L::gather_rotations(self.keys, &to[j..]));
+            }
+            let sign = L::all(self.sign);
+            for j in (0..count).step_by(L::COUNT) {
+                let found = arcs.at(j, sign, L::load(&parameters[j..]));
+                L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
+            }
+            if arcs.any_in_doubt || any & HELD != 0 {
+                for j in 0..count {
+                    let (start, end) = (self.keys[from[j] as usize], self.keys[to[j] as usize]);
+                    if from[j] == to[j] {
+                        rotations[j] = start;
+                    } else if arcs.any_in_doubt {
+                        let (arc, _) = arc_anyhow(start, end);
+                        rotations[j] = at(arc.middle, arc.tangent, self.sign, parameters[j]);
+                    }
+                }
+            }
+        }
+        self.done = whole;
+    }
 }
 
 /// [`any_turns`].

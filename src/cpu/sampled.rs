@@ -10,7 +10,7 @@ use glam::Quat;
 use super::cubic_lanes::CubicBlock;
 use super::dispatch::in_lanes;
 use super::mend::LEFT_OUT;
-use super::sample_lanes::{LANES, SampleBlock, Turns};
+use super::sample_lanes::{ArcRun, LANES, SampleBlock, Turns};
 use crate::branchless::{dot, unit};
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::Sides;
@@ -247,6 +247,22 @@ impl<'a> Sampled<'a> {
         };
         match &mut self.block {
             Block::ByTwo(block) => {
+                let mut samples = samples;
+                if block.form == Form::Arc && signs.each.is_empty() {
+                    block.flush(output);
+                    let left = std::mem::take(output).into_slice();
+                    let mut run = ArcRun {
+                        samples,
+                        keys: bytemuck::cast_slice(stretch.keys),
+                        sign: signs.all,
+                        output: &mut *left,
+                        done: 0,
+                    };
+                    in_lanes(&mut run);
+                    let done = run.done;
+                    samples = &samples[done..];
+                    *output = left[done..].iter_mut();
+                }
                 for &sample in samples {
                     block.push(stretch.keys, sample, &signs, output);
                 }

@@ -41,7 +41,8 @@ pub(crate) fn arcs<L: Lanes>(
 ) -> ArcLanes {
     let mut lanes = ArcLanes::default();
     for j in (0..count).step_by(L::COUNT) {
-        let vector = arc_in_lanes::<L>(&from[j..], &to[j..]);
+        let (start, end) = (L::load_rotations(&from[j..]), L::load_rotations(&to[j..]));
+        let vector = arc_in_lanes(start, end);
         for c in 0..4 {
             vector.middle[c].store(&mut lanes.middles[c][j..j + L::COUNT]);
             vector.tangent[c].store(&mut lanes.tangents[c][j..j + L::COUNT]);
@@ -78,8 +79,7 @@ pub(crate) struct LaneArcs<L> {
 
 /// The arcs between [`Lanes::COUNT`] pairs of keys.
 #[inline(always)]
-pub(crate) fn arc_in_lanes<L: Lanes>(from: &[[f32; 4]], to: &[[f32; 4]]) -> LaneArcs<L> {
-    let (from, to) = (L::load_rotations(from), L::load_rotations(to));
+pub(crate) fn arc_in_lanes<L: Lanes>(from: [L; 4], to: [L; 4]) -> LaneArcs<L> {
     let dot = inner(from, to);
     let flip = dot.sign();
     let end = [to[0] * flip, to[1] * flip, to[2] * flip, to[3] * flip];
@@ -129,16 +129,7 @@ pub(crate) fn may_turn(from: [f32; 4], to: [f32; 4]) -> bool {
 pub(crate) fn any_turns<L: Lanes>(keys: &[[f32; 4]]) -> bool {
     let mut first = 0;
     while first + L::COUNT < keys.len() {
-        let (from, to) = (&keys[first..], &keys[first + 1..]);
-        // Multiplied before they are put side by side: half as much to put.
-        let mut products = [[0.0; 4]; 8];
-        for j in 0..L::COUNT {
-            for c in 0..4 {
-                products[j][c] = from[j][c] * to[j][c];
-            }
-        }
-        let [x, y, z, w] = L::load_rotations(&products);
-        if (x + y + z + w).any_at_most(IN_DOUBT) {
+        if L::inner(&keys[first..], &keys[first + 1..]).any_at_most(IN_DOUBT) {
             return true;
         }
         first += L::COUNT;

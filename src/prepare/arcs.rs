@@ -49,7 +49,8 @@ impl InLanes for ArcBlock {
     fn run<L: Lanes>(&mut self) {
         for j in (0..self.count).step_by(L::COUNT) {
             let lanes = j..j + L::COUNT;
-            let arcs = arc_in_lanes::<L>(&self.from[j..], &self.to[j..]);
+            let from = L::load_rotations(&self.from[j..]);
+            let arcs = arc_in_lanes(from, L::load_rotations(&self.to[j..]));
             L::store_rotations(arcs.middle, &mut self.middles[lanes.clone()]);
             L::store_rotations(arcs.tangent, &mut self.tangents[lanes.clone()]);
             arcs.flip.store(&mut self.flips[lanes.clone()]);

@@ -3,8 +3,9 @@
 use std::arch::x86_64::{
     __m256, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
     _mm256_castps_pd, _mm256_cmp_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_permutevar8x32_ps, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_ps,
-    _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
+    _mm256_permutevar8x32_ps, _mm256_set_m128, _mm256_set1_ps, _mm256_setr_epi32,
+    _mm256_setzero_ps, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd,
+    _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -80,6 +81,15 @@ impl Number for Eight {
 }
 
 impl Eight {
+    /// A rotation in each half.
+    #[inline(always)]
+    fn of_two(first: [f32; 4], second: [f32; 4]) -> Self {
+        Self(avx2!(_mm256_set_m128(
+            bytemuck::cast(second),
+            bytemuck::cast(first)
+        )))
+    }
+
     /// Four by four within each half.
     #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
@@ -127,6 +137,34 @@ impl Lanes for Eight {
         let rotations: [[f32; 4]; 8] = *rotations.first_chunk().expect("eight rotations");
         let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(rotations);
         Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    }
+
+    #[inline(always)]
+    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
+        let [a, b, c, d, e, f, g, h]: [u32; 8] = *places.first_chunk().expect("eight places");
+        // Written out: closures are not always inlined.
+        Self::transposed([
+            Self::of_two(rotations[a as usize], rotations[b as usize]),
+            Self::of_two(rotations[c as usize], rotations[d as usize]),
+            Self::of_two(rotations[e as usize], rotations[f as usize]),
+            Self::of_two(rotations[g as usize], rotations[h as usize]),
+        ])
+    }
+
+    #[inline(always)]
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
+        let from: [[f32; 4]; 8] = *from.first_chunk().expect("eight rotations");
+        let to: [[f32; 4]; 8] = *to.first_chunk().expect("eight rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(from);
+        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(to);
+        // Multiplied before they are put side by side: half as much to put.
+        let [x, y, z, w] = Self::transposed([
+            Self(a) * Self(e),
+            Self(b) * Self(f),
+            Self(c) * Self(g),
+            Self(d) * Self(h),
+        ]);
+        x + y + z + w
     }
 
     #[inline(always)]
