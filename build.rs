@@ -15,7 +15,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 #[path = "src/spirv.rs"]
 mod spirv;
 
-/// How a kernel reads: storage buffers, or texel buffers. The name of the latter says so.
+/// How a kernel reads: storage buffers, or texel buffers. The name of the latter says so;
+/// those also store two words of 64 bits, not four of 32.
 const READS: [&str; 2] = ["storage", "texels"];
 
 /// What the kernel is joined with: one of each, and its name is that of all three.
@@ -80,6 +81,10 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
                     files.push(format!("kernel_{reads}"));
                     if reads == "texels" {
                         files.push(format!("{form}_texels"));
+                        if encoding == "f32" {
+                            files.retain(|file| file != "store_f32");
+                            files.extend(["wide", "store_f32_wide"].map(str::to_owned));
+                        }
                     }
                     pipelines.push((named(&format!("{form}_{clock}_{encoding}"), reads), files));
                 }
@@ -103,6 +108,9 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
             let own = shared.iter().chain(needed).map(|&file| file.to_owned());
             let mut files: Vec<_> = own.collect();
             files.extend(read.iter().map(|read| format!("{read}_{reads}")));
+            if reads == "texels" {
+                files.push("wide".to_owned());
+            }
             pipelines.push((named(sampled, reads), files));
         }
     }
@@ -153,7 +161,8 @@ fn read_shader(file: &str) -> String {
 }
 
 fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
-    let info = Validator::new(ValidationFlags::all(), Capabilities::IMMEDIATES)
+    let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
+    let info = Validator::new(ValidationFlags::all(), capabilities)
         .validate(module)
         .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
     let options = spv::Options {

@@ -1,6 +1,6 @@
 // Fewer samples than keys: an invocation for each sample, straight from the keys beside
 // it. Joined with a `sampled_*`, which has `between`, and with what reads (`key_at`,
-// `sample_at`).
+// `sample_at`) and stores.
 // Twin: src/cpu/sampled.rs.
 
 // Where a sample lies among the keys of its row.
@@ -28,8 +28,6 @@ const HELD: u32 = 0x80000000;
 // this bit says of a float.
 const TURNED: u32 = 0x40000000;
 
-@group(0) @binding(2) var<storage, read_write> rotations: array<vec4f>;
-
 var<immediate> rows: Rows;
 
 @compute @workgroup_size(ROWS_WORKGROUP)
@@ -52,7 +50,7 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     for (var j = 0u; j < count; j++) {
         let stored = key_at(key);
         let own = canonical(between(key, signed(stored), key + next, known));
-        rotations[place] = select(own, as_given(stored), is_held);
+        store(place, select(own, as_given(stored), is_held));
         key += keys;
         place += samples;
     }

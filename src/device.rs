@@ -105,7 +105,8 @@ pub enum Reads {
     Automatic,
     /// Storage buffers.
     StorageBuffers,
-    /// Texel buffers, where the device can hold in one what it may allocate at once.
+    /// Texel buffers, and stores of 64 bits; where the device has such integers, and can
+    /// hold in one buffer what it may allocate at once.
     TexelBuffers,
 }
 

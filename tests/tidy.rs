@@ -69,6 +69,8 @@ fn every_shader_function_has_its_twin() {
                 "distance_in_frames",
                 "distance_in_seconds",
                 "store_f32",
+                "store_f32_wide",
+                "wide",
                 "pass",
                 "store_matrix3x3",
                 "store_matrix3x4",

@@ -43,7 +43,10 @@ impl LogicalDevice {
         if borrows {
             extensions.push(ext::external_memory_host::NAME.as_ptr());
         }
+        let features =
+            vk::PhysicalDeviceFeatures::default().shader_int64(physical.reads_texels(reads));
         let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
         let instance = &physical.instance.raw;

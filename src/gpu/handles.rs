@@ -20,7 +20,8 @@ use crate::spirv::FloatControls;
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).
 ///
-/// The device needs no features. Below Vulkan 1.2, enable
+/// The device needs no features, but is faster with one where it is software
+/// ([`VulkanHandles::shader_int64`]). Below Vulkan 1.2, enable
 /// `VK_KHR_shader_float_controls` where it is offered.
 pub struct VulkanHandles {
     /// The loaded functions; they keep the loader library open.
@@ -35,6 +36,8 @@ pub struct VulkanHandles {
     pub device: ash::Device,
     /// Whether `VK_KHR_shader_float_controls` is enabled; of no account from Vulkan 1.2 on.
     pub shader_float_controls: bool,
+    /// Whether the feature `shaderInt64` is enabled, which makes software devices faster.
+    pub shader_int64: bool,
     /// A queue of the device that can compute.
     pub queue: vk::Queue,
     /// That queue's family.
@@ -144,6 +147,7 @@ impl VulkanEngine {
             // What the device could do was not asked for.
             physical.float_controls = FloatControls::default();
         }
+        physical.has_int64 &= handles.shader_int64;
         let device =
             LogicalDevice::borrowed(physical, handles.device, handles.queue, options.reads);
         Self::with_device(device, options)

@@ -79,6 +79,8 @@ pub(crate) struct PhysicalDevice {
     pub(super) float_controls_extension: bool,
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     max_texel_buffer_elements: u32,
+    /// Shaders may have integers of 64 bits.
+    pub(super) has_int64: bool,
     /// What memory must be aligned to that the device is to work on where it is, bytes.
     pub(super) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
@@ -154,6 +156,8 @@ impl PhysicalDevice {
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
         // SAFETY: as above.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
+        // SAFETY: as above.
+        let features = unsafe { vk_instance.get_physical_device_features(raw) };
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
                 == vk::TRUE,
@@ -194,18 +198,19 @@ impl PhysicalDevice {
             float_controls,
             float_controls_extension: reports_controls && !core_1_2,
             memory,
+            has_int64: features.shader_int64 == vk::TRUE,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             lent_alignment: borrows.then_some(lent.min_imported_host_pointer_alignment),
             info,
         }))
     }
 
-    /// Whether its kernels are to read texel buffers. Cards bring together what neighbouring
-    /// lanes ask for; lavapipe brings it lane by lane, and 32 bits of a storage buffer more
-    /// slowly than a texel of 128.
+    /// Whether its kernels are to read texel buffers, and to store 64 bits at once. Cards
+    /// bring together what neighbouring lanes ask for; lavapipe brings it lane by lane, and
+    /// 32 bits of a storage buffer more slowly than a texel of 128.
     pub(super) fn reads_texels(&self, reads: Reads) -> bool {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
-        let can = longest >= self.info.max_memory_allocation_size;
+        let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
         match reads {
             Reads::Automatic => can && self.info.kind == DeviceKind::Cpu,
             Reads::StorageBuffers => false,

@@ -10,6 +10,7 @@ pub(crate) struct Application {
     pub(crate) device: ash::Device,
     entry: ash::Entry,
     pub(crate) queue: vk::Queue,
+    shader_int64: bool,
 }
 
 impl Application {
@@ -24,7 +25,12 @@ impl Application {
             let queues = [vk::DeviceQueueCreateInfo::default()
                 .queue_family_index(0)
                 .queue_priorities(&[1.0])];
-            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+            let has = instance.get_physical_device_features(physical_device);
+            let features =
+                vk::PhysicalDeviceFeatures::default().shader_int64(has.shader_int64 == vk::TRUE);
+            let info = vk::DeviceCreateInfo::default()
+                .queue_create_infos(&queues)
+                .enabled_features(&features);
             let device = instance
                 .create_device(physical_device, &info, None)
                 .unwrap();
@@ -35,6 +41,7 @@ impl Application {
                 device,
                 entry,
                 queue,
+                shader_int64: has.shader_int64 == vk::TRUE,
             }
         }
     }
@@ -48,6 +55,7 @@ impl Application {
             physical_device: self.physical_device,
             device: self.device.clone(),
             shader_float_controls: false,
+            shader_int64: self.shader_int64,
             queue: self.queue,
             queue_family: 0,
         };
