@@ -10,7 +10,7 @@ use glam::Quat;
 use crate::clock::FramesError;
 use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::frame_clock::{FrameClock, finite_scale, in_frames};
-use crate::numeric::{round_f32, whole_number};
+use crate::numeric::{frame_number, round_f32};
 use crate::schedule::COUNTABLE;
 use crate::segment::Sample;
 use crate::segment::shader::HELD;
@@ -159,7 +159,7 @@ impl InLanes for Boundaries {
         for j in 0..count {
             let boundary = clock.boundary(self.times[j]);
             frames[j] = boundary.frame;
-            firsts[j] = whole_number(within(boundary.first));
+            firsts[j] = frame_number(boundary.first);
             on_frame[j] = i64::from(boundary.first == boundary.frame);
         }
         let mut next = [0.0; LANES];
@@ -174,14 +174,6 @@ impl InLanes for Boundaries {
         (self.frames, self.firsts, self.on_frame) = (frames, firsts, on_frame);
         (self.wholes, self.scales, self.offsets) = (wholes, scales, offsets);
     }
-}
-
-/// Frames as far away as no sample is.
-#[inline(always)]
-fn within(frame: f64) -> f64 {
-    const FAR: f64 = (1u64 << 50) as f64;
-    let below = if frame < FAR { frame } else { FAR };
-    if below > -FAR { below } else { -FAR }
 }
 
 /// Where times lie among keys. What an interval makes of them is kept for the next time in

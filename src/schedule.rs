@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::frame_clock::{Clock, CopyClock, FrameClock, in_frames};
-use crate::numeric::round_quat;
+use crate::numeric::{frame_number, round_quat};
 use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::tracks::LATEST;
 
@@ -175,6 +175,7 @@ impl Prepared {
             let found = starts.partition_point(|&start| start <= first_time);
             skipped = found.saturating_sub(2);
         }
+        let (first_frame, last_frame) = (samples.start as i64, samples.end as i64);
         // Its own, and not borrowed: the compiler must see that nothing else is in it.
         let mut spans = SpanBlock::new();
         'blocks: for block in (skipped..starts.len()).step_by(SpanBlock::LEN) {
@@ -183,20 +184,18 @@ impl Prepared {
             spans.fill(clock, &starts[block..end], next);
             let (sources, keys) = (&sources[block..end], &keys[block..end]);
             for (j, (&source, &key)) in sources.iter().zip(keys).enumerate() {
-                let mut first = spans.first[j] as usize; // saturates at 0
-                let to = spans.first[j + 1] as usize;
-                if first >= samples.end {
+                let (mut first, to) = (spans.first[j], spans.first[j + 1]);
+                if first >= last_frame {
                     break 'blocks;
                 }
-                if first == to {
+                if first == to || to <= first_frame {
                     continue;
                 }
-                let from_frame = spans.frame[j];
-                if key != NONE && first as f64 == from_frame {
-                    clip(first, first + 1, &samples, key, emit);
+                if key != NONE && spans.on_frame[j] == 1 && first >= 0 {
+                    clip(first as usize, first as usize + 1, &samples, key, emit);
                     first += 1;
                 }
-                let (first, last) = (first.max(samples.start), to.min(samples.end));
+                let (first, last) = (first.max(first_frame), to.min(last_frame));
                 if first >= last {
                     continue;
                 }
@@ -204,16 +203,14 @@ impl Prepared {
                     Source::Segment(index) => {
                         let whole = spans.whole[j];
                         // Distances fit 32 bits if that of the last sample does.
-                        if (last as f64 - whole).abs() >= COUNTABLE
-                            || (first as f64 - whole).abs() >= COUNTABLE
-                        {
+                        if (last - whole).abs() >= DISTANCES || (first - whole).abs() >= DISTANCES {
                             let span = part.spans.start + block + j;
                             return Err(self.gap_too_long(part, span, clock.rate()));
                         }
                         RunSource::Segment {
                             index,
                             distance: Distance::Frames {
-                                first: (first as i64 - whole as i64) as i32,
+                                first: (first - whole) as i32,
                             },
                             scale: spans.scale[j],
                             offset: spans.offset[j],
@@ -223,14 +220,14 @@ impl Prepared {
                     Source::Exact(index) => RunSource::Exact {
                         index,
                         parameter: Parameter::Frames {
-                            start: from_frame,
-                            frames: spans.frame[j + 1] - from_frame,
+                            start: spans.frame[j],
+                            frames: spans.frame[j + 1] - spans.frame[j],
                         },
                     },
                 };
                 emit.run(Run {
-                    sample: first,
-                    count: last - first,
+                    sample: first as usize,
+                    count: (last - first) as usize,
                     source,
                 });
             }
@@ -309,7 +306,9 @@ pub(crate) fn clip(
 }
 
 /// Distances in frames are whole numbers of 32 bits.
-pub(crate) const COUNTABLE: f64 = (1u64 << 31) as f64;
+pub(crate) const COUNTABLE: f64 = DISTANCES as f64;
+
+const DISTANCES: i64 = 1 << 31;
 
 /// The frame coordinates of consecutive spans, and what their samples' parameters
 /// follow from. Worked out in vector lanes: plain loops over arrays, no calls.
@@ -317,9 +316,11 @@ struct SpanBlock {
     /// Where each span starts, and at the end where the last one ends, in frames.
     frame: [f64; Self::LEN + 1],
     /// The first whole frame not before `frame`.
-    first: [f64; Self::LEN + 1],
+    first: [i64; Self::LEN + 1],
+    /// Whether that is `frame` itself: 1 or 0.
+    on_frame: [i64; Self::LEN],
     /// The whole frame nearest to each span's middle.
-    whole: [f64; Self::LEN],
+    whole: [i64; Self::LEN],
     scale: [f32; Self::LEN],
     offset: [f32; Self::LEN],
 }
@@ -331,8 +332,9 @@ impl SpanBlock {
     fn new() -> Self {
         Self {
             frame: [0.0; Self::LEN + 1],
-            first: [0.0; Self::LEN + 1],
-            whole: [0.0; Self::LEN],
+            first: [0; Self::LEN + 1],
+            on_frame: [0; Self::LEN],
+            whole: [0; Self::LEN],
             scale: [0.0; Self::LEN],
             offset: [0.0; Self::LEN],
         }
@@ -344,13 +346,15 @@ impl SpanBlock {
         let count = starts.len();
         let frame = &mut self.frame[..count];
         let first = &mut self.first[..count];
+        let on_frame = &mut self.on_frame[..count];
         for j in 0..count {
             let boundary = clock.boundary(starts[j]);
             frame[j] = boundary.frame;
-            first[j] = boundary.first;
+            first[j] = frame_number(boundary.first);
+            on_frame[j] = i64::from(boundary.first == boundary.frame);
         }
         let end = clock.boundary(next);
-        (self.frame[count], self.first[count]) = (end.frame, end.first);
+        (self.frame[count], self.first[count]) = (end.frame, frame_number(end.first));
         let from = &self.frame[..count];
         let to = &self.frame[1..=count];
         let whole = &mut self.whole[..count];
@@ -358,7 +362,7 @@ impl SpanBlock {
         let offsets = &mut self.offset[..count];
         for j in 0..count {
             let span = in_frames(from[j], to[j], 1.0);
-            whole[j] = span.whole;
+            whole[j] = frame_number(span.whole);
             scales[j] = span.scale;
             offsets[j] = span.offset;
         }

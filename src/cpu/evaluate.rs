@@ -1,5 +1,7 @@
 //! Twin of `shaders/kernel.wgsl`: the samples of one run, in vector lanes.
 
+use glam::Vec4;
+
 use super::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
@@ -26,6 +28,13 @@ pub(crate) trait Evaluate {
 
 /// See [`Evaluate::is_canonical`].
 pub(super) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
+
+/// Whether no component of a segment's middle is smaller than [`COARSE`].
+#[inline(always)]
+pub(super) fn is_coarse(middle: [f32; 4]) -> bool {
+    let magnitudes = Vec4::from_array(middle).abs();
+    magnitudes.cmpge(Vec4::splat(COARSE)).all()
+}
 
 /// How a run's parameter follows from the distance to the segment's middle.
 #[derive(Debug, Clone, Copy)]

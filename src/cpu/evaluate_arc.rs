@@ -1,6 +1,6 @@
 //! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
 
-use super::evaluate::{COARSE, Evaluate};
+use super::evaluate::{COARSE, Evaluate, is_coarse};
 use super::lanes::Number;
 use super::sine_cosine::short_sine_and_fall;
 use crate::segment::ArcSegment;
@@ -23,12 +23,16 @@ impl Evaluate for ArcSegment {
 
     #[inline(always)]
     fn is_canonical(&self) -> bool {
-        let mut all = true;
-        for c in 0..4 {
-            let is_zero = self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
-            all &= is_zero | (self.middle[c].abs() >= COARSE);
-        }
-        all
+        is_coarse(self.middle) || self.is_coarse_or_zero()
+    }
+}
+
+impl ArcSegment {
+    /// As [`Evaluate::is_canonical`], where some middle is small.
+    #[inline(never)]
+    fn is_coarse_or_zero(&self) -> bool {
+        let is_zero = |c: usize| self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
+        (0..4).all(|c| self.middle[c].abs() >= COARSE || is_zero(c))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Twin of `shaders/evaluate_polynomial.wgsl`: the same names, the same order.
 
-use super::evaluate::{COARSE, Evaluate};
+use super::evaluate::{COARSE, Evaluate, is_coarse};
 use super::lanes::Number;
 use crate::segment::PolynomialSegment;
 
@@ -23,9 +23,7 @@ impl Evaluate for PolynomialSegment {
 
     #[inline(always)]
     fn is_canonical(&self) -> bool {
-        let [x, y, z, w] = self.coefficients[0].map(f32::abs);
-        let least = x.min(y).min(z).min(w);
-        least >= COARSE || self.is_coarse_or_zero()
+        is_coarse(self.coefficients[0]) || self.is_coarse_or_zero()
     }
 }
 
