@@ -73,6 +73,30 @@ impl Prepared {
         }
     }
 
+    /// What gives the rotation of one part at a time; nothing outside its keys.
+    #[inline(always)]
+    pub(crate) fn source_at(&self, part: &Part, time: f64) -> Option<RunSource> {
+        let starts = &self.spans.starts[part.spans.clone()];
+        let i = match starts.len() {
+            0 => return None,
+            1 => 0,
+            _ => starts
+                .partition_point(|&start| start <= time)
+                .saturating_sub(1),
+        };
+        let end = starts.get(i + 1).copied().unwrap_or(part.end);
+        if !(starts[i] <= time && time < end) {
+            return None;
+        }
+        // Written out: closures are not always inlined.
+        let span = part.spans.start + i;
+        let key = self.spans.keys[span];
+        if time == starts[i] && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(self.time_source(span, end))
+    }
+
     #[inline(always)]
     fn time_source(&self, span: usize, end: f64) -> RunSource {
         let start = self.spans.starts[span];

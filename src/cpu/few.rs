@@ -5,9 +5,9 @@ use super::dispatch::InLanes;
 use super::evaluate::{Affine, one};
 use super::evaluate_arc::{on_arc, square};
 use super::lanes::{Lanes, canonical};
-use crate::frame_clock::finite_scale;
 use crate::numeric::round_f32;
-use crate::prepare::{ClipData, NONE, PartRef, Source};
+use crate::prepare::{ClipData, PartRef};
+use crate::schedule::{Distance, RunSource};
 use crate::segment::{ArcSegment, PolynomialSegment, Segments};
 use crate::window::Window;
 
@@ -112,39 +112,19 @@ impl<'a> PartRef<'a> {
     #[inline(always)]
     fn at_time(self, time: f64) -> Option<One<'a>> {
         let PartRef { prepared, part } = self;
-        let starts = &prepared.spans.starts[part.spans.clone()];
-        let i = match starts.len() {
-            0 => return None,
-            1 => 0,
-            _ => starts
-                .partition_point(|&start| start <= time)
-                .saturating_sub(1),
-        };
-        let start = starts[i];
-        let end = starts.get(i + 1).copied().unwrap_or(part.end);
-        let span = part.spans.start + i;
-        if !(start <= time && time < end) {
-            return None;
-        }
-        // Written out: closures are not always inlined.
-        let key = prepared.spans.keys[span];
-        if time == start && key != NONE {
-            return Some(One::Constant(prepared.constants[key as usize]));
-        }
-        let index = match prepared.spans.sources[span] {
-            Source::Constant(index) => {
+        let (index, middle, affine) = match prepared.source_at(part, time)? {
+            RunSource::Constant(index) => {
                 return Some(One::Constant(prepared.constants[index as usize]));
             }
-            Source::Exact(_) => return None,
-            Source::Segment(index) => index as usize,
+            RunSource::Segment {
+                index,
+                distance: Distance::Seconds { middle },
+                scale,
+                offset,
+            } => (index as usize, middle, Affine { scale, offset }),
+            _ => return None,
         };
-        // As by a run.
-        let seconds = end - start;
-        let distance = round_f32(time - (start + seconds * 0.5));
-        let affine = Affine {
-            scale: finite_scale(1.0 / seconds),
-            offset: 0.0,
-        };
+        let distance = round_f32(time - middle);
         match &prepared.segments {
             Segments::Arc(arcs) => {
                 let parameter = distance * affine.scale + affine.offset;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::clock::{FramesError, Timeline};
+use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, Part, Prepared};
@@ -47,8 +47,13 @@ impl GroupWork {
     }
 }
 
-/// Parts of a group that one thread turns into items.
+/// Parts of a group that one thread turns into items: so many, and more where there are
+/// fewer samples.
 const PARTS_PER_CHUNK: usize = 64;
+const SAMPLES_PER_CHUNK: usize = 4096;
+
+/// So few explicit times of a track are looked up one by one.
+const FEW: usize = 3;
 
 /// The work lists of a window: one for each group that has any of its tracks. `shift` is
 /// added to every place in the output; `spare` are chunks to use again, whose memory would
@@ -68,7 +73,8 @@ pub(super) fn work(
         let last = prepared
             .parts
             .partition_point(|part| (part.track as usize) < window.tracks.end);
-        let pieces = prepared.parts[first..last].chunks(PARTS_PER_CHUNK);
+        let parts = (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK);
+        let pieces = prepared.parts[first..last].chunks(parts);
         let listings: Vec<_> = pieces
             .map(|parts| Listing {
                 prepared,
@@ -118,6 +124,25 @@ impl InLanes for Listing<'_> {
                 chunk: &mut self.chunk,
             };
             let samples = self.window.samples.clone();
+            if let Ticks::Times { times, stride } = &self.timeline.ticks
+                && samples.len() <= FEW
+            {
+                let own = &times[part.track as usize * stride..];
+                for sample in samples {
+                    match self.prepared.source_at(part, own[sample]) {
+                        Some(source) => list.run(Run {
+                            sample,
+                            count: 1,
+                            source,
+                        }),
+                        None => {
+                            let one = sample..sample + 1;
+                            self.prepared.time_runs(part, own, one, &mut list);
+                        }
+                    }
+                }
+                continue;
+            }
             for cycle in self.prepared.cycles(part, self.timeline, samples) {
                 let listed = self.prepared.runs(part, self.timeline, &cycle, &mut list);
                 if listed.is_err() {
