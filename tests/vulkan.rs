@@ -223,8 +223,19 @@ fn the_callers_keys_are_read_where_they_are() {
         let times: Vec<f64> = (0..70_000).map(|t| f64::from(t % 1000) * 0.00101).collect();
         (set, Frames::at_each(times))
     };
+    let apart = || {
+        let (together, frames) = dense_set(70, 1100, 0.0);
+        let mut set = TrackSet::new();
+        for (index, track) in together.tracks().enumerate() {
+            let slower = |time: &f64| time * (1.0 + index as f64 * 1e-4);
+            let times: Vec<f64> = track.times.iter().map(slower).collect();
+            set.push("", &times, track.keys).unwrap();
+        }
+        (set, frames)
+    };
     let cases = [
         ("many", dense_set(70, 1100, 0.0)),
+        ("many, at times of their own", apart()),
         ("many, some turned", dense_set(70, 1100, 1e-4)),
         ("long", dense_set(1, 90_000, 0.0)),
         ("long, some turned", dense_set(1, 90_000, 1e-4)),
