@@ -243,6 +243,9 @@ fn the_callers_keys_are_read_where_they_are() {
         ("pairs, some turned", of_two(0.01)),
     ];
     for engine in vulkan_engines(|_| {}) {
+        let (set, nothing) = (&cases[0].1.0, Frames::at(Vec::new()));
+        let found = engine.evaluate(set, method::SLERP, &nothing).unwrap();
+        assert!(found.as_quats().is_empty());
         for (what, (set, frames)) in &cases {
             for method in [method::SLERP, method::CATMULL_ROM] {
                 let layout = Layout::TrackMajor;

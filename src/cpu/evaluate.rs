@@ -6,7 +6,7 @@ use super::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
 /// So few samples are evaluated one by one: a vector would be mostly waste.
-pub(super) const FEW: usize = 3;
+pub(crate) const FEW: usize = 3;
 
 /// One form's formula.
 pub(crate) trait Evaluate {

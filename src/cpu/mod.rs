@@ -38,6 +38,7 @@ pub(crate) use dispatch::tests::at_every_width;
 pub(crate) use dispatch::{InLanes, in_lanes};
 pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
+pub(crate) use evaluate::FEW;
 pub(crate) use gentle::{Gentle, gentle, signed};
 pub(crate) use lanes::{Lanes, Number};
 pub(crate) use long::{first_sample, is_in_stretches};

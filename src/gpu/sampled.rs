@@ -6,6 +6,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
+use glam::Quat;
+
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::engine::{SLOTS, VulkanEngine};
@@ -14,8 +16,6 @@ use super::lent::Lent;
 use super::pipeline::{Exactness, Pipeline, SampledKernel};
 use super::slot::{Slot, Stopwatch, Target, copy};
 use super::submission::{Access, Binding, Submission};
-use glam::Quat;
-
 use crate::cpu::Straight;
 use crate::engine::Error;
 use crate::key_pieces::{KeyJob, KeyPiece, Keys};
@@ -135,10 +135,10 @@ impl VulkanEngine {
             let slot = &mut slots[*next];
             slot.finish(&mut lent.target, stopwatch)?;
             let writing = Instant::now();
-            slot.output = start..start + piece.rotation_count() * size_of::<Quat>();
-            start = slot.output.end;
-            slot.start(&self.device, &pipeline, &piece, lent)?;
+            let own = start..start + piece.rotation_count() * size_of::<Quat>();
+            slot.start(&self.device, &pipeline, &piece, lent, own.clone())?;
             stopwatch.timings.work_lists += writing.elapsed();
+            start = own.end;
         }
     }
 
@@ -172,13 +172,14 @@ impl KeySlot {
         })
     }
 
-    /// Submits one piece.
+    /// Submits one piece, whose result is that stretch of all, bytes.
     fn start(
         &mut self,
         device: &Arc<LogicalDevice>,
         pipeline: &Pipeline,
         piece: &KeyPiece<'_, '_>,
         lent: &Borrowed<'_>,
+        output: Range<usize>,
     ) -> Result<(), Error> {
         let [mut key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
         let lent_keys = lent.keys.as_ref().filter(|_| !piece.turns());
@@ -186,10 +187,10 @@ impl KeySlot {
             key_bytes = 0;
         }
         let place = match &lent.target {
-            Target::Lent(memory) if !self.output.is_empty() => {
+            Target::Lent(memory) if !output.is_empty() => {
                 rotation_bytes = 0;
-                let start = memory.start() + self.output.start;
-                let size = self.output.len() as u64;
+                let start = memory.start() + output.start;
+                let size = output.len() as u64;
                 Some(Binding::stretch(memory.raw(), start as u64, size))
             }
             _ => None,
@@ -235,6 +236,7 @@ impl KeySlot {
             .dispatch(pipeline, bindings, bytemuck::bytes_of(&rows), groups)?;
         self.submission.barrier(Access::Kernel, Access::Host);
         self.submission.submit()?;
+        self.output = output;
         Ok(())
     }
 

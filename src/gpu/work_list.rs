@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cpu::{InLanes, Lanes, in_lanes};
+use crate::cpu::{FEW, InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, Part, Prepared};
 use crate::schedule::{Distance, Emit, Run, RunSource};
@@ -51,9 +51,6 @@ impl GroupWork {
 /// fewer samples.
 const PARTS_PER_CHUNK: usize = 64;
 const SAMPLES_PER_CHUNK: usize = 4096;
-
-/// So few explicit times of a track are looked up one by one.
-const FEW: usize = 3;
 
 /// The work lists of a window: one for each group that has any of its tracks. `shift` is
 /// added to every place in the output; `spare` are chunks to use again, whose memory would

@@ -191,7 +191,8 @@ impl KeyPiece<'_, '_> {
     /// Whether samples are explicit times, and all that is to be written.
     fn is_times_alone(&self, written: &Written<'_>) -> bool {
         let in_times = matches!(self.job.timeline.ticks, Ticks::Times { .. });
-        in_times && written.lent.is_some() && written.joints.is_empty()
+        let any = !written.samples.is_empty();
+        any && in_times && written.lent.is_some() && written.joints.is_empty()
     }
 
     /// The samples of whole tracks, which may be many with a sample each.
