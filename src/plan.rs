@@ -177,7 +177,7 @@ impl InLanes for Boundaries {
 }
 
 /// Where times lie among keys. What an interval makes of them is kept for the next time in
-/// one that is as long: many tracks share theirs, and a division takes longer than to look.
+/// it: many tracks share their times, and a division takes longer than to look.
 pub(crate) struct TimePlan {
     start: f64,
     end: f64,
