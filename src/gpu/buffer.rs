@@ -8,6 +8,7 @@ use ash::vk;
 
 use super::device::LogicalDevice;
 use super::error::{Named, VulkanError};
+use super::physical::PhysicalDevice;
 
 /// Where a buffer lives and who touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +32,35 @@ impl Residence {
             Self::Device => (Flags::DEVICE_LOCAL, Flags::empty()),
         }
     }
+}
+
+/// Memory that the process has already.
+const LENT: vk::ExternalMemoryHandleTypeFlags =
+    vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
+
+fn usage(is_texels: bool) -> vk::BufferUsageFlags {
+    let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+        | vk::BufferUsageFlags::TRANSFER_SRC
+        | vk::BufferUsageFlags::TRANSFER_DST;
+    match is_texels {
+        true => usage | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+        false => usage,
+    }
+}
+
+/// Whether a device takes such memory for a buffer.
+pub(super) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
+    let info = vk::PhysicalDeviceExternalBufferInfo::default()
+        .usage(usage(is_texels))
+        .handle_type(LENT);
+    let mut found = vk::ExternalBufferProperties::default();
+    let instance = &physical.instance.raw;
+    // SAFETY: Vulkan 1.1, and a device of the instance.
+    unsafe {
+        instance.get_physical_device_external_buffer_properties(physical.raw, &info, &mut found);
+    }
+    let features = found.external_memory_properties.external_memory_features;
+    features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
 }
 
 /// A storage buffer, mapped for as long as it lives where the host touches it.
@@ -96,29 +126,27 @@ impl Buffer {
         pages: NonNull<u8>,
         size: u64,
     ) -> Option<Self> {
-        const KIND: vk::ExternalMemoryHandleTypeFlags =
-            vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
         let borrows = device.borrows.as_ref()?;
         let pages = pages.as_ptr().cast();
         let mut properties = vk::MemoryHostPointerPropertiesEXT::default();
         // SAFETY: the extension is enabled, and the pages are there.
         let known = unsafe {
             let call = borrows.fp().get_memory_host_pointer_properties_ext;
-            call(borrows.device(), KIND, pages, &raw mut properties)
+            call(borrows.device(), LENT, pages, &raw mut properties)
         };
         known
             .result()
             .named("vkGetMemoryHostPointerPropertiesEXT")
             .ok()?;
         let is_texels = device.reads_texels;
-        let mut buffer = Self::without_memory(device, size, is_texels, Some(KIND)).ok()?;
+        let mut buffer = Self::without_memory(device, size, is_texels, Some(LENT)).ok()?;
         // SAFETY: the buffer was just created.
         let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
         let (required, preferred) = Residence::Readback.properties();
         let allowed = needs.memory_type_bits & properties.memory_type_bits;
         let memory_type = device.physical.memory_type(allowed, required, preferred)?;
         let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
-            .handle_type(KIND)
+            .handle_type(LENT)
             .host_pointer(pages);
         let allocate = vk::MemoryAllocateInfo::default()
             .allocation_size(size)
@@ -134,15 +162,11 @@ impl Buffer {
         is_texels: bool,
         external: Option<vk::ExternalMemoryHandleTypeFlags>,
     ) -> Result<Self, VulkanError> {
-        let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
-            | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
-        if is_texels {
-            usage |= vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
-        }
         let mut kinds = vk::ExternalMemoryBufferCreateInfo::default()
             .handle_types(external.unwrap_or_default());
-        let mut info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        let mut info = vk::BufferCreateInfo::default()
+            .size(size)
+            .usage(usage(is_texels));
         if external.is_some() {
             info = info.push_next(&mut kinds);
         }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
+use super::buffer::may_be_lent;
 use super::error::{Named, VulkanError};
 use super::physical::{DeviceKind, PhysicalDevice};
 use crate::device::Reads;
@@ -39,12 +40,14 @@ impl LogicalDevice {
             .collect();
         // Software devices work in threads of this process: waiting for them has an end, and
         // nothing of them works on memory that was given back.
-        let borrows = physical.info.kind == DeviceKind::Cpu && physical.lent_alignment.is_some();
+        let reads_texels = physical.reads_texels(reads);
+        let borrows = physical.info.kind == DeviceKind::Cpu
+            && physical.lent_alignment.is_some()
+            && may_be_lent(&physical, reads_texels);
         if borrows {
             extensions.push(ext::external_memory_host::NAME.as_ptr());
         }
-        let features =
-            vk::PhysicalDeviceFeatures::default().shader_int64(physical.reads_texels(reads));
+        let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads_texels);
         let info = vk::DeviceCreateInfo::default()
             .enabled_features(&features)
             .queue_create_infos(&queues)
