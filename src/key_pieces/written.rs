@@ -95,21 +95,22 @@ impl KeyPiece<'_, '_> {
             times: TimePlan::new(),
             joints: rule.map(|rule| TrackJoints::new(rule, ends)),
         };
+        let ticks = &self.job.timeline.ticks;
         places
             .into_par_iter()
             .try_for_each_init(new, |known, (task, mut written)| {
-                match &task.what {
-                    What::Part(part) => self.write_part(part, known, &mut written)?,
-                    What::Tracks(tracks) if self.is_times_alone(&written) => {
-                        self.write_times(tracks.clone(), known, &mut written);
-                    }
-                    What::Tracks(tracks) => {
-                        for index in tracks.clone() {
-                            self.write_part(&self.job.track(index), known, &mut written)?;
-                        }
-                    }
+                let tracks = match &task.what {
+                    What::Part(part) => return self.write_part(part, known, &mut written),
+                    What::Tracks(tracks) => tracks.clone(),
+                };
+                if let (Ticks::Times { times, stride }, Some(first)) = (ticks, written.lent) {
+                    let samples = written.samples;
+                    self.write_times(tracks, (times, *stride), first, known, samples);
+                    return Ok(());
                 }
-                Ok(())
+                tracks.into_iter().try_for_each(|index| {
+                    self.write_part(&self.job.track(index), known, &mut written)
+                })
             })
     }
 
@@ -188,21 +189,19 @@ impl KeyPiece<'_, '_> {
         Ok(())
     }
 
-    /// Whether samples are explicit times, and all that is to be written.
-    fn is_times_alone(&self, written: &Written<'_>) -> bool {
-        let in_times = matches!(self.job.timeline.ticks, Ticks::Times { .. });
-        let any = !written.samples.is_empty();
-        any && in_times && written.lent.is_some() && written.joints.is_empty()
-    }
-
-    /// The samples of whole tracks, which may be many with a sample each.
-    fn write_times(&self, tracks: Range<usize>, known: &mut Known<'_>, written: &mut Written<'_>) {
+    /// The samples of whole tracks, which may be many with a sample each, where keys are
+    /// read as they are stored; `first` is the place of the set's first one.
+    fn write_times(
+        &self,
+        tracks: Range<usize>,
+        (times, stride): (&[f64], usize),
+        first: usize,
+        known: &mut Known<'_>,
+        samples: &mut [Sample],
+    ) {
         let KeyJob { set, timeline, .. } = self.job;
-        let (Ticks::Times { times, stride }, Some(first)) = (&timeline.ticks, written.lent) else {
-            return;
-        };
         let mut first_key = (first + set.keys_of(0..tracks.start)) as u32;
-        for (index, samples) in tracks.zip(written.samples.chunks_mut(timeline.len())) {
+        for (index, samples) in tracks.zip(samples.chunks_mut(timeline.len().max(1))) {
             let (starts, keys) = set.times_and_keys(index);
             let times = &times[index * stride..][..samples.len()];
             known.times.write(starts, times, first_key, samples);
