@@ -782,10 +782,13 @@ fn few_times_of_each_track_have_the_bits_of_many() {
         set.push("", &times, &keys).unwrap();
     }
     give_key_data(&mut set, 84);
-    let engines = vulkan_engines(|_| {})
-        .into_iter()
-        .chain([cpu()])
-        .collect::<Vec<_>>();
+    // In one window and group, and in many: of these some hold all of each of their tracks.
+    let small = |options: &mut EngineOptions| options.memory = Some(300_000);
+    let staged = |options: &mut EngineOptions| options.transfer = Transfer::Staged;
+    let mut engines = vulkan_engines(|_| {});
+    engines.push(cpu());
+    let mut others = vulkan_engines(small);
+    others.extend(vulkan_engines(staged));
     for method in METHODS {
         for count in 1..=3 {
             let some = |copies: usize| -> Vec<f64> {
@@ -797,10 +800,19 @@ fn few_times_of_each_track_have_the_bits_of_many() {
             let of_track = |row: &[Quat]| row[..count].to_vec();
             let rows = many.as_quats().chunks(4 * count);
             let expected: Vec<Quat> = rows.flat_map(of_track).collect();
-            for engine in &engines {
+            let others = others.iter().filter(|_| count == 2);
+            for engine in engines.iter().chain(others) {
                 let clip = engine.upload(&set, method).unwrap();
-                let found = clip.evaluate(&Frames::at_each(some(1))).unwrap();
+                let frames = Frames::at_each(some(1));
+                let found = clip.evaluate(&frames).unwrap();
                 assert_same_bits(&expected, found.as_quats(), method.name);
+                let found = clip.evaluate_as(&frames, Layout::FrameMajor).unwrap();
+                for (row, track) in expected.chunks(count).zip(0..) {
+                    for (sample, &rotation) in row.iter().enumerate() {
+                        let found = found.get(track, sample).unwrap();
+                        assert_same_bits(&[rotation], &[found], method.name);
+                    }
+                }
             }
         }
     }

@@ -125,11 +125,15 @@ fn results_stay_in_an_applications_own_buffer() {
     set.push("wild", &[0.0, 0.001, 2.0, 2.001, 5.0], &keys)
         .unwrap();
     let frames = Frames::fps(30).between(0.0, 20.0);
+    let few = Frames::at(vec![0.3, 7.0]);
     for method in METHODS {
         let clip = engine.upload(&set, method).unwrap();
-        for encoding in Encoding::KINDS {
+        let requests = [&frames, &few].into_iter();
+        let requests =
+            requests.flat_map(|frames| Encoding::KINDS.map(|encoding| (frames, encoding)));
+        for (frames, encoding) in requests {
             let expected = clip
-                .evaluate_encoded(&frames, Layout::FrameMajor, encoding)
+                .evaluate_encoded(frames, Layout::FrameMajor, encoding)
                 .unwrap();
             // Not at the start, and not aligned to what devices like.
             let offset = 5 * encoding.bytes() as u64;
@@ -142,7 +146,7 @@ fn results_stay_in_an_applications_own_buffer() {
             };
             let write = |stretch| {
                 // SAFETY: the buffer is as it must be, and nobody else uses it.
-                unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, encoding, stretch) }
+                unsafe { clip.evaluate_to_buffer(frames, Layout::FrameMajor, encoding, stretch) }
             };
             write(stretch(offset, size)).unwrap();
             let found = application.bytes(memory, offset + size);

@@ -7,6 +7,7 @@ mod canary;
 mod device;
 mod engine;
 mod error;
+mod few_items;
 mod handles;
 mod instance;
 mod lent;

@@ -12,7 +12,6 @@ use super::error::VulkanError;
 use super::pipeline::{Clock, Exactness, Pipeline, kernel, kernel_bindings};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding};
-use super::work_list::{WorkChunk, work};
 use crate::clock::{Ticks, Timeline};
 use crate::encoding::Encoding;
 use crate::method::Form;
@@ -114,8 +113,7 @@ impl VulkanEngine {
         }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let mut lists = work(clip, timeline, &window, shift as u32, &mut slot.spare)?;
-        slot.write(&self.device, &lists)?;
+        let work = slot.list(&self.device, clip, timeline, &window, shift as u32)?;
 
         let staged_items = !self.in_place;
         if staged_items {
@@ -144,7 +142,7 @@ impl VulkanEngine {
                 Slot::grow(&self.device, &mut slot.readback, size, Residence::Readback)?;
             }
         }
-        slot.submission.begin(lists.len() as u32)?;
+        slot.submission.begin(work.groups.len() as u32)?;
         let (mut items, mut distances) = (&slot.items, &slot.distances);
         if let (Some(own_items), Some(own_distances)) = (&slot.device_items, &slot.device_distances)
         {
@@ -164,12 +162,11 @@ impl VulkanEngine {
         let pipeline = self.pipeline(clip.interpolation.form(), timeline, encoding)?;
         slot.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
-        for list in &lists {
-            let item_count = list.item_count() as u32;
+        for (group, item_count) in work.groups {
             if item_count == 0 {
                 continue;
             }
-            let group = &buffers.groups[list.group];
+            let group = &buffers.groups[group];
             let bindings = [
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
@@ -188,12 +185,7 @@ impl VulkanEngine {
                 .dispatch(&pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
             first_item += item_count;
         }
-        let chunks = lists.iter_mut().flat_map(|list| &mut list.chunks);
-        let mut patches: Vec<(usize, [f32; 4])> = chunks
-            .flat_map(|chunk| std::mem::take(&mut chunk.patches))
-            .collect();
-        let used = lists.into_iter().flat_map(|list| list.chunks);
-        slot.spare.extend(used.map(WorkChunk::cleared));
+        let mut patches = work.patches;
         match (target, &slot.rotations, &slot.readback) {
             (Target::Slice(_), Some(rotations), Some(readback)) => {
                 slot.submission.barrier(Access::Kernel, Access::Copy);

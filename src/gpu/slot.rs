@@ -8,12 +8,16 @@ use rayon::prelude::*;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
+use super::engine::EvaluateError;
 use super::error::VulkanError;
+use super::few_items::FewItems;
 use super::lent::Lent;
 use super::submission::{Spent, Submission};
-use super::work_list::{GroupWork, WorkChunk};
+use super::work_list::{GroupWork, Patch, Work, WorkChunk, work};
+use crate::clock::Timeline;
 use crate::device::Timings;
 use crate::encoding::Encoding;
+use crate::prepare::ClipData;
 use crate::segment::Item;
 use crate::window::Window;
 
@@ -40,7 +44,7 @@ pub(super) struct Slot {
 /// What is left to do when a window has been computed.
 pub(super) struct Finish {
     pub(super) window: Window,
-    pub(super) patches: Vec<(usize, [f32; 4])>,
+    pub(super) patches: Vec<Patch>,
 }
 
 /// Adds up where the time of an evaluation goes.
@@ -131,50 +135,57 @@ impl Slot {
         Ok(())
     }
 
-    /// Writes the work lists of all groups, one behind the other.
-    pub(super) fn write(
+    /// Lists the work of a window where the device reads it, that of all groups one behind
+    /// the other; `shift` is added to every place in the output.
+    pub(super) fn list(
         &mut self,
         device: &Arc<LogicalDevice>,
-        lists: &[GroupWork],
-    ) -> Result<(), VulkanError> {
-        let item_bytes = lists.iter().map(GroupWork::item_count).sum::<usize>() * size_of::<Item>();
-        let distance_count = lists.iter().map(GroupWork::distance_count).sum::<usize>();
-        if self.items.size() < item_bytes as u64 {
-            self.items = Buffer::new(device, "tumble items", item_bytes as u64, Residence::Upload)?;
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        shift: u32,
+    ) -> Result<Work, EvaluateError> {
+        if let Some(few) = FewItems::new(clip, timeline, window, shift) {
+            let (items, distances) = self.room(device, few.count(), few.count())?;
+            return Ok(few.write(items, distances));
         }
-        let distance_bytes = (distance_count * size_of::<f32>()) as u64;
-        if self.distances.size() < distance_bytes {
-            self.distances = Buffer::new(
-                device,
-                "tumble distances",
-                distance_bytes,
-                Residence::Upload,
-            )?;
+        let lists = work(clip, timeline, window, shift, &mut self.spare)?;
+        let item_count = lists.iter().map(GroupWork::item_count).sum();
+        let distance_count = lists.iter().map(GroupWork::distance_count).sum();
+        let (items, distances) = self.room(device, item_count, distance_count)?;
+        write(&lists, items, distances);
+        let mut work = Work::default();
+        for list in lists {
+            work.groups.push((list.group, list.item_count() as u32));
+            for mut chunk in list.chunks {
+                work.patches.append(&mut chunk.patches);
+                self.spare.push(chunk.cleared());
+            }
         }
-        let mut items: &mut [Item] = bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes));
-        let mut distances: &mut [f32] =
-            bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes as usize));
-        let mut next_distance = 0;
-        let mut places = Vec::new();
-        for chunk in lists.iter().flat_map(|list| &list.chunks) {
-            let (own_items, other_items) = items.split_at_mut(chunk.items.len());
-            let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
-            (items, distances) = (other_items, others);
-            places.push((chunk, own_items, own_distances, next_distance));
-            next_distance += chunk.distances.len() as i32;
-        }
-        places
-            .into_par_iter()
-            .for_each(|(chunk, items, distances, first)| {
-                items.copy_from_slice(&chunk.items);
-                distances.copy_from_slice(&chunk.distances);
-                if !distances.is_empty() {
-                    for item in items {
-                        item.first += first;
-                    }
-                }
-            });
-        Ok(())
+        Ok(work)
+    }
+
+    /// Room for so many items and distances, where the host writes them.
+    fn room(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        items: usize,
+        distances: usize,
+    ) -> Result<(&mut [Item], &mut [f32]), VulkanError> {
+        let room = |buffer: &mut Buffer, name, bytes: usize| {
+            if buffer.size() < bytes as u64 {
+                *buffer = Buffer::new(device, name, bytes as u64, Residence::Upload)?;
+            }
+            Ok::<_, VulkanError>(())
+        };
+        let (item_bytes, distance_bytes) =
+            (items * size_of::<Item>(), distances * size_of::<f32>());
+        room(&mut self.items, "tumble items", item_bytes)?;
+        room(&mut self.distances, "tumble distances", distance_bytes)?;
+        Ok((
+            bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes)),
+            bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes)),
+        ))
     }
 
     /// Waits for the window in flight, if any, and brings its results home.
@@ -215,6 +226,30 @@ impl Slot {
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
     }
+}
+
+/// Writes the work lists of all groups, one behind the other.
+fn write(lists: &[GroupWork], mut items: &mut [Item], mut distances: &mut [f32]) {
+    let mut next_distance = 0;
+    let mut places = Vec::new();
+    for chunk in lists.iter().flat_map(|list| &list.chunks) {
+        let (own_items, other_items) = items.split_at_mut(chunk.items.len());
+        let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
+        (items, distances) = (other_items, others);
+        places.push((chunk, own_items, own_distances, next_distance));
+        next_distance += chunk.distances.len() as i32;
+    }
+    places
+        .into_par_iter()
+        .for_each(|(chunk, items, distances, first)| {
+            items.copy_from_slice(&chunk.items);
+            distances.copy_from_slice(&chunk.distances);
+            if !distances.is_empty() {
+                for item in items {
+                    item.first += first;
+                }
+            }
+        });
 }
 
 /// Bytes of a result that one thread copies at once.

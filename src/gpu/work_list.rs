@@ -2,14 +2,26 @@
 
 use rayon::prelude::*;
 
-use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cpu::{FEW, InLanes, Lanes, in_lanes};
+use crate::clock::{FramesError, Timeline};
+use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, Part, Prepared};
 use crate::schedule::{Distance, Emit, Run, RunSource};
 use crate::segment::Item;
 use crate::segment::shader::{HOLD, ITEM_SAMPLES};
 use crate::window::Window;
+
+/// What the device and the host have to do in a window.
+#[derive(Default)]
+pub(super) struct Work {
+    /// Groups of the clip and how many items each has, which lie one behind the other.
+    pub(super) groups: Vec<(usize, u32)>,
+    /// Rotations that the host computed.
+    pub(super) patches: Vec<Patch>,
+}
+
+/// A place in the window, and the rotation there.
+pub(super) type Patch = (usize, [f32; 4]);
 
 /// What one group of a clip has to do in a window.
 pub(super) struct GroupWork {
@@ -23,8 +35,7 @@ pub(super) struct GroupWork {
 pub(super) struct WorkChunk {
     pub(super) items: Vec<Item>,
     pub(super) distances: Vec<f32>,
-    /// Rotations that the host computed: (place in the window, value).
-    pub(super) patches: Vec<(usize, [f32; 4])>,
+    pub(super) patches: Vec<Patch>,
 }
 
 impl WorkChunk {
@@ -52,6 +63,19 @@ impl GroupWork {
 const PARTS_PER_CHUNK: usize = 64;
 const SAMPLES_PER_CHUNK: usize = 4096;
 
+pub(super) fn parts_per_chunk(window: &Window) -> usize {
+    (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK)
+}
+
+/// The parts of a group that a window's tracks have.
+pub(super) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part] {
+    let from = |track: usize| {
+        let is_before = |part: &Part| (part.track as usize) < track;
+        prepared.parts.partition_point(is_before)
+    };
+    &prepared.parts[from(window.tracks.start)..from(window.tracks.end)]
+}
+
 /// The work lists of a window: one for each group that has any of its tracks. `shift` is
 /// added to every place in the output; `spare` are chunks to use again, whose memory would
 /// cost more than their work.
@@ -64,15 +88,9 @@ pub(super) fn work(
 ) -> Result<Vec<GroupWork>, FramesError> {
     let mut all = Vec::new();
     for (group, prepared) in clip.groups.iter().enumerate() {
-        let first = prepared
-            .parts
-            .partition_point(|part| (part.track as usize) < window.tracks.start);
-        let last = prepared
-            .parts
-            .partition_point(|part| (part.track as usize) < window.tracks.end);
-        let parts = (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK);
-        let pieces = prepared.parts[first..last].chunks(parts);
-        let listings: Vec<_> = pieces
+        let parts = parts_in(prepared, window);
+        let listings: Vec<_> = parts
+            .chunks(parts_per_chunk(window))
             .map(|parts| Listing {
                 prepared,
                 parts,
@@ -90,7 +108,7 @@ pub(super) fn work(
                 listing.listed.map(|()| listing.chunk)
             })
             .collect::<Result<_, FramesError>>()?;
-        if first < last {
+        if !parts.is_empty() {
             all.push(GroupWork { group, chunks });
         }
     }
@@ -121,25 +139,6 @@ impl InLanes for Listing<'_> {
                 chunk: &mut self.chunk,
             };
             let samples = self.window.samples.clone();
-            if let Ticks::Times { times, stride } = &self.timeline.ticks
-                && samples.len() <= FEW
-            {
-                let own = &times[part.track as usize * stride..];
-                for sample in samples {
-                    match self.prepared.source_at(part, own[sample]) {
-                        Some(source) => list.run(Run {
-                            sample,
-                            count: 1,
-                            source,
-                        }),
-                        None => {
-                            let one = sample..sample + 1;
-                            self.prepared.time_runs(part, own, one, &mut list);
-                        }
-                    }
-                }
-                continue;
-            }
             for cycle in self.prepared.cycles(part, self.timeline, samples) {
                 let listed = self.prepared.runs(part, self.timeline, &cycle, &mut list);
                 if listed.is_err() {
