@@ -40,7 +40,7 @@ pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
 pub(crate) use evaluate::FEW;
 pub(crate) use gentle::{Gentle, gentle, signed};
-pub(crate) use lanes::{Lanes, Number};
+pub(crate) use lanes::{Lanes, Number, canonical};
 pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
 pub(crate) use mend::{LEFT_OUT, Row};

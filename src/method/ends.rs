@@ -4,7 +4,7 @@
 use std::marker::PhantomData;
 
 use super::Ends;
-use crate::branchless::{Vector, exp, log, product, scaled};
+use crate::branchless::{Quaternion, Vector, exp, log, product, scaled};
 use crate::cpu::in_lanes;
 use crate::prepare::{
     BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, Intervals, KeyHandles,
@@ -44,7 +44,6 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
             let alone = EndInterval {
                 log,
                 other: [0.0; 3],
-                rest: [0.0; 3],
             };
             let handle = R::end(alone, EndHandle::Turn(log));
             intervals.set_outgoing(lane, handle);
@@ -56,14 +55,14 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
         }
         if let Some(lane) = first {
             let other = intervals.incoming(lane + 1);
-            let rest = product(intervals.step(lane), exp(scaled(other, -1.0)));
-            let handle = end_handle::<R>(intervals, lane, other, log(rest), ends.start());
+            let without = |back| product(intervals.step(lane), back);
+            let handle = end_handle::<R>(intervals, lane, other, without, ends.start());
             intervals.set_outgoing(lane, handle);
         }
         if let Some(lane) = last {
             let other = intervals.outgoing(lane);
-            let rest = product(exp(scaled(other, -1.0)), intervals.step(lane));
-            let handle = end_handle::<R>(intervals, lane, other, log(rest), ends.end());
+            let without = |back| product(back, intervals.step(lane));
+            let handle = end_handle::<R>(intervals, lane, other, without, ends.end());
             intervals.set_incoming(lane + 1, handle);
         }
     }
@@ -106,20 +105,23 @@ impl Ends {
 }
 
 /// The handle of an end's key towards the interval in `lane`, whose other handle is
-/// given, and what it leaves of the interval.
+/// given, and what the step is without the rotation back by that.
 fn end_handle<R: HandleRule>(
     intervals: &Intervals,
     lane: usize,
     other: Vector,
-    rest: Vector,
+    without: impl Fn(Quaternion) -> Quaternion,
     end: End,
 ) -> Vector {
-    let log = intervals.log(lane);
-    let interval = EndInterval { log, other, rest };
+    let step_log = intervals.log(lane);
+    let interval = EndInterval {
+        log: step_log,
+        other,
+    };
     let handle = match end {
         End::Parabolic => EndHandle::Parabolic,
-        End::Natural => EndHandle::Natural,
-        End::Secant => EndHandle::Turn(log),
+        End::Natural => EndHandle::Natural(log(without(exp(scaled(other, -1.0))))),
+        End::Secant => EndHandle::Turn(step_log),
         End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.duration(lane))),
     };
     R::end(interval, handle)

@@ -58,7 +58,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
         }
     }
 
-    fn end(EndInterval { log, other, rest }: EndInterval, handle: EndHandle) -> Vector {
+    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
             // Such handles are too long by 3/PART, everywhere alike.
@@ -66,7 +66,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
                 let whole = scaled(log, 2.0 / f64::from(PART));
                 sum(whole, scaled(other, -1.0))
             }
-            EndHandle::Natural => scaled(rest, 0.5),
+            EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
 }

@@ -42,11 +42,11 @@ impl HandleRule for Rule {
     }
 
     /// At its ends a squad turns by `log + 2 outgoing` and by `log + 2 incoming`.
-    fn end(EndInterval { log, other, .. }: EndInterval, handle: EndHandle) -> Vector {
+    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),
             EndHandle::Parabolic => scaled(other, -1.0),
-            EndHandle::Natural => scaled(other, -0.5),
+            EndHandle::Natural(_) => scaled(other, -0.5),
         }
     }
 }

@@ -26,8 +26,8 @@ pub(super) struct Cutter {
 /// A part of a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    /// The interval that the curve is of.
-    pub(super) interval: usize,
+    /// The span that the curve is of.
+    pub(super) span: usize,
     /// Its place among the curves given.
     curve: usize,
     pub(super) piece: Piece,
@@ -48,22 +48,22 @@ impl Cutter {
         }
     }
 
-    /// Adds the curve of an interval: at least two parts will come of it.
-    pub(super) fn push(&mut self, interval: usize, curve: Curve) {
-        self.push_pieces(interval, &curve.piece.halves());
+    /// Adds the curve of a span: at least two parts will come of it.
+    pub(super) fn push(&mut self, span: usize, curve: Curve) {
+        self.push_pieces(span, &curve.piece.halves());
         self.curves.push(curve);
     }
 
-    /// Adds the curve of an interval, to be cut where it does not fit whole.
-    pub(super) fn push_whole(&mut self, interval: usize, curve: Curve) {
-        self.push_pieces(interval, &[curve.piece]);
+    /// Adds the curve of a span, to be cut where it does not fit whole.
+    pub(super) fn push_whole(&mut self, span: usize, curve: Curve) {
+        self.push_pieces(span, &[curve.piece]);
         self.curves.push(curve);
     }
 
     /// Of the curve that is given next.
-    fn push_pieces(&mut self, interval: usize, pieces: &[Piece]) {
+    fn push_pieces(&mut self, span: usize, pieces: &[Piece]) {
         self.waiting.extend(pieces.iter().map(|&piece| Part {
-            interval,
+            span,
             curve: self.curves.len(),
             piece,
             segment: None,
@@ -102,10 +102,10 @@ impl Cutter {
             self.waiting.append(&mut halves);
         }
         self.parts
-            .sort_unstable_by_key(|part| (part.interval, part.piece.from));
+            .sort_unstable_by_key(|part| (part.span, part.piece.from));
     }
 
-    /// The parts of every curve given, in order of intervals and time.
+    /// The parts of every curve given, in order of spans and time.
     pub(super) fn parts(&self) -> &[Part] {
         &self.parts
     }

@@ -6,18 +6,18 @@
 //! them. Powers come last: a Chebyshev coefficient's rounding error stays small in
 //! their sum, that of a power found directly would not.
 
-use super::curve::{Curve, Piece};
+use std::array;
 use std::sync::Arc;
 
-use super::intervals::{Intervals, LANES};
+use super::curve::{Curve, Piece};
+use super::intervals::{Intervals, LANES, Lane};
 use super::motion;
 use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
 use super::pace::Pace;
 use super::shape::Shape;
-use crate::cpu::Lanes;
-use crate::formula::Numbers;
+use crate::cpu::{Lanes, canonical};
+use crate::formula::{Numbers, Product};
 use crate::method::Quantity;
-use crate::numeric::canonical;
 use crate::segment::PolynomialSegment;
 
 /// Powers of the parameter in a segment.
@@ -85,23 +85,39 @@ pub(super) struct FitBlock {
     pub(super) reaches: Lane64,
 }
 
-/// The rotations at a block's nodes: that of the middle, and differences from it at each
-/// pair of nodes, their mean and half of what they differ by.
-pub(super) struct Samples<const PAIRS: usize> {
-    pub(super) middle: [Lane32; 4],
-    pub(super) even: [[Lane32; 4]; PAIRS],
-    pub(super) odd: [[Lane32; 4]; PAIRS],
+/// The rotations at the nodes of curves: those of the middle, and differences from it at
+/// each pair of nodes, their mean and half of what they differ by.
+pub(super) struct Samples<N, const PAIRS: usize> {
+    pub(super) middle: [N; 4],
+    pub(super) even: [[N; 4]; PAIRS],
+    pub(super) odd: [[N; 4]; PAIRS],
 }
 
-impl<const PAIRS: usize> Samples<PAIRS> {
+impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
+    /// All the same.
     #[inline(always)]
-    pub(super) fn new() -> Self {
-        let lane = [0.0; LANES];
+    pub(super) fn all(number: N) -> Self {
         Self {
-            middle: [lane; 4],
-            even: [[lane; 4]; PAIRS],
-            odd: [[lane; 4]; PAIRS],
+            middle: [number; 4],
+            even: [[number; 4]; PAIRS],
+            odd: [[number; 4]; PAIRS],
         }
+    }
+}
+
+impl<const PAIRS: usize> Samples<Lane32, PAIRS> {
+    /// Those of the lanes from `lane` on.
+    #[inline(always)]
+    fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
+        let mut own = Samples::all(L::all(0.0));
+        for c in 0..4 {
+            own.middle[c] = L::load(&self.middle[c][lane..]);
+            for k in 0..PAIRS {
+                own.even[k][c] = L::load(&self.even[k][c][lane..]);
+                own.odd[k][c] = L::load(&self.odd[k][c][lane..]);
+            }
+        }
+        own
     }
 }
 
@@ -128,8 +144,14 @@ impl FitBlock {
         self.tier
     }
 
-    pub(super) fn is_full(&self) -> bool {
-        self.count == LANES
+    /// How many curves it has.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// How many more it takes.
+    pub(super) fn room(&self) -> usize {
+        LANES - self.count
     }
 
     pub(super) fn clear(&mut self) {
@@ -153,31 +175,42 @@ impl FitBlock {
         if curve.pace.is_some() {
             self.paces.push(curve.pace.clone());
         }
-        self.push_piece(piece);
-    }
-
-    /// Adds the curve in a lane of `intervals`; the block is not full.
-    pub(super) fn push_from(&mut self, intervals: &Intervals, from: usize) {
-        let lane = self.count;
-        for (lanes, curves) in self.numbers.iter_mut().zip(&intervals.numbers) {
-            lanes[lane] = curves[from];
-        }
-        self.rates[lane] = intervals.rate(from);
-        self.push_piece(Piece::WHOLE);
-    }
-
-    fn push_piece(&mut self, piece: Piece) {
         let (start, width) = piece.extent();
-        self.widths[self.count] = width;
-        self.middles[self.count] = start + 0.5 * width;
+        self.widths[lane] = width;
+        self.middles[lane] = start + 0.5 * width;
         self.count += 1;
+    }
+
+    /// Adds the curves in some lanes of `intervals`; the block has room for them.
+    pub(super) fn push_from(&mut self, intervals: &Intervals, lanes: &[u8]) {
+        let own = self.count..self.count + lanes.len();
+        let (to, from) = (&mut self.numbers[..], &intervals.numbers[..]);
+        if let (Ok(to), Ok(from)) = (to.try_into(), from.try_into()) {
+            copy::<{ Product::BASIS }>(to, own.start, from, lanes);
+        } else {
+            for (numbers, all) in self.numbers.iter_mut().zip(&intervals.numbers) {
+                copy(
+                    array::from_mut(numbers),
+                    own.start,
+                    array::from_ref(all),
+                    lanes,
+                );
+            }
+        }
+        for (rate, &lane) in self.rates[own.clone()].iter_mut().zip(lanes) {
+            *rate = intervals.rate(usize::from(lane) % LANES);
+        }
+        let (start, width) = Piece::WHOLE.extent();
+        self.widths[own.clone()].fill(width);
+        self.middles[own.clone()].fill(start + 0.5 * width);
+        self.count = own.end;
     }
 
     /// A curve's own numbers; 0 behind them.
     #[inline(always)]
     pub(super) fn numbers_of(&self, lane: usize) -> Numbers {
         let own = &self.numbers[..];
-        std::array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
+        array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
     }
 
     /// The whole curve in a lane.
@@ -216,7 +249,7 @@ impl FitBlock {
     pub(super) fn scale(&mut self, scales: &Lane32) {
         for power in &mut self.coefficients {
             for (coefficients, &scale) in power.iter_mut().zip(scales) {
-                *coefficients = coefficients.map(|c| canonical(c * scale));
+                *coefficients = canonical(coefficients.map(|c| c * scale));
             }
         }
     }
@@ -230,91 +263,102 @@ impl FitBlock {
     /// Writes the polynomial of a lane. Powers above the tier's stay 0.
     #[inline]
     pub(super) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
-        for (power, coefficients) in segment.coefficients.iter_mut().enumerate() {
-            *coefficients = self.coefficients[power][lane];
+        for (own, power) in segment.coefficients.iter_mut().zip(&self.coefficients) {
+            *own = power[lane % LANES];
         }
     }
 
     /// From the differences at the nodes to the coefficients.
     #[inline(always)]
-    pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
+    pub(super) fn interpolate_all<L: Lanes, const PAIRS: usize>(
         &mut self,
         count: usize,
         nodes: &Nodes<PAIRS>,
-        samples: &Samples<PAIRS>,
+        samples: &Samples<Lane32, PAIRS>,
     ) {
-        let entire = self.is_entire();
         for lane in (0..count).step_by(L::COUNT) {
-            let lanes = lane..lane + L::COUNT;
-            let nothing = [L::all(0.0); 4];
-            let (mut even, mut odd) = ([nothing; PAIRS], [nothing; PAIRS]);
-            let mut tails = L::all(0.0);
-            for c in 0..4 {
-                let means: [L; PAIRS] = coefficients(&nodes.even, &samples.even, c, lane);
-                let halves: [L; PAIRS] = coefficients(&nodes.odd, &samples.odd, c, lane);
-                for power in 0..PAIRS {
-                    even[power][c] = of_power(&EVEN_POWERS, &means, power).canonical();
-                    odd[power][c] = of_power(&ODD_POWERS, &halves, power).canonical();
-                }
-                let last_even: L = means[PAIRS - 1].magnitude();
-                let last_odd: L = halves[PAIRS - 1].magnitude();
-                let before_last = means[PAIRS - 2].magnitude() + halves[PAIRS - 2].magnitude();
-                let tail = if entire {
-                    last_even + L::all(0.125) * last_odd
-                } else {
-                    last_even + last_odd + L::all(0.25) * before_last
-                };
-                tails = tail.larger(tails);
-            }
-            tails.store(&mut self.tails[lanes.clone()]);
-            let mut store = self.coefficients.iter_mut();
-            let [x, y, z, w] = &samples.middle;
-            let middle = [
-                L::load(&x[lane..]).canonical(),
-                L::load(&y[lane..]).canonical(),
-                L::load(&z[lane..]).canonical(),
-                L::load(&w[lane..]).canonical(),
-            ];
-            let stored = store.next().expect("the middle");
-            L::store_rotations(middle, &mut stored[lanes.clone()]);
-            for (odd, even) in odd.into_iter().zip(even) {
-                for powers in [odd, even] {
-                    let stored = store.next().expect("as many powers");
-                    L::store_rotations(powers, &mut stored[lanes.clone()]);
-                }
-            }
+            self.interpolate(lane, nodes, &samples.at::<L>(lane));
+        }
+    }
+
+    /// As [`FitBlock::interpolate_all`], of the vector of lanes from `lane` on.
+    #[inline(always)]
+    pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
+        &mut self,
+        lane: usize,
+        nodes: &Nodes<PAIRS>,
+        samples: &Samples<L, PAIRS>,
+    ) {
+        let lanes = lane..lane + L::COUNT;
+        let means = coefficients(&nodes.even, &samples.even);
+        let halves = coefficients(&nodes.odd, &samples.odd);
+        let entire = self.is_entire();
+        let mut tails = L::all(0.0);
+        for c in 0..4 {
+            let last_even = means[PAIRS - 1][c].magnitude();
+            let last_odd = halves[PAIRS - 1][c].magnitude();
+            let before_last = means[PAIRS - 2][c].magnitude() + halves[PAIRS - 2][c].magnitude();
+            let tail = if entire {
+                last_even + L::all(0.125) * last_odd
+            } else {
+                last_even + last_odd + L::all(0.25) * before_last
+            };
+            tails = tail.larger(tails);
+        }
+        tails.store(&mut self.tails[lanes.clone()]);
+        let store = &mut self.coefficients;
+        L::store_rotations(canonical(samples.middle), &mut store[0][lanes.clone()]);
+        for power in 0..PAIRS {
+            let odd = of_power(&ODD_POWERS, &halves, power);
+            L::store_rotations(canonical(odd), &mut store[2 * power + 1][lanes.clone()]);
+            let even = of_power(&EVEN_POWERS, &means, power);
+            L::store_rotations(canonical(even), &mut store[2 * power + 2][lanes.clone()]);
         }
     }
 }
 
-/// Chebyshev coefficients of a component, from its samples.
+/// Copies numbers of some lanes to consecutive ones, from `start` on.
+#[inline(always)]
+fn copy<const N: usize>(to: &mut [Lane64; N], start: usize, from: &[Lane; N], lanes: &[u8]) {
+    for (place, &lane) in (start..).zip(lanes) {
+        for c in 0..N {
+            to[c][place % LANES] = from[c][usize::from(lane) % LANES];
+        }
+    }
+}
+
+/// Chebyshev coefficients, from samples. What is the same for all components is brought
+/// once.
 #[inline(always)]
 fn coefficients<L: Lanes, const PAIRS: usize>(
     nodes: &[[f32; PAIRS]; PAIRS],
-    samples: &[[Lane32; 4]; PAIRS],
-    component: usize,
-    lane: usize,
-) -> [L; PAIRS] {
-    let mut sums = [L::all(0.0); PAIRS];
-    for k in 0..PAIRS {
-        let sample = L::load(&samples[k][component][lane..]);
-        for i in 0..PAIRS {
-            sums[i] = sums[i] + L::all(nodes[i][k]) * sample;
+    samples: &[[L; 4]; PAIRS],
+) -> [[L; 4]; PAIRS] {
+    let mut sums = [[L::all(0.0); 4]; PAIRS];
+    for i in 0..PAIRS {
+        for k in 0..PAIRS {
+            let node = L::all(nodes[i][k]);
+            for c in 0..4 {
+                sums[i][c] = sums[i][c] + node * samples[k][c];
+            }
         }
     }
     sums
 }
 
-/// The coefficient of a power, from those of Chebyshev polynomials.
+/// The coefficients of a power, from those of Chebyshev polynomials.
 #[inline(always)]
 fn of_power<L: Lanes, const PAIRS: usize>(
     powers: &[[f32; 5]; 5],
-    coefficients: &[L; PAIRS],
+    coefficients: &[[L; 4]; PAIRS],
     power: usize,
-) -> L {
-    let mut sum = L::all(0.0);
+) -> [L; 4] {
+    let mut sums = [L::all(0.0); 4];
     for i in power..PAIRS {
-        sum = sum + L::all(powers[i][power]) * coefficients[i];
+        let factor = L::all(powers[i][power]);
+        for c in 0..4 {
+            sums[c] = sums[c] + factor * coefficients[i][c];
+        }
     }
-    sum
+    sums
 }

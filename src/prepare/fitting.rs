@@ -1,5 +1,5 @@
-//! Curves to segments: they wait in lanes until a block of them is full, and become
-//! spans in order of time once all of them are fitted.
+//! Curves to segments: they wait in lanes until a block of them is full. Each becomes one
+//! span at once, and several where it turns out that it is to be cut.
 
 use bytemuck::Zeroable;
 
@@ -9,12 +9,13 @@ use super::fit::{FitBlock, Tier, tier};
 use super::intervals::Intervals;
 use super::shape::Shape;
 use super::steady::SteadyBlock;
-use super::{NONE, Prepared, Source};
+use super::{NONE, Part, Prepared, Source, Spans};
 use crate::cpu::in_lanes;
 use crate::method::Quantity;
 use crate::segment::{PolynomialSegment, Segments};
 
-/// Fits curves; what it needs for that is kept.
+/// Fits curves; what it needs for that is kept. Each is that of the next span, whose source
+/// is not there yet.
 pub(super) struct Fitting {
     shape: &'static Shape,
     quantity: Quantity,
@@ -23,39 +24,30 @@ pub(super) struct Fitting {
     /// Made when there is an interval for it.
     steady: Option<Box<SteadyBlock>>,
     cutter: Cutter,
-    intervals: Vec<Fitted>,
+    /// Spans while curves among them are cut.
+    uncut: Spans,
 }
 
-/// Where an interval is, and what it becomes.
-pub(super) struct Place {
-    /// Its part of the prepared tracks.
-    pub(super) part: usize,
-    /// Seconds.
-    pub(super) start: f64,
-    pub(super) end: f64,
-    /// The constant to store at exactly the start, or [`NONE`].
-    pub(super) key: u32,
-}
-
-struct Fitted {
-    place: Place,
-    source: CurveSource,
-}
-
-#[derive(Clone, Copy)]
-enum CurveSource {
-    Constant(u32),
-    Segment(u32),
-    /// Parts, the first of which may have that place among the segments.
-    Parts(Option<u32>),
-}
-
-/// Curves that wait for a block to fill, and which intervals they are of.
-#[derive(Default)]
+/// Curves that wait for a block to fill.
 struct Queue {
+    tier: Tier,
     /// Made when there is a curve for it: to make one takes longer than to fit few.
     block: Option<Box<FitBlock>>,
-    intervals: Vec<usize>,
+    /// The lanes of those that are not in the block yet.
+    lanes: Vec<u8>,
+    /// Which spans they are of: those in the block, then those in `lanes`.
+    spans: Vec<usize>,
+}
+
+impl Queue {
+    fn new(tier: Tier) -> Self {
+        Self {
+            tier,
+            block: None,
+            lanes: Vec::new(),
+            spans: Vec::new(),
+        }
+    }
 }
 
 impl Fitting {
@@ -63,161 +55,192 @@ impl Fitting {
         Self {
             shape,
             quantity,
-            gentle: Queue::default(),
-            full: Queue::default(),
+            gentle: Queue::new(Tier::Gentle),
+            full: Queue::new(Tier::Full),
             steady: None,
             cutter: Cutter::new(shape, quantity),
-            intervals: Vec::new(),
+            uncut: Spans::default(),
         }
     }
 
-    /// Adds an interval that stands still.
-    pub(super) fn push_constant(&mut self, place: Place, constant: u32) {
-        let source = CurveSource::Constant(constant);
-        self.intervals.push(Fitted { place, source });
-    }
-
-    /// Adds an interval with the curve in a lane of `curves`.
-    pub(super) fn push(
+    /// Takes the curve in a lane of `curves`, which are to be [brought](Fitting::bring)
+    /// before they are others.
+    #[inline]
+    pub(super) fn take(
         &mut self,
         prepared: &mut Prepared,
-        place: Place,
         curves: &Intervals,
         lane: usize,
-    ) {
-        let interval = self.intervals.len();
-        let Some(tier) = tier(curves.energies[lane]) else {
-            self.cutter
-                .push(interval, curves.curve(lane, self.shape, self.quantity));
-            let source = CurveSource::Parts(None);
-            self.intervals.push(Fitted { place, source });
-            return;
+    ) -> Source {
+        let span = prepared.spans.sources.len();
+        let queue = match tier(curves.energies[lane]) {
+            Some(Tier::Gentle) => &mut self.gentle,
+            Some(Tier::Full) => &mut self.full,
+            None => {
+                self.cutter
+                    .push(span, curves.curve(lane, self.shape, self.quantity));
+                return UNTRIED;
+            }
         };
-        self.push_segment(prepared, place);
-        let queue = match tier {
-            Tier::Gentle => &mut self.gentle,
-            Tier::Full => &mut self.full,
-        };
-        queue.intervals.push(interval);
-        let new = || Box::new(FitBlock::new(self.shape, self.quantity, tier));
-        let block = queue.block.get_or_insert_with(new);
-        block.push_from(curves, lane);
-        if block.is_full() {
-            self.run(tier, prepared);
+        queue.lanes.push(lane as u8);
+        queue.spans.push(span);
+        new_segment(prepared).0
+    }
+
+    /// Brings the curves that were taken into blocks.
+    pub(super) fn bring(&mut self, prepared: &mut Prepared, curves: &Intervals) {
+        for queue in [&mut self.gentle, &mut self.full] {
+            let mut lanes = &queue.lanes[..];
+            while !lanes.is_empty() {
+                let new = || Box::new(FitBlock::new(self.shape, self.quantity, queue.tier));
+                let block = queue.block.get_or_insert_with(new);
+                let (own, others) = lanes.split_at(block.room().min(lanes.len()));
+                block.push_from(curves, own);
+                if block.room() == 0 {
+                    run(block, &mut queue.spans, &mut self.cutter, prepared);
+                }
+                lanes = others;
+            }
+            queue.lanes.clear();
         }
     }
 
-    /// Adds an interval with a segment, which is zero.
-    pub(super) fn push_segment<'p>(
-        &mut self,
-        prepared: &'p mut Prepared,
-        place: Place,
-    ) -> &'p mut PolynomialSegment {
-        let segments = polynomials(prepared);
-        let segment = segments.len();
-        let source = CurveSource::Segment(segment as u32);
-        self.intervals.push(Fitted { place, source });
-        segments.push(PolynomialSegment::zeroed());
-        &mut segments[segment]
-    }
-
-    /// Adds two keys that are alone.
-    pub(super) fn push_steady(
-        &mut self,
-        prepared: &mut Prepared,
-        place: Place,
-        keys: [[f32; 4]; 2],
-    ) {
-        let segments = polynomials(prepared);
-        let segment = segments.len() as u32;
-        segments.push(PolynomialSegment::zeroed());
-        let source = CurveSource::Segment(segment);
-        self.intervals.push(Fitted { place, source });
+    /// Takes two keys that are alone.
+    pub(super) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
+        let (source, segment) = new_segment(prepared);
         let new = || Box::new(SteadyBlock::new());
         let block = self.steady.get_or_insert_with(new);
-        block.push(keys, segment);
+        block.push(keys, segment as u32);
         if block.is_full() {
             in_lanes(&mut **block);
-            block.write(segments);
+            block.write(polynomials(prepared));
         }
+        source
     }
 
-    /// Adds an interval with any curve.
-    pub(super) fn push_curve(&mut self, place: Place, curve: Curve) {
-        self.cutter.push_whole(self.intervals.len(), curve);
-        let source = CurveSource::Parts(None);
-        self.intervals.push(Fitted { place, source });
+    /// Takes any curve.
+    pub(super) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
+        self.cutter.push_whole(prepared.spans.sources.len(), curve);
+        UNTRIED
     }
 
-    /// Fits the curves of a queue.
-    fn run(&mut self, tier: Tier, prepared: &mut Prepared) {
-        let queue = match tier {
-            Tier::Gentle => &mut self.gentle,
-            Tier::Full => &mut self.full,
-        };
-        let Some(block) = &mut queue.block else {
-            return;
-        };
-        block.run();
-        let trusted = block.is_trusted();
-        let segments = polynomials(prepared);
-        for (lane, interval) in queue.intervals.drain(..).enumerate() {
-            let source = &mut self.intervals[interval].source;
-            let CurveSource::Segment(segment) = *source else {
-                continue;
-            };
-            if trusted || block.fits(lane) {
-                block.write(lane, &mut segments[segment as usize]);
-            } else {
-                *source = CurveSource::Parts(Some(segment));
-                self.cutter.push(interval, block.curve(lane));
+    /// Fits what still waits, and puts the parts of curves that were cut where these are
+    /// among the spans.
+    pub(super) fn finish(&mut self, prepared: &mut Prepared) {
+        for queue in [&mut self.gentle, &mut self.full] {
+            if let Some(block) = &mut queue.block {
+                run(block, &mut queue.spans, &mut self.cutter, prepared);
             }
         }
-        block.clear();
-    }
-
-    /// Fits what still waits, and appends the spans of all intervals given.
-    pub(super) fn finish(&mut self, prepared: &mut Prepared) {
-        self.run(Tier::Gentle, prepared);
-        self.run(Tier::Full, prepared);
         if let Some(block) = &mut self.steady {
             in_lanes(&mut **block);
             block.write(polynomials(prepared));
         }
         self.cutter.cut();
-        let mut parts = self.cutter.parts();
-        for (interval, Fitted { place, source }) in self.intervals.drain(..).enumerate() {
-            let first_span = prepared.spans.len();
-            let Place { start, key, .. } = place;
-            match source {
-                CurveSource::Constant(constant) => {
-                    prepared.push_span(start, Source::Constant(constant), NONE);
-                }
-                CurveSource::Segment(segment) => {
-                    prepared.push_span(start, Source::Segment(segment), key);
-                }
-                CurveSource::Parts(mut spare) => {
-                    let is_own = |part: &&CurvePart| part.interval == interval;
-                    let own = parts.iter().take_while(is_own).count();
-                    for part in parts.split_off(..own).unwrap_or_default() {
-                        let (from, _) = part.piece.extent();
-                        let start = start + (place.end - start) * from;
-                        let key = if from == 0.0 { key } else { NONE };
-                        let source = prepared.part_source(&self.cutter, part, &mut spare);
-                        prepared.push_span(start, source, key);
-                    }
-                }
-            }
-            let spans = &mut prepared.parts[place.part].spans;
-            let is_first = spans.start == spans.end;
-            let start = if is_first { first_span } else { spans.start };
-            *spans = start..prepared.spans.len();
-        }
+        prepared.put_parts(&self.cutter, &mut self.uncut);
         self.cutter.clear();
     }
 }
 
+/// Fits the curves of a block, which are of the first of the `spans`.
+fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
+    block.run();
+    let trusted = block.is_trusted();
+    for (lane, span) in spans.drain(..block.count()).enumerate() {
+        let Source::Segment(segment) = prepared.spans.sources[span] else {
+            continue;
+        };
+        if trusted || block.fits(lane) {
+            block.write(lane, &mut polynomials(prepared)[segment as usize]);
+        } else {
+            cutter.push(span, block.curve(lane));
+        }
+    }
+    block.clear();
+}
+
+/// Of curves that are cut untried.
+const UNTRIED: Source = Source::Segment(NONE);
+
+/// A segment, which is zero; and its place.
+pub(super) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
+    let segments = polynomials(prepared);
+    let place = segments.len();
+    segments.push(PolynomialSegment::zeroed());
+    (Source::Segment(place as u32), place)
+}
+
 impl Prepared {
+    /// Puts the parts of curves that were cut where these are among the spans.
+    fn put_parts(&mut self, cutter: &Cutter, uncut: &mut Spans) {
+        let mut cut = cutter.parts();
+        let Some(first) = cut.first().map(|part| part.span) else {
+            return;
+        };
+        uncut.clear();
+        uncut.extend(&self.spans, first..self.spans.len());
+        self.spans.truncate(first);
+        for part in 0..self.parts.len() {
+            let Part { spans, end, .. } = &self.parts[part];
+            let (spans, end) = (spans.clone(), *end);
+            if spans.end <= first {
+                continue;
+            }
+            let start = if spans.start > first {
+                self.spans.len()
+            } else {
+                spans.start
+            };
+            let mut next = spans.start.max(first);
+            while next < spans.end {
+                let to = cut
+                    .first()
+                    .map_or(spans.end, |part| part.span.min(spans.end));
+                self.spans.extend(uncut, next - first..to - first);
+                next = to;
+                if next < spans.end {
+                    next += 1;
+                    let is_last = next == spans.end;
+                    let end = if is_last {
+                        end
+                    } else {
+                        uncut.starts[next - first]
+                    };
+                    cut = self.put_first(cutter, cut, uncut, to - first, end);
+                }
+            }
+            self.parts[part].spans = start..self.spans.len();
+        }
+    }
+
+    /// Puts the parts of the first curve there, whose span ends at `end`; the others' parts.
+    fn put_first<'c>(
+        &mut self,
+        cutter: &Cutter,
+        parts: &'c [CurvePart],
+        uncut: &Spans,
+        span: usize,
+        end: f64,
+    ) -> &'c [CurvePart] {
+        let (start, key) = (uncut.starts[span], uncut.keys[span]);
+        let mut spare = match uncut.sources[span] {
+            Source::Segment(place) if place != NONE => Some(place),
+            _ => None,
+        };
+        let count = (parts.iter())
+            .take_while(|part| part.span == parts[0].span)
+            .count();
+        let (own, others) = parts.split_at(count);
+        for part in own {
+            let (from, _) = part.piece.extent();
+            let start = start + (end - start) * from;
+            let key = if from == 0.0 { key } else { NONE };
+            let source = self.part_source(cutter, part, &mut spare);
+            self.push_span(start, source, key);
+        }
+        others
+    }
+
     fn part_source(
         &mut self,
         cutter: &Cutter,

@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use super::NONE;
 use super::curve::{Curve, Piece};
 use super::shape::Shape;
 use crate::branchless::{self, Quaternion, Vector};
@@ -40,7 +41,7 @@ pub(crate) struct Stretch {
     pub(super) track: usize,
     /// Its place in the prepared parts.
     pub(super) part: usize,
-    /// The constant of its first key; [`NONE`](super::NONE) where the curve does not
+    /// The constant of its first key; [`NONE`] where the curve does not
     /// meet its keys.
     pub(super) key: u32,
 }
@@ -49,6 +50,14 @@ impl Stretch {
     /// The lanes of its intervals.
     pub(crate) fn lanes(&self) -> Range<usize> {
         self.lane..self.lane + self.intervals.len()
+    }
+
+    /// The constant at the start of its `i`th interval.
+    pub(super) fn key_at(&self, i: usize) -> u32 {
+        match self.key {
+            NONE => NONE,
+            first => first + i as u32,
+        }
     }
 
     /// The lane of the track's first interval, where it is among these.
@@ -94,6 +103,8 @@ pub(crate) struct Intervals {
     pub(super) numbers: Vec<Lane>,
     /// How far the curve goes: the sum of the squares of its half-rotation vectors.
     pub(super) energies: Lane,
+    /// 0 where a pass has to be done again by what holds anywhere.
+    pub(super) holds: Lane,
 }
 
 impl Intervals {
@@ -119,22 +130,31 @@ impl Intervals {
             inward: [lane; 4],
             numbers: vec![lane; numbers],
             energies: lane,
+            holds: lane,
         }
     }
 
-    /// Adds interval `i` of a track, with the method's own numbers; the block is not full.
-    pub(super) fn push(&mut self, track: Track, i: usize, given: Option<[[f64; 4]; 2]>) {
-        let lane = self.count;
-        self.from[lane] = track.keys[i].to_array();
-        self.to[lane] = track.keys[i + 1].to_array();
-        self.starts[lane] = track.times[i];
-        self.ends[lane] = track.times[i + 1];
-        self.durations[lane] = track.times[i + 1] - track.times[i];
-        if let Some([outward, inward]) = given {
-            put(&mut self.outward, lane, outward);
-            put(&mut self.inward, lane + 1, inward);
+    /// Adds some intervals of a track; the block has room for them.
+    pub(super) fn push(&mut self, track: Track, intervals: Range<usize>) {
+        let lanes = self.count..self.count + intervals.len();
+        let Range { start, end } = intervals;
+        let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
+        self.from[lanes.clone()].copy_from_slice(&keys[start..end]);
+        self.to[lanes.clone()].copy_from_slice(&keys[start + 1..=end]);
+        let (starts, ends) = (&track.times[start..end], &track.times[start + 1..=end]);
+        self.starts[lanes.clone()].copy_from_slice(starts);
+        self.ends[lanes.clone()].copy_from_slice(ends);
+        let durations = self.durations[lanes.clone()].iter_mut();
+        for (duration, (start, end)) in durations.zip(starts.iter().zip(ends)) {
+            *duration = end - start;
         }
-        self.count += 1;
+        self.count = lanes.end;
+    }
+
+    /// Sets the method's own numbers of the keys that an interval starts and ends with.
+    pub(super) fn set_given(&mut self, lane: usize, outward: [f64; 4], inward: [f64; 4]) {
+        put(&mut self.outward, lane, outward);
+        put(&mut self.inward, lane + 1, inward);
     }
 
     /// Adds a lane for a neighbour that there is not.
@@ -196,9 +216,7 @@ impl Intervals {
     /// The key that the interval starts with, in the sign that the keys before it give.
     #[inline(always)]
     pub(crate) fn key(&self, lane: usize) -> Quaternion {
-        let [x, y, z, w] = branchless::unit(self.from[lane]);
-        let sign = self.signs[lane];
-        [x * sign, y * sign, z * sign, w * sign]
+        aligned(self.from[lane], self.signs[lane])
     }
 
     /// The key that the interval ends with, in the sign that the step gives.
@@ -246,6 +264,13 @@ impl Intervals {
     pub(super) fn whole32(&self) -> usize {
         self.count.next_multiple_of(16).min(LANES)
     }
+}
+
+/// A key in that sign.
+#[inline(always)]
+pub(super) fn aligned(key: [f32; 4], sign: f64) -> Quaternion {
+    let [x, y, z, w] = branchless::unit(key);
+    [x * sign, y * sign, z * sign, w * sign]
 }
 
 #[inline(always)]

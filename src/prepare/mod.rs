@@ -139,6 +139,20 @@ impl Spans {
         self.starts.len()
     }
 
+    /// Adds some of other spans.
+    fn extend(&mut self, other: &Self, range: Range<usize>) {
+        self.starts.extend_from_slice(&other.starts[range.clone()]);
+        self.sources
+            .extend_from_slice(&other.sources[range.clone()]);
+        self.keys.extend_from_slice(&other.keys[range]);
+    }
+
+    fn truncate(&mut self, count: usize) {
+        self.starts.truncate(count);
+        self.sources.truncate(count);
+        self.keys.truncate(count);
+    }
+
     fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
         self.sources.reserve(count);

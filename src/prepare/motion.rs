@@ -1,7 +1,7 @@
 //! Angular velocities and accelerations of curves: by their formulas, evaluated in
 //! numbers that carry their derivatives, and fitted like the rotations themselves.
 
-use super::fit::{FitBlock, Samples, Tier};
+use super::fit::{FitBlock, Lane32, Samples, Tier};
 use super::intervals::LANES;
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use crate::branchless::{Quaternion, Vector, product, step};
@@ -62,12 +62,12 @@ impl Fit<'_> {
     #[inline(always)]
     fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
         let count = self.0.whole();
-        let mut samples = Samples::new();
+        let mut samples = Samples::all([0.0; LANES]);
         let mut scales = [1.0; LANES];
         for (lane, scale) in scales[..count].iter_mut().enumerate() {
             *scale = sample(self.0, lane, nodes, &mut samples);
         }
-        self.0.interpolate::<L, PAIRS>(count, nodes, &samples);
+        self.0.interpolate_all::<L, PAIRS>(count, nodes, &samples);
         self.0.scale(&scales);
     }
 }
@@ -78,7 +78,7 @@ fn sample<const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
 ) -> f32 {
     let curve = block.curve(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);

@@ -1,13 +1,13 @@
 //! Passes over the lanes of a block: plain loops, compiled for every vector width.
 //!
-//! Outputs are arrays of a pass's own: the compiler must see that they do not overlap
-//! what is read.
+//! Outputs are arguments of a loop's own function: so the compiler knows that they do not
+//! overlap what is read.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
 use std::marker::PhantomData;
 
-use super::intervals::{Intervals, LANES, Lane, ROOM, at, energy, put};
+use super::intervals::{Intervals, LANES, Lane, ROOM, aligned, at, energy, put};
 use crate::branchless::{self, Algebra, Anywhere, Near, Quaternion, Vector, product, scaled, sum};
 use crate::cpu::{InLanes, Lanes};
 use crate::formula::Product;
@@ -19,27 +19,46 @@ pub(super) struct Steps<'a>(pub(super) &'a mut Intervals);
 impl InLanes for Steps<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let lane = [0.0; ROOM];
-        // Outputs are arrays of its own, here and in every pass: the compiler must
-        // see that they do not overlap what is read.
-        let (mut dots, mut steps, mut logs) = (lane, [lane; 4], [lane; 3]);
-        let mut holds = lane;
-        let Intervals { from, to, .. } = &*self.0;
-        let noise = self.0.noise;
-        for j in 0..self.0.whole() {
-            let [x, y, z, w] = branchless::step(branchless::unit(from[j]), branchless::unit(to[j]));
-            let flip = if w < noise { -1.0 } else { 1.0 };
-            let step = [x * flip, y * flip, z * flip, w * flip];
-            let mut near = Near::new();
-            dots[j] = w;
-            put(&mut steps, j, step);
-            put(&mut logs, j, near.log(step));
-            holds[j] = near.holds;
+        let (whole, noise) = (self.0.whole(), self.0.noise);
+        let Intervals {
+            from,
+            to,
+            dots,
+            steps,
+            logs,
+            holds,
+            count,
+            ..
+        } = &mut *self.0;
+        step_lanes(whole, (from, to), noise, dots, steps, logs, holds);
+        for j in (0..*count).filter(|&j| holds[j] == 0.0) {
+            put(logs, j, branchless::log(at(steps, j)));
         }
-        for j in (0..self.0.count).filter(|&j| holds[j] == 0.0) {
-            put(&mut logs, j, branchless::log(at(&steps, j)));
-        }
-        (self.0.dots, self.0.steps, self.0.logs) = (dots, steps, logs);
+    }
+}
+
+#[inline(always)]
+fn step_lanes(
+    count: usize,
+    (from, to): (&[[f32; 4]; ROOM], &[[f32; 4]; ROOM]),
+    noise: f64,
+    dots: &mut Lane,
+    steps: &mut [Lane; 4],
+    logs: &mut [Lane; 3],
+    holds: &mut Lane,
+) {
+    for j in 0..count {
+        let (from, to) = (branchless::unit(from[j]), branchless::unit(to[j]));
+        let [x, y, z, w] = branchless::step(from, to);
+        let flip = if w < noise { -1.0 } else { 1.0 };
+        let step = [x * flip, y * flip, z * flip, w * flip];
+        let mut near = Near::new();
+        let log = near.log(step);
+        dots[j] = w;
+        // Written out: with a loop over the components this one is not vectorised.
+        [steps[0][j], steps[1][j], steps[2][j], steps[3][j]] = step;
+        [logs[0][j], logs[1][j], logs[2][j]] = log;
+        holds[j] = near.holds;
     }
 }
 
@@ -94,13 +113,13 @@ pub(crate) trait HandleRule {
     fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles;
 
     /// The handle of the first or of the last key of a track.
-    fn end(EndInterval { log, other, rest }: EndInterval, handle: EndHandle) -> Vector {
+    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
             // The tangents of a parabola change evenly.
             EndHandle::Parabolic => sum(scaled(log, 2.0 / 3.0), scaled(other, -1.0)),
             // No acceleration: the control rotation lies half way to the other one.
-            EndHandle::Natural => scaled(rest, 0.5),
+            EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
 }
@@ -112,8 +131,6 @@ pub(crate) struct EndInterval {
     pub(crate) log: Vector,
     /// The handle of its inner key.
     pub(crate) other: Vector,
-    /// The logarithm of the step without that handle.
-    pub(crate) rest: Vector,
 }
 
 /// What the handle of an end's key shall do.
@@ -123,8 +140,8 @@ pub(crate) enum EndHandle {
     Turn(Vector),
     /// Continue the parabola through the last three keys.
     Parabolic,
-    /// Give no acceleration.
-    Natural,
+    /// Give no acceleration; the logarithm of the step without the inner key's handle.
+    Natural(Vector),
 }
 
 /// The handles of every key that an interval starts with, or ends with.
@@ -136,29 +153,47 @@ pub(crate) struct KeyHandles<'a, R> {
 impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let lane = [0.0; ROOM];
-        let (mut incoming, mut outgoing) = ([lane; 3], [lane; 3]);
-        let mut holds = lane;
-        let all = &*self.intervals;
+        let whole = self.intervals.whole();
+        let Intervals {
+            durations,
+            steps,
+            logs,
+            outward,
+            incoming,
+            outgoing,
+            holds,
+            count,
+            ..
+        } = &mut *self.intervals;
         let interval = |j: usize| Interval {
-            duration: all.durations[j],
-            step: at(&all.steps, j),
-            log: at(&all.logs, j),
-            key: at(&all.outward, j),
+            duration: durations[j],
+            step: at(steps, j),
+            log: at(logs, j),
+            key: at(outward, j),
         };
-        for j in 0..all.whole() {
-            let mut near = Near::new();
-            let handles = R::handles(&mut near, interval(j), interval(j + 1));
-            put(&mut incoming, j + 1, handles.incoming);
-            put(&mut outgoing, j + 1, handles.outgoing);
-            holds[j + 1] = near.holds;
-        }
-        for j in (1..all.count).filter(|&j| holds[j] == 0.0) {
+        handle_lanes::<R>(whole, interval, incoming, outgoing, holds);
+        for j in (1..*count).filter(|&j| holds[j] == 0.0) {
             let handles = R::handles(&mut Anywhere, interval(j - 1), interval(j));
-            put(&mut incoming, j, handles.incoming);
-            put(&mut outgoing, j, handles.outgoing);
+            put(incoming, j, handles.incoming);
+            put(outgoing, j, handles.outgoing);
         }
-        (self.intervals.incoming, self.intervals.outgoing) = (incoming, outgoing);
+    }
+}
+
+#[inline(always)]
+fn handle_lanes<R: HandleRule>(
+    count: usize,
+    interval: impl Fn(usize) -> Interval,
+    incoming: &mut [Lane; 3],
+    outgoing: &mut [Lane; 3],
+    holds: &mut Lane,
+) {
+    for j in 0..count {
+        let mut near = Near::new();
+        let handles = R::handles(&mut near, interval(j), interval(j + 1));
+        put(incoming, j + 1, handles.incoming);
+        put(outgoing, j + 1, handles.outgoing);
+        holds[j + 1] = near.holds;
     }
 }
 
@@ -169,42 +204,68 @@ pub(crate) struct BetweenHandles<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenHandles<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let lane = [0.0; ROOM];
-        let (mut bases, mut middles, mut lasts) = ([lane; 4], [lane; 3], [lane; 3]);
-        let (mut energies, mut holds) = (lane, lane);
-        let all = &*self.0;
-        for j in 0..all.whole() {
-            let (first, last) = (at(&all.outgoing, j), at(&all.incoming, j + 1));
-            let mut near = Near::new();
-            let middle = between(&mut near, first, at(&all.steps, j), last);
-            put(&mut middles, j, middle);
-            put(&mut lasts, j, last);
-            put(&mut bases, j, all.key(j));
+        let whole = self.0.whole();
+        let Intervals {
+            from,
+            signs,
+            steps,
+            incoming,
+            outgoing,
+            numbers,
+            energies,
+            holds,
+            count,
+            ..
+        } = &mut *self.0;
+        let key = |j: usize| aligned(from[j], signs[j]);
+        let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
+        let (bases, vectors) = product_numbers(numbers);
+        between_lanes(whole, key, handles, bases, vectors, energies, holds);
+        for j in (0..*count).filter(|&j| holds[j] == 0.0) {
+            let (first, step, last) = handles(j);
+            let middle = between(&mut Anywhere, first, step, last);
+            put_vectors(vectors, j, [first, middle, last]);
             energies[j] = energy([first, middle, last]);
-            holds[j] = near.holds;
         }
-        for j in (0..all.count).filter(|&j| holds[j] == 0.0) {
-            let (first, last) = (at(&all.outgoing, j), at(&all.incoming, j + 1));
-            let middle = between(&mut Anywhere, first, at(&all.steps, j), last);
-            put(&mut middles, j, middle);
-            energies[j] = energy([first, middle, last]);
-        }
-        let firsts = all.outgoing;
-        self.0.put_product(&bases, [&firsts, &middles, &lasts]);
-        self.0.energies = energies;
     }
 }
 
-impl Intervals {
-    /// Bases and vectors of [`Product`].
-    #[inline(always)]
-    fn put_product(&mut self, bases: &[Lane; 4], vectors: [&[Lane; 3]; 3]) {
-        self.numbers[..4].copy_from_slice(bases);
-        for (j, vector) in vectors.into_iter().enumerate() {
-            let place = Product::VECTORS + 3 * j;
-            self.numbers[place..place + 3].copy_from_slice(vector);
-        }
+#[inline(always)]
+fn between_lanes(
+    count: usize,
+    key: impl Fn(usize) -> Quaternion,
+    handles: impl Fn(usize) -> (Vector, Quaternion, Vector),
+    bases: &mut [Lane; 4],
+    vectors: &mut [Lane; 9],
+    energies: &mut Lane,
+    holds: &mut Lane,
+) {
+    for j in 0..count {
+        let (first, step, last) = handles(j);
+        let mut near = Near::new();
+        let middle = between(&mut near, first, step, last);
+        put(bases, j, key(j));
+        put_vectors(vectors, j, [first, middle, last]);
+        energies[j] = energy([first, middle, last]);
+        holds[j] = near.holds;
     }
+}
+
+/// Bases and vectors of [`Product`].
+#[inline(always)]
+fn product_numbers(numbers: &mut [Lane]) -> (&mut [Lane; 4], &mut [Lane; 9]) {
+    let (bases, others) = numbers.split_at_mut(Product::VECTORS);
+    let vectors = &mut others[..Product::BASIS - Product::VECTORS];
+    (
+        bases.try_into().expect("a quaternion"),
+        vectors.try_into().expect("three vectors"),
+    )
+}
+
+#[inline(always)]
+fn put_vectors(lanes: &mut [Lane; 9], lane: usize, [a, b, c]: [Vector; 3]) {
+    let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
+    put(lanes, lane, all);
 }
 
 /// `log(a⁻¹ b)`.
@@ -227,23 +288,47 @@ pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for ControlRotations<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let lane = [0.0; ROOM];
-        let mut controls = [[lane; 4]; 4];
-        let mut energies = lane;
-        let all = &*self.0;
-        for j in 0..all.whole() {
-            let (first, last) = (at(&all.outgoing, j), at(&all.incoming, j + 1));
-            let start = all.key(j);
-            let end = product(start, at(&all.steps, j));
-            put(&mut controls[0], j, start);
-            put(&mut controls[1], j, product(start, branchless::exp(first)));
-            let back = branchless::exp(scaled(last, -1.0));
-            put(&mut controls[2], j, product(end, back));
-            put(&mut controls[3], j, end);
-            energies[j] = energy([first, at(&all.logs, j), last]);
+        let whole = self.0.whole();
+        let Intervals {
+            from,
+            signs,
+            steps,
+            logs,
+            incoming,
+            outgoing,
+            numbers,
+            energies,
+            ..
+        } = &mut *self.0;
+        let key = |j: usize| aligned(from[j], signs[j]);
+        let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
+        let log = |j: usize| at(logs, j);
+        let controls = (&mut numbers[..16]).try_into().expect("four rotations");
+        control_lanes(whole, key, handles, log, controls, energies);
+    }
+}
+
+#[inline(always)]
+fn control_lanes(
+    count: usize,
+    key: impl Fn(usize) -> Quaternion,
+    handles: impl Fn(usize) -> (Vector, Quaternion, Vector),
+    log: impl Fn(usize) -> Vector,
+    controls: &mut [Lane; 16],
+    energies: &mut Lane,
+) {
+    for j in 0..count {
+        let (first, step, last) = handles(j);
+        let start = key(j);
+        let end = product(start, step);
+        let a = product(start, branchless::exp(first));
+        let b = product(end, branchless::exp(scaled(last, -1.0)));
+        for (place, control) in [start, a, b, end].into_iter().enumerate() {
+            for c in 0..4 {
+                controls[4 * place + c][j] = control[c];
+            }
         }
-        self.0.numbers[..16].copy_from_slice(controls.as_flattened());
-        self.0.energies = energies;
+        energies[j] = energy([first, log(j), last]);
     }
 }
 
@@ -254,28 +339,45 @@ pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenNeighbours<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let lane = [0.0; ROOM];
-        let (mut bases, mut vectors) = ([lane; 4], [[lane; 3]; 3]);
-        let (mut energies, mut holds) = (lane, lane);
-        let all = &*self.0;
-        for j in 0..all.whole() {
-            let before: Vector = at(&all.logs, j);
-            let own: Vector = at(&all.logs, j + 1);
-            let after: Vector = at(&all.logs, j + 2);
-            put(&mut vectors[0], j + 1, before);
-            put(&mut vectors[1], j + 1, own);
-            put(&mut vectors[2], j + 1, after);
-            energies[j + 1] = energy([before, own, after]);
-            let mut near = Near::new();
-            let back = near.exp(scaled(before, -1.0));
-            put(&mut bases, j + 1, product(all.key(j + 1), back));
-            holds[j + 1] = near.holds;
+        let whole = self.0.whole();
+        let Intervals {
+            from,
+            signs,
+            logs,
+            numbers,
+            energies,
+            holds,
+            count,
+            ..
+        } = &mut *self.0;
+        let key = |j: usize| aligned(from[j], signs[j]);
+        let log = |j: usize| at(logs, j);
+        let (bases, vectors) = product_numbers(numbers);
+        neighbour_lanes(whole, key, log, bases, vectors, energies, holds);
+        for j in (1..*count).filter(|&j| holds[j] == 0.0) {
+            let back = branchless::exp(scaled(log(j - 1), -1.0));
+            put(bases, j, product(key(j), back));
         }
-        for j in (1..all.count).filter(|&j| holds[j] == 0.0) {
-            let back = branchless::exp(scaled(at(&all.logs, j - 1), -1.0));
-            put(&mut bases, j, product(all.key(j), back));
-        }
-        self.0.put_product(&bases, vectors.each_ref());
-        self.0.energies = energies;
+    }
+}
+
+#[inline(always)]
+fn neighbour_lanes(
+    count: usize,
+    key: impl Fn(usize) -> Quaternion,
+    log: impl Fn(usize) -> Vector,
+    bases: &mut [Lane; 4],
+    vectors: &mut [Lane; 9],
+    energies: &mut Lane,
+    holds: &mut Lane,
+) {
+    for j in 0..count {
+        let (before, own, after) = (log(j), log(j + 1), log(j + 2));
+        put_vectors(vectors, j + 1, [before, own, after]);
+        energies[j + 1] = energy([before, own, after]);
+        let mut near = Near::new();
+        let back = near.exp(scaled(before, -1.0));
+        put(bases, j + 1, product(key(j + 1), back));
+        holds[j + 1] = near.holds;
     }
 }

@@ -4,11 +4,21 @@
 use std::sync::Arc;
 
 use super::curve::Curve;
-use super::fitting::{Fitting, Place};
+use super::fitting::Fitting;
 use super::pace::Pace;
-use super::{NONE, Part, Prepared};
+use super::{NONE, Part, Prepared, Source};
 use crate::branchless::length;
 use crate::numeric::round_quat;
+
+/// Where an interval is.
+pub(super) struct Place {
+    /// Its part of the prepared tracks.
+    pub(super) part: usize,
+    /// Seconds.
+    pub(super) start: f64,
+    /// The constant to store at exactly the start, or [`NONE`].
+    pub(super) key: u32,
+}
 
 /// Intervals that wait, in order; those without a curve stand still.
 #[derive(Default)]
@@ -29,7 +39,9 @@ impl Waiting {
                 .take_while(|(place, _)| place.part == part)
                 .count();
             let others = waiting.split_off(own);
+            let first_span = prepared.spans.len();
             retime(prepared, fitting, waiting, part);
+            prepared.parts[part].spans = first_span..prepared.spans.len();
             waiting = others;
         }
     }
@@ -70,14 +82,7 @@ fn retime(
             (NONE, key) => key,
             (before, _) => before,
         };
-        fitting.push_constant(
-            Place {
-                start,
-                end,
-                ..place
-            },
-            held,
-        );
+        prepared.push_span(start, Source::Constant(held), NONE);
         return;
     }
     let (seconds, count) = (end - start, paced.len());
@@ -97,13 +102,9 @@ fn retime(
         {
             prepared.constants[beyond.at_end as usize] = round_quat(curve.value_at(1.0));
         }
-        let place = Place {
-            start: from,
-            end: to,
-            ..place
-        };
         if from < to {
-            fitting.push_curve(place, curve);
+            let source = fitting.take_curve(prepared, curve);
+            prepared.push_span(from, source, place.key);
         }
     }
     let Some(beyond) = &prepared.parts[part].beyond else {

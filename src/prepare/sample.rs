@@ -28,12 +28,7 @@ pub(super) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
     #[inline(always)]
-    fn sample<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        count: usize,
-        nodes: &Nodes<PAIRS>,
-        samples: &mut Samples<PAIRS>,
-    ) {
+    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>) {
         let lane = [0.0; LANES];
         let mut middles = Middles {
             bases: [[lane; 4]; 3],
@@ -44,7 +39,8 @@ impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
         };
         block.at_middles::<OWN_BASIS>(count, &mut middles);
         for lane in (0..count).step_by(L::COUNT) {
-            Expanded::<L>::new(&middles, lane).sample(lane, nodes, samples);
+            let samples = Expanded::<L>::new(&middles, lane).sample(nodes);
+            block.interpolate(lane, nodes, &samples);
         }
     }
 }
@@ -212,65 +208,67 @@ impl<L: Lanes> Expanded<L> {
 
     /// Samples them at every node.
     #[inline(always)]
-    fn sample<const PAIRS: usize>(
-        &self,
-        lane: usize,
-        nodes: &Nodes<PAIRS>,
-        Samples { middle, even, odd }: &mut Samples<PAIRS>,
-    ) {
+    fn sample<const PAIRS: usize>(&self, nodes: &Nodes<PAIRS>) -> Samples<L, PAIRS> {
         let half = L::all(0.5);
-        let lanes = lane..lane + L::COUNT;
-        for c in 0..4 {
-            self.terms[0][c].store(&mut middle[c][lanes.clone()]);
-        }
+        let mut samples = Samples::all(L::all(0.0));
+        samples.middle = self.terms[0];
         for k in 0..PAIRS {
-            let before = self.difference(L::all(-nodes.at[k]));
-            let after = self.difference(L::all(nodes.at[k]));
+            let [before, after] = self.differences(L::all(nodes.at[k]));
             for c in 0..4 {
-                ((after[c] + before[c]) * half).store(&mut even[k][c][lanes.clone()]);
-                ((after[c] - before[c]) * half).store(&mut odd[k][c][lanes.clone()]);
+                samples.even[k][c] = (after[c] + before[c]) * half;
+                samples.odd[k][c] = (after[c] - before[c]) * half;
             }
         }
+        samples
     }
 
-    /// `q(s) - q(0)`.
+    /// `q(-s) - q(0)` and `q(s) - q(0)`, side by side: each is a long chain.
     #[inline(always)]
-    fn difference(&self, s: L) -> [L; 4] {
-        let (s1, f1) = self.turn(0, s);
-        let (s2, f2) = self.turn(1, s);
-        let (s3, f3) = self.turn(2, s);
-        // With cosines as 1 + fall, nothing is lost where the angles are small.
-        let both = f2 + f3 + f2 * f3;
-        let cs = s3 + f2 * s3;
-        let sc = s2 + s2 * f3;
-        let ss = s2 * s3;
-        let cc = L::all(1.0) + both;
-        let mut difference = self.terms[0];
-        for c in 0..4 {
-            let terms = [
-                self.terms[0][c],
-                self.terms[1][c],
-                self.terms[2][c],
-                self.terms[3][c],
-                self.terms[4][c],
-                self.terms[5][c],
-                self.terms[6][c],
-                self.terms[7][c],
-            ];
-            let rest = terms[1] * cs + terms[2] * sc + terms[3] * ss;
-            let even = terms[0] * both + rest;
-            let odd = terms[4] * cc + terms[5] * cs + terms[6] * sc + terms[7] * ss;
-            difference[c] = even + (terms[0] + even) * f1 + odd * s1;
+    fn differences(&self, s: L) -> [[L; 4]; 2] {
+        let first = self.turns(0, s);
+        let second = self.turns(1, s);
+        let third = self.turns(2, s);
+        let mut differences = [self.terms[0]; 2];
+        for i in 0..2 {
+            let ((s1, f1), (s2, f2), (s3, f3)) = (first[i], second[i], third[i]);
+            // With cosines as 1 + fall, nothing is lost where the angles are small.
+            let both = f2 + f3 + f2 * f3;
+            let cs = s3 + f2 * s3;
+            let sc = s2 + s2 * f3;
+            let ss = s2 * s3;
+            let cc = L::all(1.0) + both;
+            for c in 0..4 {
+                let terms = [
+                    self.terms[0][c],
+                    self.terms[1][c],
+                    self.terms[2][c],
+                    self.terms[3][c],
+                    self.terms[4][c],
+                    self.terms[5][c],
+                    self.terms[6][c],
+                    self.terms[7][c],
+                ];
+                let rest = terms[1] * cs + terms[2] * sc + terms[3] * ss;
+                let even = terms[0] * both + rest;
+                let odd = terms[4] * cc + terms[5] * cs + terms[6] * sc + terms[7] * ss;
+                differences[i][c] = even + (terms[0] + even) * f1 + odd * s1;
+            }
         }
-        difference
+        differences
     }
 
-    /// Sine over length, and cosine less 1, of the j-th angle.
+    /// Sine over length, and cosine less 1, of the j-th angle at `-s` and at `s`.
     #[inline(always)]
-    fn turn(&self, j: usize, s: L) -> (L, L) {
+    fn turns(&self, j: usize, s: L) -> [(L, L); 2] {
         let [linear, quadratic, cubic] = [self.powers[0][j], self.powers[1][j], self.powers[2][j]];
-        let weight = ((cubic * s + quadratic) * s + linear) * s;
-        sine_and_fall(weight, self.squares[j] * (weight * weight))
+        let rise = cubic * s;
+        // The same as with -s, to the bit.
+        let before = -((linear - (quadratic - rise) * s) * s);
+        let after = ((rise + quadratic) * s + linear) * s;
+        [
+            sine_and_fall(before, self.squares[j] * (before * before)),
+            sine_and_fall(after, self.squares[j] * (after * after)),
+        ]
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use super::fit::{FitBlock, Samples, Tier};
+use super::fit::{FitBlock, Lane32, Samples, Tier};
 use super::intervals::LANES;
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::Expansion;
@@ -98,12 +98,8 @@ impl Shape {
 
 /// A way to sample the curves of a block.
 pub(super) trait Sampling: 'static {
-    fn sample<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        count: usize,
-        nodes: &Nodes<PAIRS>,
-        samples: &mut Samples<PAIRS>,
-    );
+    /// Samples so many and interpolates them.
+    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>);
 }
 
 /// Fits the curves of a block.
@@ -116,20 +112,11 @@ struct Fit<'a, S>(&'a mut FitBlock, PhantomData<S>);
 impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        match self.0.tier() {
-            Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
-            Tier::Full => self.fit::<L, _>(&FULL_NODES),
-        }
-    }
-}
-
-impl<S: Sampling> Fit<'_, S> {
-    #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
         let count = self.0.whole();
-        let mut samples = Samples::new();
-        S::sample::<L, PAIRS>(self.0, count, nodes, &mut samples);
-        self.0.interpolate::<L, PAIRS>(count, nodes, &samples);
+        match self.0.tier() {
+            Tier::Gentle => S::fit::<L, _>(self.0, count, &GENTLE_NODES),
+            Tier::Full => S::fit::<L, _>(self.0, count, &FULL_NODES),
+        }
     }
 }
 
@@ -138,13 +125,9 @@ struct Directly<F>(PhantomData<F>);
 
 impl<F: Formula> Sampling for Directly<F> {
     #[inline(always)]
-    fn sample<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        count: usize,
-        nodes: &Nodes<PAIRS>,
-        samples: &mut Samples<PAIRS>,
-    ) {
-        let Samples { middle, even, odd } = samples;
+    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>) {
+        let mut samples = Samples::all([0.0; LANES]);
+        let Samples { middle, even, odd } = &mut samples;
         let mut middles = [[0.0; LANES]; 4];
         let mut doubts = [0.0; LANES];
         for lane in 0..count {
@@ -175,8 +158,9 @@ impl<F: Formula> Sampling for Directly<F> {
             }
         }
         for lane in (0..count).filter(|&lane| doubts[lane].is_nan()) {
-            sample_anywhere::<F, PAIRS>(block, lane, nodes, samples);
+            sample_anywhere::<F, PAIRS>(block, lane, nodes, &mut samples);
         }
+        block.interpolate_all::<L, PAIRS>(count, nodes, &samples);
     }
 }
 
@@ -192,7 +176,7 @@ fn sample_anywhere<F: Formula, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
 ) {
     let numbers = block.numbers_of(lane);
     let between: Quaternion = F::rotation(&numbers, block.middles[lane]);

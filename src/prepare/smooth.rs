@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use super::fitting::{Fitting, Place};
+use super::fitting::{Fitting, new_segment, polynomials};
 use super::gentle_lanes::GentleLanes;
 use super::intervals::{Intervals, LANES, Stretch};
 use super::passes::{FramesHeld, Steps};
-use super::retime::Waiting;
+use super::retime::{Place, Waiting};
 use super::set::Prepare;
-use super::{NONE, Part, Prepared};
+use super::{NONE, Part, Prepared, Source};
 use crate::branchless::Vector;
 use crate::cpu::in_lanes;
 use crate::cycle::Outside;
@@ -147,10 +147,7 @@ impl Prepare for SmoothPreparation {
                     NONE
                 },
             });
-            for i in from..to {
-                let given = self.given(track, i, velocities.get(i - intervals.start..));
-                self.intervals.push(track, i, given);
-            }
+            self.push(track, from..to, velocities.get(from - intervals.start..));
             if context > 0 {
                 self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
             }
@@ -168,13 +165,25 @@ impl Prepare for SmoothPreparation {
 }
 
 impl SmoothPreparation {
+    /// Adds a lane of context.
     fn neighbour(&mut self, track: Track, interval: Option<usize>) {
         match interval {
-            Some(i) => {
-                let given = self.given(track, i, None);
-                self.intervals.push(track, i, given);
-            }
+            Some(i) => self.push(track, i..i + 1, None),
             None => self.intervals.push_nothing(),
+        }
+    }
+
+    /// Adds some intervals of a track; `velocities` start with that of the first one's
+    /// first key.
+    fn push(&mut self, track: Track, intervals: Range<usize>, velocities: Option<&[Vector]>) {
+        let first = self.intervals.count;
+        self.intervals.push(track, intervals.clone());
+        for (i, interval) in intervals.enumerate() {
+            let velocities = velocities.and_then(|all| all.get(i..));
+            let Some([outward, inward]) = self.given(track, interval, velocities) else {
+                break; // the method has none for any
+            };
+            self.intervals.set_given(first + i, outward, inward);
         }
     }
 
@@ -212,48 +221,77 @@ impl SmoothPreparation {
                 in_lanes(&mut held);
                 holds_frame = held.held;
             }
-            for (i, lane) in stretch.lanes().enumerate() {
-                let key = if stretch.key == NONE {
-                    NONE
-                } else {
-                    stretch.key + i as u32
-                };
-                let place = Place {
-                    part: stretch.part,
-                    start: self.intervals.starts[lane],
-                    end: self.intervals.ends[lane],
-                    key,
-                };
-                if self.interpolation.speed == Speed::Constant {
-                    let moves = !self.holds(&stretch, lane);
-                    let quantity = self.interpolation.quantity;
-                    let curve =
-                        moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
-                    self.waiting.push(place, curve);
-                } else if !holds_frame[lane] {
-                    self.fitting.push_constant(place, NONE);
-                } else if stretch.all == 1 && self.interpolation.is_steady_alone() {
-                    let keys = self.intervals.keys(lane);
-                    self.fitting.push_steady(prepared, place, keys);
-                } else if let Some(gentle) = self.gentle.as_ref().filter(|all| all.holds(lane)) {
-                    let segment = self.fitting.push_segment(prepared, place);
-                    gentle.write(lane, segment);
-                } else if !self.holds(&stretch, lane) {
-                    self.fitting.push(prepared, place, &self.intervals, lane);
-                } else if key == NONE {
-                    let stored = match self.interpolation.quantity {
-                        Quantity::Rotation => self.intervals.keys(lane)[0],
-                        _ => STILL,
-                    };
-                    let constant = prepared.constant(stored);
-                    self.fitting.push_constant(place, constant);
-                } else {
-                    self.fitting.push_constant(place, key);
-                }
+            if self.interpolation.speed == Speed::Constant {
+                self.wait(&stretch);
+            } else {
+                self.push_spans(prepared, &stretch, &holds_frame);
             }
         }
+        self.fitting.bring(prepared, &self.intervals);
         self.intervals.count = 0;
         Ok(())
+    }
+
+    /// Lets a stretch wait until all of its track is there.
+    fn wait(&mut self, stretch: &Stretch) {
+        for (i, lane) in stretch.lanes().enumerate() {
+            let place = Place {
+                part: stretch.part,
+                start: self.intervals.starts[lane],
+                key: stretch.key_at(i),
+            };
+            let quantity = self.interpolation.quantity;
+            let moves = !self.holds(stretch, lane);
+            let curve = moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
+            self.waiting.push(place, curve);
+        }
+    }
+
+    /// Makes the intervals of a stretch into spans.
+    fn push_spans(
+        &mut self,
+        prepared: &mut Prepared,
+        stretch: &Stretch,
+        holds_frame: &[bool; LANES],
+    ) {
+        let first_span = prepared.spans.len();
+        let starts = &self.intervals.starts[stretch.lanes()];
+        prepared.spans.starts.extend_from_slice(starts);
+        let keys = (0..starts.len()).map(|i| stretch.key_at(i));
+        prepared.spans.keys.extend(keys);
+        let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
+        for (i, lane) in stretch.lanes().enumerate() {
+            let source = if !holds_frame[lane] {
+                Source::Constant(NONE)
+            } else if is_steady {
+                let keys = self.intervals.keys(lane);
+                self.fitting.take_steady(prepared, keys)
+            } else if let Some(gentle) = self.gentle.as_ref().filter(|all| all.holds(lane)) {
+                let (source, place) = new_segment(prepared);
+                gentle.write(lane, &mut polynomials(prepared)[place]);
+                source
+            } else if !self.holds(stretch, lane) {
+                self.fitting.take(prepared, &self.intervals, lane)
+            } else if stretch.key != NONE {
+                Source::Constant(stretch.key_at(i))
+            } else {
+                Source::Constant(prepared.constant(match self.interpolation.quantity {
+                    Quantity::Rotation => self.intervals.keys(lane)[0],
+                    _ => STILL,
+                }))
+            };
+            if let Source::Constant(_) = source {
+                prepared.spans.keys[first_span + i] = NONE;
+            }
+            prepared.spans.sources.push(source);
+        }
+        let spans = &mut prepared.parts[stretch.part].spans;
+        let start = if spans.start == spans.end {
+            first_span
+        } else {
+            spans.start
+        };
+        *spans = start..first_span + stretch.intervals.len();
     }
 
     /// Makes the intervals that wait into curves, in f64 only where there are others than
