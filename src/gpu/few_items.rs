@@ -3,14 +3,13 @@
 
 use rayon::prelude::*;
 
-use super::work_list::{Patch, Work, parts_in, parts_per_chunk};
+use super::work_list::{Patch, Work, item, parts_in, parts_per_chunk};
 use crate::clock::{Ticks, Timeline};
 use crate::cpu::{FEW, InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
 use crate::prepare::{ClipData, Part, Prepared};
 use crate::schedule::{Distance, Run, RunSource};
 use crate::segment::Item;
-use crate::segment::shader::HOLD;
 use crate::window::Window;
 
 /// A window, each sample of which is one item.
@@ -125,43 +124,26 @@ impl InLanes for Piece<'_> {
             let own = &times[track * stride..];
             for sample in window.samples.clone() {
                 let source = match self.prepared.source_at(part, own[sample]) {
+                    Some(source) => source,
                     None => source_outside(self.prepared, part, own, sample),
-                    source => source,
                 };
-                let mut item = Item {
-                    source: 0,
-                    output: window.place(track, sample) as u32 + shift,
-                    count: HOLD, // nothing
-                    first,
-                    scale: 0.0,
-                    offset: 0.0,
-                };
+                let place = window.place(track, sample);
                 let mut from_middle = 0.0;
                 match source {
-                    Some(RunSource::Constant(source)) => {
-                        (item.source, item.count) = (source, 1 | HOLD);
-                    }
-                    Some(RunSource::Segment {
-                        index,
+                    RunSource::Segment {
                         distance: Distance::Seconds { middle },
-                        scale,
-                        offset,
-                    }) => {
-                        (item.source, item.count) = (index, 1);
-                        (item.scale, item.offset) = (scale, offset);
-                        from_middle = round_f32(own[sample] - middle);
-                    }
-                    Some(RunSource::Exact { index, parameter }) => {
-                        let timeline = self.all.timeline;
-                        let exact = self
-                            .prepared
-                            .exact(index, parameter, timeline, track, sample);
-                        self.patches.push((window.place(track, sample), exact));
+                        ..
+                    } => from_middle = round_f32(own[sample] - middle),
+                    RunSource::Exact { index, parameter } => {
+                        let Self { all, prepared, .. } = self;
+                        let exact = prepared.exact(index, parameter, all.timeline, track, sample);
+                        self.patches.push((place, exact));
                     }
                     _ => {}
                 }
                 if let Some((own_item, own_distance)) = places.next() {
-                    (*own_item, *own_distance) = (item, from_middle);
+                    *own_item = item(source, place as u32 + shift, 1, first);
+                    *own_distance = from_middle;
                 }
                 first += 1;
             }
@@ -172,14 +154,10 @@ impl InLanes for Piece<'_> {
 /// What gives a sample of a part where that takes more than to look. Apart, so that what is
 /// usual stays small.
 #[inline(never)]
-fn source_outside(
-    prepared: &Prepared,
-    part: &Part,
-    times: &[f64],
-    sample: usize,
-) -> Option<RunSource> {
-    let mut source = None;
-    let mut found = |run: Run| source = Some(run.source);
+fn source_outside(prepared: &Prepared, part: &Part, times: &[f64], sample: usize) -> RunSource {
+    // Replaced: every time lies somewhere in a whole track, or outside.
+    let mut source = RunSource::Constant(0);
+    let mut found = |run: Run| source = run.source;
     prepared.time_runs(part, times, sample..sample + 1, &mut found);
     source
 }

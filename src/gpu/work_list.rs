@@ -174,22 +174,13 @@ impl Emit for List<'_> {
         let chunk = &mut *self.chunk;
         let output = |sample| window.place(track, sample) as u32 + shift;
         let samples = run.sample..run.sample + run.count;
-        let (source, hold, scale, offset) = match run.source {
-            RunSource::Constant(source) => (source, HOLD, 0.0, 0.0),
-            RunSource::Segment {
-                index,
-                scale,
-                offset,
-                ..
-            } => (index, 0, scale, offset),
-            RunSource::Exact { index, parameter } => {
-                chunk.patches.extend(samples.map(|sample| {
-                    let value = prepared.exact(index, parameter, timeline, track, sample);
-                    (window.place(track, sample), value)
-                }));
-                return;
-            }
-        };
+        if let RunSource::Exact { index, parameter } = run.source {
+            chunk.patches.extend(samples.map(|sample| {
+                let value = prepared.exact(index, parameter, timeline, track, sample);
+                (window.place(track, sample), value)
+            }));
+            return;
+        }
         let mut first = 0;
         if let RunSource::Segment { distance, .. } = run.source {
             first = match distance {
@@ -204,14 +195,32 @@ impl Emit for List<'_> {
         }
         for done in (0..run.count).step_by(ITEM_SAMPLES as usize) {
             let count = (run.count - done).min(ITEM_SAMPLES as usize) as u32;
-            chunk.items.push(Item {
-                source,
-                output: output(run.sample + done),
-                count: count | hold,
-                first: first.wrapping_add(done as i32),
-                scale,
-                offset,
-            });
+            let first = first.wrapping_add(done as i32);
+            let output = output(run.sample + done);
+            chunk.items.push(item(run.source, output, count, first));
         }
+    }
+}
+
+/// The item of so many samples; of what the host evaluates it stores nothing.
+#[inline(always)]
+pub(super) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
+    let (source, count, scale, offset) = match source {
+        RunSource::Constant(source) => (source, count | HOLD, 0.0, 0.0),
+        RunSource::Segment {
+            index,
+            scale,
+            offset,
+            ..
+        } => (index, count, scale, offset),
+        RunSource::Exact { .. } => (0, HOLD, 0.0, 0.0),
+    };
+    Item {
+        source,
+        output,
+        count,
+        first,
+        scale,
+        offset,
     }
 }
