@@ -8,10 +8,35 @@
 mod near;
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
+use std::ops::{Add, Mul, Sub};
 
-pub(crate) use near::{Algebra, Anywhere, Near, near_arc_square, near_waves};
+pub(crate) use near::{
+    Algebra, Anywhere, LONG_SQUARE, Near, SHORT_SQUARE, long_waves, near_arc_square, near_waves,
+    short_waves,
+};
 
 use crate::numeric::nearest_whole;
+
+/// What sums and products are made of, be it a number or a vector of them.
+pub(crate) trait Arithmetic:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+}
+
+impl<N> Arithmetic for N where N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N> {}
+
+/// f64, or a vector of them.
+pub(crate) trait Real: Arithmetic {
+    /// The same in every lane.
+    fn all(value: f64) -> Self;
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        value
+    }
+}
 
 /// `x y z w`.
 pub(crate) type Quaternion = [f64; 4];
@@ -32,7 +57,7 @@ pub(crate) fn length(v: Vector) -> f64 {
 
 /// `k v`.
 #[inline(always)]
-pub(crate) fn scaled(v: Vector, k: f64) -> Vector {
+pub(crate) fn scaled<N: Arithmetic>(v: [N; 3], k: N) -> [N; 3] {
     [v[0] * k, v[1] * k, v[2] * k]
 }
 
@@ -52,7 +77,7 @@ pub(crate) fn ratio(a: f64, b: f64) -> f64 {
 
 /// The Hamilton product `a b`.
 #[inline(always)]
-pub(crate) fn product(a: Quaternion, b: Quaternion) -> Quaternion {
+pub(crate) fn product<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     [
         a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
         a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],

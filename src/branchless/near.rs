@@ -3,7 +3,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Quaternion, Vector, exp, log, log_near, log_toward, scaled};
+use super::{Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled};
 
 /// The exponentials and logarithms that a method's rule is made of. Two of them:
 /// [`Near`] for vector lanes, and [`Anywhere`] for the lanes where it does not hold,
@@ -76,6 +76,27 @@ const COSINE: [f64; 8] = [
     4.6276759850181716e-14,
 ];
 
+/// As [`SINC`] and [`COSINE`] for x² up to [`SHORT_SQUARE`], within 3e-12: for what is
+/// rounded to f32.
+const SHORT_SINC: [f64; 4] = [
+    -0.16666666666590457,
+    0.008333333235781787,
+    -0.00019841074685369954,
+    2.743233430893218e-06,
+];
+const SHORT_COSINE: [f64; 4] = [
+    -0.499999999991622,
+    0.04166666559421515,
+    -0.0013888674329962797,
+    2.466415894289239e-05,
+];
+
+/// The largest square of an angle that [`short_waves`] takes.
+pub(crate) const SHORT_SQUARE: f64 = 0.25;
+
+/// The largest square of an angle that [`long_waves`] takes.
+pub(crate) const LONG_SQUARE: f64 = FRAC_PI_2 * FRAC_PI_2;
+
 /// Coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), 0 <= u <= 1;
 /// from Chebyshev nodes, within 2e-13.
 const ANGLE_BY_SINE: [f64; 16] = [
@@ -121,16 +142,16 @@ const ARC_SQUARE: [f64; 16] = [
 /// `1 + x (c₀ + c₁ x + …)`, four coefficients at a time: a chain of a quarter as many
 /// operations. Their number is a multiple of four.
 #[inline(always)]
-fn one_plus<const N: usize>(c: &[f64; N], x: f64) -> f64 {
+fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
     let square = x * x;
     let fourth = square * square;
-    let mut sum = 0.0;
+    let mut sum = R::all(0.0);
     for i in (0..N / 4).rev() {
-        let low = c[4 * i + 1] * x + c[4 * i];
-        let high = c[4 * i + 3] * x + c[4 * i + 2];
+        let low = R::all(c[4 * i + 1]) * x + R::all(c[4 * i]);
+        let high = R::all(c[4 * i + 3]) * x + R::all(c[4 * i + 2]);
         sum = sum * fourth + (high * square + low);
     }
-    sum * x + 1.0
+    sum * x + R::all(1.0)
 }
 
 /// `x / sin(x)` for `u = 1 - cos(x)`, 0 <= x <= pi/2: an angle from its sine without
@@ -140,11 +161,26 @@ fn angle_by_sine(u: f64) -> f64 {
     one_plus(&ANGLE_BY_SINE, u)
 }
 
+/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`LONG_SQUARE`]; within 1e-14.
+#[inline(always)]
+pub(crate) fn long_waves<R: Real>(square: R) -> (R, R) {
+    (one_plus(&SINC, square), one_plus(&COSINE, square))
+}
+
+/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`SHORT_SQUARE`]; within 3e-12.
+#[inline(always)]
+pub(crate) fn short_waves<R: Real>(square: R) -> (R, R) {
+    (
+        one_plus(&SHORT_SINC, square),
+        one_plus(&SHORT_COSINE, square),
+    )
+}
+
 /// `sin(x)/x` and `cos(x)` by `x²`, which is at most (pi/2)²; else NaN.
 #[inline(always)]
 pub(crate) fn near_waves(square: f64) -> (f64, f64) {
-    let doubt = near_or_nan(square, FRAC_PI_2 * FRAC_PI_2);
-    let (sinc, cosine) = (one_plus(&SINC, square), one_plus(&COSINE, square));
+    let doubt = near_or_nan(square, LONG_SQUARE);
+    let (sinc, cosine) = long_waves(square);
     (sinc + doubt, cosine + doubt)
 }
 
@@ -177,9 +213,8 @@ impl Algebra for Near {
     #[inline(always)]
     fn exp(&mut self, a: Vector) -> Quaternion {
         let z = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
-        self.check(z, FRAC_PI_2 * FRAC_PI_2);
-        let sinc = one_plus(&SINC, z);
-        let cosine = one_plus(&COSINE, z);
+        self.check(z, LONG_SQUARE);
+        let (sinc, cosine) = long_waves(z);
         [sinc * a[0], sinc * a[1], sinc * a[2], cosine]
     }
 
@@ -234,6 +269,18 @@ mod tests {
 
     fn v_of(x: f64) -> f64 {
         libm::sin(x / 2.0) * libm::sin(x / 2.0)
+    }
+
+    /// Catches a wrong digit in a polynomial.
+    #[test]
+    fn short_waves_are_those_of_libm() {
+        for i in 0..=5_000 {
+            let x = f64::from(i) * 1e-4;
+            let (sinc, cosine) = short_waves(x * x);
+            assert!((sinc * x - libm::sin(x)).abs() < 3e-12, "{x}");
+            assert!((cosine - libm::cos(x)).abs() < 3e-12, "{x}");
+        }
+        assert_eq!(SHORT_SQUARE, 0.5 * 0.5);
     }
 
     /// Catches a wrong digit in a polynomial, and one used beyond its range.

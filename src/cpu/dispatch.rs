@@ -3,6 +3,7 @@
 //! subtraction and multiplication are used, never a fused one.
 #![allow(unsafe_code)]
 
+mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod eight;
 
@@ -11,6 +12,7 @@ use std::sync::OnceLock;
 
 use glam::Vec4;
 
+pub(crate) use doubles::Four;
 #[cfg(target_arch = "x86_64")]
 use eight::Eight;
 

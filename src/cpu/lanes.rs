@@ -1,15 +1,15 @@
 //! What the twins compute with: the number of one sample, or those of several in one vector.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::Neg;
 
 use glam::{Mat4, Vec4};
 
+use super::dispatch::Four;
+use crate::branchless::{Arithmetic, Real};
 use crate::segment::shader::TINY_BITS;
 
 /// A number of one sample, or of several. Whatever it is of, an operation rounds alike.
-pub(crate) trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
-{
+pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The same for every sample.
     fn all(value: f32) -> Self;
 
@@ -39,6 +39,12 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 pub(crate) trait Lanes: Number {
     /// How many.
     const COUNT: usize;
+
+    /// As many in f64.
+    type Doubles: Doubles;
+
+    /// Rounded to f32.
+    fn rounded(numbers: Self::Doubles) -> Self;
 
     /// Of [`Lanes::COUNT`] samples.
     fn load(samples: &[f32]) -> Self;
@@ -73,6 +79,21 @@ pub(crate) trait Lanes: Number {
     fn any_within(self, limit: f32) -> bool;
 }
 
+/// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
+pub(crate) trait Doubles: Real {
+    /// Of the first so many numbers.
+    fn load(numbers: &[f64]) -> Self;
+
+    /// To the first so many numbers.
+    fn store(self, numbers: &mut [f64]);
+
+    /// The larger of two numbers; `other` where one of them is none.
+    fn larger(self, other: Self) -> Self;
+
+    /// Whether each is a number, and not more than `limit`.
+    fn are_at_most(self, limit: f64) -> bool;
+}
+
 impl Number for Vec4 {
     #[inline(always)]
     fn all(value: f32) -> Self {
@@ -88,6 +109,13 @@ impl Number for Vec4 {
 
 impl Lanes for Vec4 {
     const COUNT: usize = 4;
+
+    type Doubles = Four;
+
+    #[inline(always)]
+    fn rounded(numbers: Four) -> Self {
+        numbers.rounded()
+    }
 
     #[inline(always)]
     fn load(samples: &[f32]) -> Self {

@@ -27,7 +27,7 @@ pub(crate) fn sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
 
 /// The same for |a| <= pi/4.
 #[inline(always)]
-pub(super) fn short_sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
+pub(crate) fn short_sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
     let zz = z * z;
     let sine_low = N::all(SHORT_SINE_5) * z + N::all(SHORT_SINE_3);
     let sine_tail = N::all(SHORT_SINE_7) * zz + sine_low;

@@ -73,7 +73,7 @@ impl Cutter {
     /// Cuts the curves given.
     pub(super) fn cut(&mut self) {
         while !self.waiting.is_empty() {
-            let new = || Box::new(FitBlock::new(self.shape, self.quantity, Tier::Full));
+            let new = || Box::new(FitBlock::new(self.shape, self.quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);
             block.clear();
             let first = self.waiting.len().saturating_sub(LANES);

@@ -31,6 +31,8 @@ pub(super) enum Tier {
     Gentle,
     /// Degree 10.
     Full,
+    /// The same, for pieces of curves that may turn any distance.
+    Piece,
 }
 
 /// Sums of the three half-rotation vectors' squares below this are fitted within 2e-8
@@ -44,21 +46,23 @@ const LONGEST_WHOLE: f64 = 0.2;
 /// Chebyshev coefficients.
 const TOLERANCE: f32 = 1.5e-7;
 
-/// How far the angles may go from the middle: the polynomials of sine and cosine
-/// hold to pi/2.
+/// How far the angles may go from the middle of a piece, and of a whole curve: the
+/// polynomials of sine and cosine hold to pi/2 and to pi/4.
 const REACH: f64 = 1.57;
+const SHORT_REACH: f64 = 0.785;
 
 pub(super) type Lane64 = [f64; LANES];
 pub(super) type Lane32 = [f32; LANES];
 
-/// What to make of a curve with that sum of squares; nothing where it is to be cut
-/// untried.
-pub(super) fn tier(energy: f64) -> Option<Tier> {
+/// How to fit a curve with that sum of squares; pieces of it where it is to be cut untried.
+pub(super) fn tier(energy: f64) -> Tier {
     if energy <= GENTLE {
-        Some(Tier::Gentle)
+        Tier::Gentle
+    } else if energy <= LONGEST_WHOLE {
+        Tier::Full
     } else {
-        // NaN is cut until nothing is left of it.
-        (energy <= LONGEST_WHOLE).then_some(Tier::Full)
+        // Also NaN, which is cut until nothing is left of it.
+        Tier::Piece
     }
 }
 
@@ -257,7 +261,11 @@ impl FitBlock {
 
     /// Whether the polynomial of a lane is near enough to its curve.
     pub(super) fn fits(&self, lane: usize) -> bool {
-        let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= REACH * REACH;
+        let reach = match self.tier {
+            Tier::Gentle | Tier::Full => SHORT_REACH,
+            Tier::Piece => REACH,
+        };
+        let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= reach * reach;
         is_near && self.coefficients[0][lane].iter().all(|c| c.is_finite())
     }
 

@@ -74,9 +74,9 @@ impl Fitting {
     ) -> Source {
         let span = prepared.spans.sources.len();
         let queue = match tier(curves.energies[lane]) {
-            Some(Tier::Gentle) => &mut self.gentle,
-            Some(Tier::Full) => &mut self.full,
-            None => {
+            Tier::Gentle => &mut self.gentle,
+            Tier::Full => &mut self.full,
+            Tier::Piece => {
                 self.cutter
                     .push(span, curves.curve(lane, self.shape, self.quantity));
                 return UNTRIED;

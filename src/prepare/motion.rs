@@ -53,7 +53,7 @@ impl InLanes for Fit<'_> {
     fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
             Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
-            Tier::Full => self.fit::<L, _>(&FULL_NODES),
+            Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
         }
     }
 }

@@ -1,27 +1,14 @@
 //! Samples of cubics, in vector lanes: the first half of a fit.
-// Loops over lanes index many arrays at once.
-#![allow(clippy::needless_range_loop)]
 
-use super::fit::{FitBlock, Lane32, Lane64, Samples};
-use super::intervals::LANES;
+use super::fit::{FitBlock, Lane64, Samples, Tier};
 use super::nodes::Nodes;
 use super::shape::Sampling;
-use crate::branchless::{self, Algebra, Near, product, scaled};
-use crate::cpu::{Lanes, Number, sine_and_fall};
-use crate::formula::Product;
-
-/// Cubics about the middle of their pieces: `q = q_0 exp(v_1 B_1) exp(v_2 B_2) exp(v_3 B_3)`.
-pub(super) struct Middles {
-    /// What the rotations before each vector, and behind the last, have made of it there.
-    bases: [[Lane32; 4]; 3],
-    /// The rotations by the second and by the third vector alone.
-    turns: [[Lane32; 4]; 2],
-    vectors: [[Lane32; 3]; 3],
-    /// The squares of the three vectors' lengths.
-    squares: [Lane32; 3],
-    /// Coefficients of s, s² and s³ in the three basis functions.
-    powers: [[Lane32; 3]; 3],
-}
+use crate::branchless::{
+    self, Arithmetic, LONG_SQUARE, Real as _, SHORT_SQUARE, long_waves, product, scaled,
+    short_waves,
+};
+use crate::cpu::{Doubles, Lanes, Number, short_sine_and_fall, sine_and_fall};
+use crate::formula::{Numbers, Product};
 
 /// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
 pub(super) struct Expansion<const OWN_BASIS: bool>;
@@ -29,121 +16,159 @@ pub(super) struct Expansion<const OWN_BASIS: bool>;
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
     #[inline(always)]
     fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>) {
-        let lane = [0.0; LANES];
-        let mut middles = Middles {
-            bases: [[lane; 4]; 3],
-            turns: [[lane; 4]; 2],
-            vectors: [[lane; 3]; 3],
-            squares: [lane; 3],
-            powers: [[lane; 3]; 3],
-        };
-        block.at_middles::<OWN_BASIS>(count, &mut middles);
-        for lane in (0..count).step_by(L::COUNT) {
-            let samples = Expanded::<L>::new(&middles, lane).sample(nodes);
-            block.interpolate(lane, nodes, &samples);
+        match block.tier() {
+            Tier::Gentle | Tier::Full => fit::<L, PAIRS, OWN_BASIS, true>(block, count, nodes),
+            Tier::Piece => fit::<L, PAIRS, OWN_BASIS, false>(block, count, nodes),
         }
     }
 }
 
-impl FitBlock {
-    #[inline(always)]
-    fn at_middles<const OWN_BASIS: bool>(&mut self, count: usize, found: &mut Middles) {
-        let Middles {
-            bases,
-            turns,
-            vectors,
-            squares,
-            powers,
-        } = found;
-        let mut reaches = [0.0; LANES];
-        // What each rotation has reached at the middle.
-        let mut reached = [[[0.0; LANES]; 4]; 3];
-        let (base, rest) = self.numbers.split_at(Product::VECTORS);
-        for j in 0..3 {
-            let mut holds = [0.0; LANES];
-            let [vx, vy, vz] = &rest[3 * j..][..3] else {
-                unreachable!("three of them")
-            };
-            let place = Product::BASIS + 4 * j;
-            // A copy: what is written below could be what a reference shows.
-            let shared: [f64; 4] = std::array::from_fn(|c| self.shape.shared[place + c]);
-            let own = self.numbers.get(place..place + 4).unwrap_or_default();
-            let at = |lane: usize| match OWN_BASIS {
-                true => [own[0][lane], own[1][lane], own[2][lane], own[3][lane]],
-                false => shared,
-            };
-            for lane in 0..count {
-                let [c0, c1, c2, c3] = at(lane);
-                let (middle, width) = (self.middles[lane], self.widths[lane]);
-                let [x, y, z] = [vx[lane], vy[lane], vz[lane]];
-                let square = x * x + y * y + z * z;
-                let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
-                let mut near = Near::new();
-                let turn = near.exp(scaled([x, y, z], weight));
-                holds[lane] = near.holds;
-                for c in 0..4 {
-                    reached[j][c][lane] = turn[c];
-                }
-                // B_j(middle + s width) - B_j(middle), in powers of s.
-                let linear = ((3.0 * c3 * middle + 2.0 * c2) * middle + c1) * width;
-                let quadratic = (3.0 * c3 * middle + c2) * width * width;
-                let cubic = c3 * width * width * width;
-                squares[j][lane] = square as f32;
-                powers[0][j][lane] = linear as f32;
-                powers[1][j][lane] = quadratic as f32;
-                powers[2][j][lane] = cubic as f32;
-                // At s = 1/2 and at -1/2, the farther.
-                let far = (linear + 0.25 * cubic).abs() * 0.5 + quadratic.abs() * 0.25;
-                let (far, reach) = (square * (far * far), reaches[lane]);
-                reaches[lane] = if far > reach { far } else { reach };
-            }
-            for lane in (0..count).filter(|&lane| holds[lane] == 0.0) {
-                let middle = self.middles[lane];
-                let [c0, c1, c2, c3] = at(lane);
-                let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
-                let turn = branchless::exp(scaled([vx[lane], vy[lane], vz[lane]], weight));
-                for c in 0..4 {
-                    reached[j][c][lane] = turn[c];
-                }
-            }
-        }
-        self.reaches = reaches;
-        for lane in 0..count {
-            let turn = |j: usize| {
-                let [x, y, z, w]: &[Lane64; 4] = &reached[j];
-                [x[lane], y[lane], z[lane], w[lane]]
-            };
-            let start = [base[0][lane], base[1][lane], base[2][lane], base[3][lane]];
-            let first = product(start, turn(0));
-            let second = product(first, turn(1));
-            let third = product(second, turn(2));
-            for c in 0..4 {
-                bases[0][c][lane] = first[c] as f32;
-                bases[1][c][lane] = second[c] as f32;
-                bases[2][c][lane] = third[c] as f32;
-                turns[0][c][lane] = reached[1][c][lane] as f32;
-                turns[1][c][lane] = reached[2][c][lane] as f32;
-            }
-        }
-        for j in 0..3 {
-            for c in 0..3 {
-                for lane in 0..count {
-                    vectors[j][c][lane] = rest[3 * j + c][lane] as f32;
-                }
-            }
-        }
-    }
-}
-
-/// The Hamilton product `a b` in f32.
 #[inline(always)]
-fn product32<N: Number>(a: [N; 4], b: [N; 4]) -> [N; 4] {
-    [
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-    ]
+fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
+    block: &mut FitBlock,
+    count: usize,
+    nodes: &Nodes<PAIRS>,
+) {
+    // A copy: what is written below could be what a reference shows.
+    let shared = block.shape.shared;
+    for lane in (0..count).step_by(L::COUNT) {
+        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
+        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 1);
+        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
+        let reach = third.reach.larger(second.reach.larger(first.reach));
+        reach.store(&mut block.reaches[lane..]);
+        let base = load4::<L>(&block.numbers, 0, lane);
+        let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
+        block.interpolate(lane, nodes, &samples);
+    }
+}
+
+/// One of the three rotations of a cubic about the middle of its piece,
+/// `q = q_0 exp(v_1 B_1) exp(v_2 B_2) exp(v_3 B_3)`, a lane to each cubic.
+struct Factor<L: Lanes> {
+    /// The rotation at the middle.
+    turn: [L::Doubles; 4],
+    vector: [L; 3],
+    /// The square of the vector's length.
+    square: L,
+    /// Coefficients of s, s² and s³ in what the basis function has more than at the middle.
+    powers: [L; 3],
+    /// The square of the farthest angle from the middle.
+    reach: L::Doubles,
+}
+
+impl<L: Lanes> Factor<L> {
+    /// The `j`th of the cubics from `lane` on.
+    #[inline(always)]
+    fn new<const OWN_BASIS: bool, const WHOLE: bool>(
+        block: &FitBlock,
+        shared: &Numbers,
+        lane: usize,
+        j: usize,
+    ) -> Self {
+        let place = Product::BASIS + 4 * j;
+        let [c0, c1, c2, c3] = if OWN_BASIS {
+            load4::<L>(&block.numbers, place, lane)
+        } else {
+            [
+                all::<L>(shared[place]),
+                all::<L>(shared[place + 1]),
+                all::<L>(shared[place + 2]),
+                all::<L>(shared[place + 3]),
+            ]
+        };
+        let (middle, width) = if WHOLE {
+            (all::<L>(0.5), all::<L>(1.0))
+        } else {
+            (
+                load::<L>(&block.middles, lane),
+                load::<L>(&block.widths, lane),
+            )
+        };
+        let vector = load3::<L>(&block.numbers, Product::VECTORS + 3 * j, lane);
+        let square = square_of(vector);
+        let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
+        // B_j(middle + s width) - B_j(middle), in powers of s.
+        let two = all::<L>(2.0);
+        let three = all::<L>(3.0);
+        let linear = ((three * c3 * middle + two * c2) * middle + c1) * width;
+        let quadratic = (three * c3 * middle + c2) * width * width;
+        let cubic = c3 * width * width * width;
+        // At s = 1/2 and at -1/2, the farther.
+        let odd = (linear + all::<L>(0.25) * cubic) * all::<L>(0.5);
+        let even = quadratic * all::<L>(0.25);
+        let (before, after) = (odd - even, odd + even);
+        let far = (before * before).larger(after * after);
+        Self {
+            turn: exp::<L::Doubles, WHOLE>(scaled(vector, weight)),
+            vector: [
+                L::rounded(vector[0]),
+                L::rounded(vector[1]),
+                L::rounded(vector[2]),
+            ],
+            square: L::rounded(square),
+            powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
+            reach: square * far,
+        }
+    }
+}
+
+/// The exponentials of half-rotation vectors; fastest where all are short.
+#[inline(always)]
+fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
+    let square = square_of(vector);
+    let (limit, (sinc, cosine)) = if SHORT {
+        (SHORT_SQUARE, short_waves(square))
+    } else {
+        (LONG_SQUARE, long_waves(square))
+    };
+    let [x, y, z] = scaled(vector, sinc);
+    let turn = [x, y, z, cosine];
+    if square.are_at_most(limit) {
+        return turn;
+    }
+    let mut lanes = Turns::default();
+    for c in 0..3 {
+        vector[c].store(&mut lanes.vectors[c]);
+    }
+    for c in 0..4 {
+        turn[c].store(&mut lanes.turns[c]);
+    }
+    lanes.beyond(limit);
+    let [x, y, z, w] = &lanes.turns;
+    [D::load(x), D::load(y), D::load(z), D::load(w)]
+}
+
+/// The most lanes that a vector has.
+const MOST: usize = 8;
+
+/// Half-rotation vectors and their exponentials.
+#[derive(Default)]
+struct Turns {
+    vectors: [[f64; MOST]; 3],
+    turns: [[f64; MOST]; 4],
+}
+
+impl Turns {
+    /// Those of squares that are not within `limit`, by what holds anywhere.
+    #[inline(never)]
+    fn beyond(&mut self, limit: f64) {
+        for lane in 0..MOST {
+            let vector = self.vectors.map(|lanes| lanes[lane]);
+            // NaN is none.
+            if !(square_of(vector) <= limit) {
+                let turn = branchless::exp(vector);
+                for c in 0..4 {
+                    self.turns[c][lane] = turn[c];
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn square_of<N: Arithmetic>([x, y, z]: [N; 3]) -> N {
+    x * x + y * y + z * z
 }
 
 /// `a v`, `v` a vector.
@@ -167,53 +192,46 @@ struct Expanded<L> {
 }
 
 impl<L: Lanes> Expanded<L> {
-    /// The cubics from `lane` on.
     #[inline(always)]
-    fn new(middles: &Middles, lane: usize) -> Self {
-        let Middles {
-            bases,
-            turns,
-            vectors,
-            squares,
-            powers,
-        } = middles;
-        // Written out: closures are not always inlined.
-        let (r2, r3) = (load4(&turns[0], lane), load4(&turns[1], lane));
-        let v1: [L; 3] = load3(&vectors[0], lane);
-        let (v2, v3) = (load3(&vectors[1], lane), load3(&vectors[2], lane));
-        let third = load4(&bases[2], lane);
-        let second = product32(about(load4(&bases[1], lane), v2), r3);
-        let first = product32(about(load4(&bases[0], lane), v1), r2);
-        let first_second = product32(about(first, v2), r3);
-        let first = product32(first, r3);
+    fn new(base: [L::Doubles; 4], [first, second, third]: [Factor<L>; 3]) -> Self {
+        // What the rotations so far have made of it.
+        let base1 = product(base, first.turn);
+        let base2 = product(base1, second.turn);
+        let base3 = product(base2, third.turn);
+        let (r2, r3) = (rounded::<L>(second.turn), rounded::<L>(third.turn));
+        let (v1, v2, v3) = (first.vector, second.vector, third.vector);
+        let of_none = rounded::<L>(base3);
+        let of_second = product(about(rounded::<L>(base2), v2), r3);
+        let to_second = product(about(rounded::<L>(base1), v1), r2);
+        let of_both = product(about(to_second, v2), r3);
+        let of_first = product(to_second, r3);
         Self {
             terms: [
-                third,
-                about(third, v3),
-                second,
-                about(second, v3),
-                first,
-                about(first, v3),
-                first_second,
-                about(first_second, v3),
+                of_none,
+                about(of_none, v3),
+                of_second,
+                about(of_second, v3),
+                of_first,
+                about(of_first, v3),
+                of_both,
+                about(of_both, v3),
             ],
-            squares: load3(squares, lane),
-            powers: [
-                load3(&powers[0], lane),
-                load3(&powers[1], lane),
-                load3(&powers[2], lane),
-            ],
+            squares: [first.square, second.square, third.square],
+            powers: [first.powers, second.powers, third.powers],
         }
     }
 
     /// Samples them at every node.
     #[inline(always)]
-    fn sample<const PAIRS: usize>(&self, nodes: &Nodes<PAIRS>) -> Samples<L, PAIRS> {
+    fn sample<const PAIRS: usize, const SHORT: bool>(
+        &self,
+        nodes: &Nodes<PAIRS>,
+    ) -> Samples<L, PAIRS> {
         let half = L::all(0.5);
         let mut samples = Samples::all(L::all(0.0));
         samples.middle = self.terms[0];
         for k in 0..PAIRS {
-            let [before, after] = self.differences(L::all(nodes.at[k]));
+            let [before, after] = self.differences::<SHORT>(L::all(nodes.at[k]));
             for c in 0..4 {
                 samples.even[k][c] = (after[c] + before[c]) * half;
                 samples.odd[k][c] = (after[c] - before[c]) * half;
@@ -224,10 +242,10 @@ impl<L: Lanes> Expanded<L> {
 
     /// `q(-s) - q(0)` and `q(s) - q(0)`, side by side: each is a long chain.
     #[inline(always)]
-    fn differences(&self, s: L) -> [[L; 4]; 2] {
-        let first = self.turns(0, s);
-        let second = self.turns(1, s);
-        let third = self.turns(2, s);
+    fn differences<const SHORT: bool>(&self, s: L) -> [[L; 4]; 2] {
+        let first = self.turns::<SHORT>(0, s);
+        let second = self.turns::<SHORT>(1, s);
+        let third = self.turns::<SHORT>(2, s);
         let mut differences = [self.terms[0]; 2];
         for i in 0..2 {
             let ((s1, f1), (s2, f2), (s3, f3)) = (first[i], second[i], third[i]);
@@ -259,34 +277,53 @@ impl<L: Lanes> Expanded<L> {
 
     /// Sine over length, and cosine less 1, of the j-th angle at `-s` and at `s`.
     #[inline(always)]
-    fn turns(&self, j: usize, s: L) -> [(L, L); 2] {
-        let [linear, quadratic, cubic] = [self.powers[0][j], self.powers[1][j], self.powers[2][j]];
+    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> [(L, L); 2] {
+        let [linear, quadratic, cubic] = self.powers[j];
         let rise = cubic * s;
         // The same as with -s, to the bit.
         let before = -((linear - (quadratic - rise) * s) * s);
         let after = ((rise + quadratic) * s + linear) * s;
-        [
-            sine_and_fall(before, self.squares[j] * (before * before)),
-            sine_and_fall(after, self.squares[j] * (after * after)),
-        ]
+        let square = self.squares[j];
+        let (to, from) = (square * (before * before), square * (after * after));
+        if SHORT {
+            [
+                short_sine_and_fall(before, to),
+                short_sine_and_fall(after, from),
+            ]
+        } else {
+            [sine_and_fall(before, to), sine_and_fall(after, from)]
+        }
     }
 }
 
 #[inline(always)]
-fn load3<L: Lanes>([x, y, z]: &[Lane32; 3], lane: usize) -> [L; 3] {
-    [
-        L::load(&x[lane..]),
-        L::load(&y[lane..]),
-        L::load(&z[lane..]),
-    ]
+fn all<L: Lanes>(value: f64) -> L::Doubles {
+    L::Doubles::all(value)
 }
 
 #[inline(always)]
-fn load4<L: Lanes>([x, y, z, w]: &[Lane32; 4], lane: usize) -> [L; 4] {
+fn load<L: Lanes>(lanes: &Lane64, lane: usize) -> L::Doubles {
+    L::Doubles::load(&lanes[lane..])
+}
+
+/// Three numbers from a place on.
+#[inline(always)]
+fn load3<L: Lanes>(numbers: &[Lane64], place: usize, lane: usize) -> [L::Doubles; 3] {
     [
-        L::load(&x[lane..]),
-        L::load(&y[lane..]),
-        L::load(&z[lane..]),
-        L::load(&w[lane..]),
+        load::<L>(&numbers[place], lane),
+        load::<L>(&numbers[place + 1], lane),
+        load::<L>(&numbers[place + 2], lane),
     ]
+}
+
+/// Four numbers from a place on.
+#[inline(always)]
+fn load4<L: Lanes>(numbers: &[Lane64], place: usize, lane: usize) -> [L::Doubles; 4] {
+    let [x, y, z] = load3::<L>(numbers, place, lane);
+    [x, y, z, load::<L>(&numbers[place + 3], lane)]
+}
+
+#[inline(always)]
+fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
+    [L::rounded(x), L::rounded(y), L::rounded(z), L::rounded(w)]
 }

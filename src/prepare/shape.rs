@@ -115,7 +115,7 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
         let count = self.0.whole();
         match self.0.tier() {
             Tier::Gentle => S::fit::<L, _>(self.0, count, &GENTLE_NODES),
-            Tier::Full => S::fit::<L, _>(self.0, count, &FULL_NODES),
+            Tier::Full | Tier::Piece => S::fit::<L, _>(self.0, count, &FULL_NODES),
         }
     }
 }

@@ -1,14 +1,16 @@
 //! Eight lanes of AVX2.
 
 use std::arch::x86_64::{
-    __m256, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
-    _mm256_castps_pd, _mm256_cmp_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_permutevar8x32_ps, _mm256_set_m128, _mm256_set1_ps, _mm256_setr_epi32,
-    _mm256_setzero_ps, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd,
-    _mm256_unpacklo_ps, _mm256_xor_ps,
+    __m256, __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_pd, _mm256_add_ps,
+    _mm256_and_ps, _mm256_blendv_ps, _mm256_castps_pd, _mm256_cmp_pd, _mm256_cmp_ps,
+    _mm256_cvtpd_ps, _mm256_max_pd, _mm256_max_ps, _mm256_movemask_pd, _mm256_movemask_ps,
+    _mm256_mul_pd, _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set_m128, _mm256_set1_pd,
+    _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_pd, _mm256_sub_ps,
+    _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
+use super::doubles::doubles;
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
@@ -111,8 +113,32 @@ impl Eight {
     }
 }
 
+doubles!(
+    EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
+    _mm256_mul_pd, _mm256_max_pd, are_at_most
+);
+
+/// Only with AVX2.
+#[inline(always)]
+unsafe fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
+    avx2! {
+        let within = _mm256_cmp_pd::<_CMP_LE_OQ>(numbers, limit);
+        _mm256_movemask_pd(within) == 0b1111
+    }
+}
+
 impl Lanes for Eight {
     const COUNT: usize = 8;
+
+    type Doubles = EightDoubles;
+
+    #[inline(always)]
+    fn rounded(EightDoubles([a, b]): EightDoubles) -> Self {
+        Self(avx2! {
+            let samples = _mm256_set_m128(_mm256_cvtpd_ps(b), _mm256_cvtpd_ps(a));
+            _mm256_permutevar8x32_ps(samples, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7))
+        })
+    }
 
     #[inline(always)]
     fn load(samples: &[f32]) -> Self {
@@ -213,12 +239,14 @@ impl Lanes for Eight {
 mod tests {
     use super::*;
     use crate::cpu::VectorWidth;
+    use crate::cpu::dispatch::doubles::tests::doubles_are_samples;
     use crate::cpu::lanes::tests::lanes_are_samples;
 
     #[test]
     fn eight_lanes_are_samples() {
         if VectorWidth::available().contains(&VectorWidth::Avx2) {
             lanes_are_samples::<Eight>();
+            doubles_are_samples::<Eight>();
         }
     }
 }
