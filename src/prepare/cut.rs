@@ -19,8 +19,8 @@ pub(super) struct Cutter {
     curves: Vec<Curve>,
     waiting: Vec<Part>,
     parts: Vec<Part>,
-    /// What those parts have become that a polynomial fits.
-    segments: Vec<PolynomialSegment>,
+    /// Places of segments that nothing has become yet.
+    spare: Vec<usize>,
 }
 
 /// A part of a curve.
@@ -32,7 +32,7 @@ pub(super) struct Part {
     curve: usize,
     pub(super) piece: Piece,
     /// Its place among the segments; nothing where even the finest does not fit.
-    segment: Option<usize>,
+    pub(super) segment: Option<usize>,
 }
 
 impl Cutter {
@@ -44,14 +44,15 @@ impl Cutter {
             curves: Vec::new(),
             waiting: Vec::new(),
             parts: Vec::new(),
-            segments: Vec::new(),
+            spare: Vec::new(),
         }
     }
 
-    /// Adds the curve of a span: at least two parts will come of it.
-    pub(super) fn push(&mut self, span: usize, curve: Curve) {
+    /// Adds the curve of a span: at least two parts will come of it. It may have a segment.
+    pub(super) fn push(&mut self, span: usize, curve: Curve, segment: Option<usize>) {
         self.push_pieces(span, &curve.piece.halves());
         self.curves.push(curve);
+        self.spare.extend(segment);
     }
 
     /// Adds the curve of a span, to be cut where it does not fit whole.
@@ -71,48 +72,56 @@ impl Cutter {
     }
 
     /// Cuts the curves given.
-    pub(super) fn cut(&mut self) {
-        while !self.waiting.is_empty() {
+    pub(super) fn cut(&mut self, segments: &mut Vec<PolynomialSegment>) {
+        let mut done = 0;
+        while done < self.waiting.len() {
             let new = || Box::new(FitBlock::new(self.shape, self.quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);
             block.clear();
-            let first = self.waiting.len().saturating_sub(LANES);
-            for part in &self.waiting[first..] {
+            let some = done..self.waiting.len().min(done + LANES);
+            for part in &mut self.waiting[some.clone()] {
                 block.push(&self.curves[part.curve], part.piece);
+                part.segment = self.spare.pop().or_else(|| {
+                    segments.push(PolynomialSegment::zeroed());
+                    Some(segments.len() - 1)
+                });
             }
-            block.run();
-            let mut halves = Vec::new();
-            for (lane, part) in self.waiting.drain(first..).enumerate() {
-                if block.fits(lane) {
-                    let mut segment = PolynomialSegment::zeroed();
-                    block.write(lane, &mut segment);
-                    let place = Some(self.segments.len());
-                    self.segments.push(segment);
-                    self.parts.push(Part {
-                        segment: place,
-                        ..part
-                    });
-                } else if part.piece.is_finest() {
+            let places = self.waiting[some.clone()].iter();
+            block.run(segments, places.filter_map(|part| part.segment));
+            for (lane, part) in some.clone().enumerate() {
+                let part = self.waiting[part];
+                if part
+                    .segment
+                    .is_some_and(|own| block.fits(lane, &segments[own]))
+                {
+                    self.parts.push(part);
+                    continue;
+                }
+                self.spare.extend(part.segment);
+                let part = Part {
+                    segment: None,
+                    ..part
+                };
+                if part.piece.is_finest() {
                     self.parts.push(part);
                 } else {
                     let half = |piece| Part { piece, ..part };
-                    halves.extend(part.piece.halves().map(half));
+                    self.waiting.extend(part.piece.halves().map(half));
                 }
             }
-            self.waiting.append(&mut halves);
+            done = some.end;
         }
-        self.parts
-            .sort_unstable_by_key(|part| (part.span, part.piece.from));
+        self.waiting.clear();
+        for place in self.spare.drain(..) {
+            segments[place] = PolynomialSegment::zeroed();
+        }
+        // Most are in order.
+        self.parts.sort_by_key(|part| (part.span, part.piece.from));
     }
 
     /// The parts of every curve given, in order of spans and time.
     pub(super) fn parts(&self) -> &[Part] {
         &self.parts
-    }
-
-    /// What a part has become.
-    pub(super) fn segment(&self, part: &Part) -> Option<PolynomialSegment> {
-        part.segment.map(|place| self.segments[place])
     }
 
     /// The part as a curve of its own.
@@ -127,6 +136,5 @@ impl Cutter {
     pub(super) fn clear(&mut self) {
         self.curves.clear();
         self.parts.clear();
-        self.segments.clear();
     }
 }

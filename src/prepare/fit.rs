@@ -9,6 +9,8 @@
 use std::array;
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
+
 use super::curve::{Curve, Piece};
 use super::intervals::{Intervals, LANES, Lane};
 use super::motion;
@@ -22,6 +24,9 @@ use crate::segment::PolynomialSegment;
 
 /// Powers of the parameter in a segment.
 const COEFFICIENTS: usize = 11;
+
+/// The most lanes that a vector has.
+pub(super) const MOST: usize = 8;
 
 /// How many powers a curve needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,8 +86,8 @@ pub(super) struct FitBlock {
     paces: Vec<Option<Arc<Pace>>>,
     pub(super) quantity: Quantity,
     count: usize,
-    /// The coefficients of each power, for every lane.
-    coefficients: [[[f32; 4]; LANES]; COEFFICIENTS],
+    /// The segments that they become.
+    places: [usize; LANES],
     /// What the fit leaves out, twice, about; the largest of any component.
     tails: Lane32,
     /// The squares of the farthest angles from the middle.
@@ -138,7 +143,7 @@ impl FitBlock {
             paces: Vec::new(),
             quantity,
             count: 0,
-            coefficients: [[[0.0; 4]; LANES]; COEFFICIENTS],
+            places: [0; LANES],
             tails: [0.0; LANES],
             reaches: lane,
         }
@@ -230,13 +235,25 @@ impl FitBlock {
         }
     }
 
-    /// Fits the curves that wait.
-    pub(super) fn run(&mut self) {
+    /// Fits the curves that wait, to segments at these places; powers above the tier's stay
+    /// what they are.
+    pub(super) fn run(
+        &mut self,
+        segments: &mut Vec<PolynomialSegment>,
+        places: impl Iterator<Item = usize>,
+    ) {
+        // One for the last vector's lanes that have no curve.
+        self.places.fill(segments.len());
+        segments.push(PolynomialSegment::zeroed());
+        for (own, place) in self.places[..self.count].iter_mut().zip(places) {
+            *own = place;
+        }
         match self.quantity {
             _ if self.count == 0 => {}
-            Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self),
-            _ => motion::fit(self),
+            Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self, segments),
+            _ => motion::fit(self, segments),
         }
+        segments.pop();
     }
 
     /// Whether all that a gentle tier holds is fitted, unchecked.
@@ -250,31 +267,23 @@ impl FitBlock {
     }
 
     /// Multiplies every lane's polynomial.
-    #[inline(always)]
-    pub(super) fn scale(&mut self, scales: &Lane32) {
-        for power in &mut self.coefficients {
-            for (coefficients, &scale) in power.iter_mut().zip(scales) {
-                *coefficients = canonical(coefficients.map(|c| c * scale));
+    pub(super) fn scale(&self, scales: &Lane32, segments: &mut [PolynomialSegment]) {
+        for (&place, &scale) in self.places[..self.count].iter().zip(scales) {
+            for own in &mut segments[place].coefficients {
+                *own = canonical(own.map(|c| c * scale));
             }
         }
     }
 
-    /// Whether the polynomial of a lane is near enough to its curve.
-    pub(super) fn fits(&self, lane: usize) -> bool {
+    /// Whether the polynomial of a lane, which has become a segment, is near enough to its
+    /// curve.
+    pub(super) fn fits(&self, lane: usize, segment: &PolynomialSegment) -> bool {
         let reach = match self.tier {
             Tier::Gentle | Tier::Full => SHORT_REACH,
             Tier::Piece => REACH,
         };
         let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= reach * reach;
-        is_near && self.coefficients[0][lane].iter().all(|c| c.is_finite())
-    }
-
-    /// Writes the polynomial of a lane. Powers above the tier's stay 0.
-    #[inline]
-    pub(super) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
-        for (own, power) in segment.coefficients.iter_mut().zip(&self.coefficients) {
-            *own = power[lane % LANES];
-        }
+        is_near && segment.coefficients[0].iter().all(|c| c.is_finite())
     }
 
     /// From the differences at the nodes to the coefficients.
@@ -284,9 +293,10 @@ impl FitBlock {
         count: usize,
         nodes: &Nodes<PAIRS>,
         samples: &Samples<Lane32, PAIRS>,
+        segments: &mut [PolynomialSegment],
     ) {
         for lane in (0..count).step_by(L::COUNT) {
-            self.interpolate(lane, nodes, &samples.at::<L>(lane));
+            self.interpolate(lane, nodes, &samples.at::<L>(lane), segments);
         }
     }
 
@@ -297,8 +307,8 @@ impl FitBlock {
         lane: usize,
         nodes: &Nodes<PAIRS>,
         samples: &Samples<L, PAIRS>,
+        segments: &mut [PolynomialSegment],
     ) {
-        let lanes = lane..lane + L::COUNT;
         let means = coefficients(&nodes.even, &samples.even);
         let halves = coefficients(&nodes.odd, &samples.odd);
         let entire = self.is_entire();
@@ -314,15 +324,31 @@ impl FitBlock {
             };
             tails = tail.larger(tails);
         }
-        tails.store(&mut self.tails[lanes.clone()]);
-        let store = &mut self.coefficients;
-        L::store_rotations(canonical(samples.middle), &mut store[0][lanes.clone()]);
+        tails.store(&mut self.tails[lane..lane + L::COUNT]);
+        let mut places = [0; MOST];
+        places[..L::COUNT].copy_from_slice(&self.places[lane..lane + L::COUNT]);
+        store(samples.middle, segments, &places, 0);
         for power in 0..PAIRS {
             let odd = of_power(&ODD_POWERS, &halves, power);
-            L::store_rotations(canonical(odd), &mut store[2 * power + 1][lanes.clone()]);
+            store(odd, segments, &places, 2 * power + 1);
             let even = of_power(&EVEN_POWERS, &means, power);
-            L::store_rotations(canonical(even), &mut store[2 * power + 2][lanes.clone()]);
+            store(even, segments, &places, 2 * power + 2);
         }
+    }
+}
+
+/// Stores the coefficients of a power to each lane's segment.
+#[inline(always)]
+fn store<L: Lanes>(
+    own: [L; 4],
+    segments: &mut [PolynomialSegment],
+    places: &[usize; MOST],
+    power: usize,
+) {
+    let mut rotations = [[0.0; 4]; MOST];
+    L::store_rotations(canonical(own), &mut rotations[..L::COUNT]);
+    for lane in 0..L::COUNT {
+        segments[places[lane]].coefficients[power] = rotations[lane];
     }
 }
 

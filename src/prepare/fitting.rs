@@ -77,8 +77,8 @@ impl Fitting {
             Tier::Gentle => &mut self.gentle,
             Tier::Full => &mut self.full,
             Tier::Piece => {
-                self.cutter
-                    .push(span, curves.curve(lane, self.shape, self.quantity));
+                let curve = curves.curve(lane, self.shape, self.quantity);
+                self.cutter.push(span, curve, None);
                 return UNTRIED;
             }
         };
@@ -136,7 +136,7 @@ impl Fitting {
             in_lanes(&mut **block);
             block.write(polynomials(prepared));
         }
-        self.cutter.cut();
+        self.cutter.cut(polynomials(prepared));
         prepared.put_parts(&self.cutter, &mut self.uncut);
         self.cutter.clear();
     }
@@ -144,18 +144,24 @@ impl Fitting {
 
 /// Fits the curves of a block, which are of the first of the `spans`.
 fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
-    block.run();
-    let trusted = block.is_trusted();
-    for (lane, span) in spans.drain(..block.count()).enumerate() {
-        let Source::Segment(segment) = prepared.spans.sources[span] else {
-            continue;
-        };
-        if trusted || block.fits(lane) {
-            block.write(lane, &mut polynomials(prepared)[segment as usize]);
-        } else {
-            cutter.push(span, block.curve(lane));
+    let own = &spans[..block.count()];
+    let sources = &prepared.spans.sources;
+    let places = own.iter().filter_map(|&span| match sources[span] {
+        Source::Segment(place) => Some(place as usize),
+        _ => None,
+    });
+    let Segments::Polynomial(segments) = &mut prepared.segments else {
+        unreachable!("the method's form")
+    };
+    block.run(segments, places.clone());
+    if !block.is_trusted() {
+        for ((lane, &span), place) in own.iter().enumerate().zip(places) {
+            if !block.fits(lane, &segments[place]) {
+                cutter.push(span, block.curve(lane), Some(place));
+            }
         }
     }
+    spans.drain(..block.count());
     block.clear();
 }
 
@@ -223,10 +229,6 @@ impl Prepared {
         end: f64,
     ) -> &'c [CurvePart] {
         let (start, key) = (uncut.starts[span], uncut.keys[span]);
-        let mut spare = match uncut.sources[span] {
-            Source::Segment(place) if place != NONE => Some(place),
-            _ => None,
-        };
         let count = (parts.iter())
             .take_while(|part| part.span == parts[0].span)
             .count();
@@ -235,29 +237,16 @@ impl Prepared {
             let (from, _) = part.piece.extent();
             let start = start + (end - start) * from;
             let key = if from == 0.0 { key } else { NONE };
-            let source = self.part_source(cutter, part, &mut spare);
+            let source = match part.segment {
+                Some(place) => Source::Segment(place as u32),
+                None => {
+                    self.exact.push(cutter.curve(part));
+                    Source::Exact(self.exact.len() as u32 - 1)
+                }
+            };
             self.push_span(start, source, key);
         }
         others
-    }
-
-    fn part_source(
-        &mut self,
-        cutter: &Cutter,
-        part: &CurvePart,
-        spare: &mut Option<u32>,
-    ) -> Source {
-        let Some(segment) = cutter.segment(part) else {
-            self.exact.push(cutter.curve(part));
-            return Source::Exact(self.exact.len() as u32 - 1);
-        };
-        let segments = polynomials(self);
-        let place = spare.take().unwrap_or_else(|| {
-            segments.push(segment);
-            segments.len() as u32 - 1
-        });
-        segments[place as usize] = segment;
-        Source::Segment(place)
     }
 }
 

@@ -8,6 +8,7 @@ use crate::branchless::{Quaternion, Vector, product, step};
 use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::method::{Axes, Quantity};
 use crate::scalar::Jet;
+use crate::segment::PolynomialSegment;
 
 /// What is asked for of a curve, from its rotation and derivatives by the parameter;
 /// `rate` is how fast the parameter runs, per second. A rotation, or a vector and 0.
@@ -42,11 +43,11 @@ fn rotated(q: Quaternion, [x, y, z]: Vector) -> Vector {
 }
 
 /// Fits a block's velocities or accelerations.
-pub(super) fn fit(block: &mut FitBlock) {
-    in_lanes(&mut Fit(block));
+pub(super) fn fit(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+    in_lanes(&mut Fit(block, segments));
 }
 
-struct Fit<'a>(&'a mut FitBlock);
+struct Fit<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
 
 impl InLanes for Fit<'_> {
     #[inline(always)]
@@ -67,8 +68,9 @@ impl Fit<'_> {
         for (lane, scale) in scales[..count].iter_mut().enumerate() {
             *scale = sample(self.0, lane, nodes, &mut samples);
         }
-        self.0.interpolate_all::<L, PAIRS>(count, nodes, &samples);
-        self.0.scale(&scales);
+        self.0
+            .interpolate_all::<L, PAIRS>(count, nodes, &samples, self.1);
+        self.0.scale(&scales, self.1);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Samples of cubics, in vector lanes: the first half of a fit.
 
-use super::fit::{FitBlock, Lane64, Samples, Tier};
+use super::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use super::nodes::Nodes;
 use super::shape::Sampling;
 use crate::branchless::{
@@ -9,16 +9,23 @@ use crate::branchless::{
 };
 use crate::cpu::{Doubles, Lanes, Number, short_sine_and_fall, sine_and_fall};
 use crate::formula::{Numbers, Product};
+use crate::segment::PolynomialSegment;
 
 /// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
 pub(super) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
     #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>) {
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
         match block.tier() {
-            Tier::Gentle | Tier::Full => fit::<L, PAIRS, OWN_BASIS, true>(block, count, nodes),
-            Tier::Piece => fit::<L, PAIRS, OWN_BASIS, false>(block, count, nodes),
+            Tier::Gentle | Tier::Full => {
+                fit::<L, PAIRS, OWN_BASIS, true>(block, nodes, segments);
+            }
+            Tier::Piece => fit::<L, PAIRS, OWN_BASIS, false>(block, nodes, segments),
         }
     }
 }
@@ -26,12 +33,12 @@ impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
 #[inline(always)]
 fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
     block: &mut FitBlock,
-    count: usize,
     nodes: &Nodes<PAIRS>,
+    segments: &mut [PolynomialSegment],
 ) {
     // A copy: what is written below could be what a reference shows.
     let shared = block.shape.shared;
-    for lane in (0..count).step_by(L::COUNT) {
+    for lane in (0..block.whole()).step_by(L::COUNT) {
         let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
         let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 1);
         let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
@@ -39,7 +46,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
         reach.store(&mut block.reaches[lane..]);
         let base = load4::<L>(&block.numbers, 0, lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
-        block.interpolate(lane, nodes, &samples);
+        block.interpolate(lane, nodes, &samples, segments);
     }
 }
 
@@ -138,9 +145,6 @@ fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     let [x, y, z, w] = &lanes.turns;
     [D::load(x), D::load(y), D::load(z), D::load(w)]
 }
-
-/// The most lanes that a vector has.
-const MOST: usize = 8;
 
 /// Half-rotation vectors and their exponentials.
 #[derive(Default)]

@@ -12,6 +12,7 @@ use crate::formula::{
     DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
 use crate::scalar::{Jet, Near};
+use crate::segment::PolynomialSegment;
 
 /// A formula, and how its curves are sampled.
 pub(crate) struct Shape {
@@ -28,7 +29,8 @@ pub(crate) struct Shape {
     pub(super) is_unit: bool,
     pub(super) rotation: fn(&Numbers, f64) -> Quaternion,
     pub(super) moving: fn(&Numbers, Jet) -> [Jet; 4],
-    pub(super) fit: fn(&mut FitBlock),
+    /// See [`Sampling::fit`].
+    pub(super) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
 }
 
 impl Shape {
@@ -98,24 +100,32 @@ impl Shape {
 
 /// A way to sample the curves of a block.
 pub(super) trait Sampling: 'static {
-    /// Samples so many and interpolates them.
-    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>);
+    /// Samples and interpolates them, to segments.
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    );
 }
 
 /// Fits the curves of a block.
-fn fit<S: Sampling>(block: &mut FitBlock) {
-    in_lanes(&mut Fit::<S>(block, PhantomData));
+fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+    in_lanes(&mut Fit::<S>(block, segments, PhantomData));
 }
 
-struct Fit<'a, S>(&'a mut FitBlock, PhantomData<S>);
+struct Fit<'a, S>(
+    &'a mut FitBlock,
+    &'a mut [PolynomialSegment],
+    PhantomData<S>,
+);
 
 impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let count = self.0.whole();
-        match self.0.tier() {
-            Tier::Gentle => S::fit::<L, _>(self.0, count, &GENTLE_NODES),
-            Tier::Full | Tier::Piece => S::fit::<L, _>(self.0, count, &FULL_NODES),
+        let Self(block, segments, _) = self;
+        match block.tier() {
+            Tier::Gentle => S::fit::<L, _>(block, &GENTLE_NODES, segments),
+            Tier::Full | Tier::Piece => S::fit::<L, _>(block, &FULL_NODES, segments),
         }
     }
 }
@@ -125,7 +135,12 @@ struct Directly<F>(PhantomData<F>);
 
 impl<F: Formula> Sampling for Directly<F> {
     #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(block: &mut FitBlock, count: usize, nodes: &Nodes<PAIRS>) {
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
+        let count = block.whole();
         let mut samples = Samples::all([0.0; LANES]);
         let Samples { middle, even, odd } = &mut samples;
         let mut middles = [[0.0; LANES]; 4];
@@ -160,7 +175,7 @@ impl<F: Formula> Sampling for Directly<F> {
         for lane in (0..count).filter(|&lane| doubts[lane].is_nan()) {
             sample_anywhere::<F, PAIRS>(block, lane, nodes, &mut samples);
         }
-        block.interpolate_all::<L, PAIRS>(count, nodes, &samples);
+        block.interpolate_all::<L, PAIRS>(count, nodes, &samples, segments);
     }
 }
 
