@@ -8,7 +8,7 @@
 mod near;
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub(crate) use near::{
     Algebra, Anywhere, LONG_SQUARE, Near, SHORT_SQUARE, long_waves, near_arc_square, near_waves,
@@ -19,22 +19,55 @@ use crate::numeric::nearest_whole;
 
 /// What sums and products are made of, be it a number or a vector of them.
 pub(crate) trait Arithmetic:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
 }
 
-impl<N> Arithmetic for N where N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N> {}
+impl<N> Arithmetic for N where
+    N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N> + Neg<Output = N>
+{
+}
 
-/// f64, or a vector of them.
-pub(crate) trait Real: Arithmetic {
+/// f64, or a vector of them: what holds for one is said of each.
+pub(crate) trait Real: Arithmetic + Div<Output = Self> {
     /// The same in every lane.
     fn all(value: f64) -> Self;
+
+    /// The square root.
+    fn root(self) -> Self;
+
+    /// The smaller and the larger of two numbers; `other` where one of them is none.
+    fn smaller(self, other: Self) -> Self;
+    fn larger(self, other: Self) -> Self;
+
+    /// `then` up to a limit, else `otherwise`; also where one of them is no number.
+    fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self;
 }
 
 impl Real for f64 {
     #[inline(always)]
     fn all(value: f64) -> Self {
         value
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        if self <= limit { then } else { otherwise }
     }
 }
 
@@ -43,16 +76,22 @@ pub(crate) type Quaternion = [f64; 4];
 /// Half of a rotation vector, unless said otherwise.
 pub(crate) type Vector = [f64; 3];
 
+/// `|v|²`.
+#[inline(always)]
+pub(crate) fn square<N: Arithmetic>([x, y, z]: [N; 3]) -> N {
+    x * x + y * y + z * z
+}
+
 /// The inner product in R⁴.
 #[inline(always)]
-pub(crate) fn dot(a: Quaternion, b: Quaternion) -> f64 {
+pub(crate) fn dot<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 }
 
 /// `|v|`.
 #[inline(always)]
 pub(crate) fn length(v: Vector) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+    square(v).sqrt()
 }
 
 /// `k v`.
@@ -63,16 +102,15 @@ pub(crate) fn scaled<N: Arithmetic>(v: [N; 3], k: N) -> [N; 3] {
 
 /// `a + b`.
 #[inline(always)]
-pub(crate) fn sum(a: Vector, b: Vector) -> Vector {
+pub(crate) fn sum<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// `a / b` for positive numbers, at most 1e150: between keys that are next to nothing
 /// apart tangents are meaningless, but they stay numbers.
 #[inline(always)]
-pub(crate) fn ratio(a: f64, b: f64) -> f64 {
-    let ratio = a / b;
-    if ratio < 1e150 { ratio } else { 1e150 }
+pub(crate) fn ratio<R: Real>(a: R, b: R) -> R {
+    (a / b).smaller(R::all(1e150))
 }
 
 /// The Hamilton product `a b`.
@@ -88,7 +126,7 @@ pub(crate) fn product<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
 
 /// `a⁻¹ b` for unit quaternions.
 #[inline(always)]
-pub(crate) fn step(a: Quaternion, b: Quaternion) -> Quaternion {
+pub(crate) fn step<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     product([-a[0], -a[1], -a[2], a[3]], b)
 }
 
@@ -101,9 +139,16 @@ pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
         f64::from(key[2]),
         f64::from(key[3]),
     ];
+    normalised(q)
+}
+
+/// As [`unit`], of its components in f64.
+#[inline(always)]
+pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
     let square = dot(q, q);
-    let first = 1.5 - 0.5 * square;
-    let scale = first * (1.5 - 0.5 * square * first * first);
+    let (half, three_halves) = (R::all(0.5), R::all(1.5));
+    let first = three_halves - half * square;
+    let scale = first * (three_halves - half * square * first * first);
     [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 

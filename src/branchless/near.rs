@@ -3,28 +3,36 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled};
+use super::{Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled, square};
 
 /// The exponentials and logarithms that a method's rule is made of. Two of them:
 /// [`Near`] for vector lanes, and [`Anywhere`] for the lanes where it does not hold,
 /// so that a lane's result depends on nothing but its own numbers.
 pub(crate) trait Algebra {
+    /// f64, or a vector of them.
+    type Number: Real;
     /// See [`exp`].
-    fn exp(&mut self, a: Vector) -> Quaternion;
+    fn exp(&mut self, a: [Self::Number; 3]) -> [Self::Number; 4];
     /// See [`log`].
-    fn log(&mut self, q: Quaternion) -> Vector;
+    fn log(&mut self, q: [Self::Number; 4]) -> [Self::Number; 3];
     /// See [`log_toward`].
-    fn log_toward(&mut self, q: Quaternion, axis: Vector) -> Vector;
+    fn log_toward(&mut self, q: [Self::Number; 4], axis: [Self::Number; 3]) -> [Self::Number; 3];
     /// See [`log_near`].
-    fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector;
+    fn log_near(&mut self, q: [Self::Number; 4], near: [Self::Number; 3]) -> [Self::Number; 3];
     /// The logarithm of a step, of which `near` is [`Near`]'s.
-    fn log_of_step(&mut self, step: Quaternion, near: Vector) -> Vector;
+    fn log_of_step(
+        &mut self,
+        step: [Self::Number; 4],
+        near: [Self::Number; 3],
+    ) -> [Self::Number; 3];
 }
 
 /// Everything, at its price: square roots, divisions and a range reduction for each.
 pub(crate) struct Anywhere;
 
 impl Algebra for Anywhere {
+    type Number = f64;
+
     fn exp(&mut self, a: Vector) -> Quaternion {
         exp(a)
     }
@@ -48,9 +56,9 @@ impl Algebra for Anywhere {
 }
 
 /// Half-angles up to pi/2, by polynomials alone: within 1e-12.
-pub(crate) struct Near {
-    /// 1 as long as every argument was within the range, else 0.
-    pub(crate) holds: f64,
+pub(crate) struct Near<R> {
+    /// 0 as long as every argument was within the range, else 1.
+    pub(crate) doubt: R,
 }
 
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x²,
@@ -157,7 +165,7 @@ fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
 /// `x / sin(x)` for `u = 1 - cos(x)`, 0 <= x <= pi/2: an angle from its sine without
 /// an arc function.
 #[inline(always)]
-fn angle_by_sine(u: f64) -> f64 {
+fn angle_by_sine<R: Real>(u: R) -> R {
     one_plus(&ANGLE_BY_SINE, u)
 }
 
@@ -196,50 +204,51 @@ fn near_or_nan(value: f64, limit: f64) -> f64 {
     if value <= limit { 0.0 } else { f64::NAN }
 }
 
-impl Near {
+impl<R: Real> Near<R> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { holds: 1.0 }
+        Self { doubt: R::all(0.0) }
     }
 
     #[inline(always)]
-    fn check(&mut self, value: f64, limit: f64) {
-        // Written so that NaN does not pass.
-        self.holds = if value <= limit { self.holds } else { 0.0 };
+    fn check(&mut self, value: R, limit: f64) {
+        // NaN does not pass.
+        self.doubt = value.up_to(R::all(limit), self.doubt, R::all(1.0));
     }
 }
 
-impl Algebra for Near {
+impl<R: Real> Algebra for Near<R> {
+    type Number = R;
+
     #[inline(always)]
-    fn exp(&mut self, a: Vector) -> Quaternion {
-        let z = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    fn exp(&mut self, a: [R; 3]) -> [R; 4] {
+        let z = square(a);
         self.check(z, LONG_SQUARE);
         let (sinc, cosine) = long_waves(z);
         [sinc * a[0], sinc * a[1], sinc * a[2], cosine]
     }
 
     #[inline(always)]
-    fn log(&mut self, q: Quaternion) -> Vector {
-        let u = 1.0 - q[3];
+    fn log(&mut self, q: [R; 4]) -> [R; 3] {
+        let u = R::all(1.0) - q[3];
         self.check(u, 1.0);
         scaled([q[0], q[1], q[2]], angle_by_sine(u))
     }
 
     #[inline(always)]
-    fn log_toward(&mut self, q: Quaternion, _: Vector) -> Vector {
+    fn log_toward(&mut self, q: [R; 4], _: [R; 3]) -> [R; 3] {
         self.log(q)
     }
 
     #[inline(always)]
-    fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector {
+    fn log_near(&mut self, q: [R; 4], near: [R; 3]) -> [R; 3] {
         // No other branch is nearer.
-        let z = near[0] * near[0] + near[1] * near[1] + near[2] * near[2];
-        self.check(z, 1.5 * 1.5);
+        self.check(square(near), 1.5 * 1.5);
         self.log(q)
     }
 
     #[inline(always)]
-    fn log_of_step(&mut self, _: Quaternion, near: Vector) -> Vector {
+    fn log_of_step(&mut self, _: [R; 4], near: [R; 3]) -> [R; 3] {
         near
     }
 }
@@ -292,8 +301,8 @@ mod tests {
             let a = scaled(direction, angle);
             let mut near = Near::new();
             let (q, back) = (near.exp(a), near.log(exp(a)));
-            assert_eq!(near.holds == 1.0, angle <= FRAC_PI_2, "{angle}");
-            if near.holds == 1.0 {
+            assert_eq!(near.doubt == 0.0, angle <= FRAC_PI_2, "{angle}");
+            if near.doubt == 0.0 {
                 let error = (0..4).map(|c| (q[c] - exp(a)[c]).abs()).fold(0.0, f64::max);
                 assert!(error < 1e-14, "{angle}: {error}");
                 let error = length(sum(back, scaled(a, -1.0)));
@@ -303,6 +312,6 @@ mod tests {
         let mut near = Near::new();
         near.exp([f64::NAN; 3]);
         near.exp([0.0; 3]);
-        assert_eq!(near.holds, 0.0);
+        assert_eq!(near.doubt, 1.0);
     }
 }

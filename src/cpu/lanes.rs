@@ -46,6 +46,9 @@ pub(crate) trait Lanes: Number {
     /// Rounded to f32.
     fn rounded(numbers: Self::Doubles) -> Self;
 
+    /// The same in f64.
+    fn widened(self) -> Self::Doubles;
+
     /// Of [`Lanes::COUNT`] samples.
     fn load(samples: &[f32]) -> Self;
 
@@ -87,9 +90,6 @@ pub(crate) trait Doubles: Real {
     /// To the first so many numbers.
     fn store(self, numbers: &mut [f64]);
 
-    /// The larger of two numbers; `other` where one of them is none.
-    fn larger(self, other: Self) -> Self;
-
     /// Whether each is a number, and not more than `limit`.
     fn are_at_most(self, limit: f64) -> bool;
 }
@@ -115,6 +115,11 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn rounded(numbers: Four) -> Self {
         numbers.rounded()
+    }
+
+    #[inline(always)]
+    fn widened(self) -> Four {
+        Four::of(self)
     }
 
     #[inline(always)]

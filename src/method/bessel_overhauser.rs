@@ -2,7 +2,7 @@
 //! its two neighbours.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, product, ratio, scaled, sum};
+use crate::branchless::{Algebra, Real as _, product, ratio, scaled, sum};
 use crate::joints::Joints;
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -39,7 +39,11 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         let both = before.duration + after.duration;
         // The slope of each side, weighted by the other side's step, left one first:
         // only so does it equal Catmull-Rom on uniform keys.
@@ -56,7 +60,7 @@ impl HandleRule for Rule {
         let turn = product(algebra.exp(left), algebra.exp(right));
         let tangent = scaled(
             algebra.log_near(turn, sum(left, right)),
-            ratio(1.0, 3.0 * both),
+            ratio(A::Number::all(1.0), A::Number::all(3.0) * both),
         );
         Handles {
             incoming: scaled(tangent, before.duration),

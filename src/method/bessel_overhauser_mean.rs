@@ -2,7 +2,7 @@
 //! logarithms.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Vector, ratio, scaled, sum};
+use crate::branchless::{Algebra, Real, ratio, scaled, sum};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -36,10 +36,14 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        _: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         Handles {
-            incoming: handle(before, after, before.duration, [1.0; 2]),
-            outgoing: handle(before, after, after.duration, [1.0; 2]),
+            incoming: handle(before, after, before.duration, [A::Number::all(1.0); 2]),
+            outgoing: handle(before, after, after.duration, [A::Number::all(1.0); 2]),
         }
     }
 }
@@ -47,14 +51,17 @@ impl HandleRule for Rule {
 /// The handle towards an interval that lasts `duration`: of the slopes of both sides, each
 /// weighted by the other side's step, and by a weight of its own.
 #[inline(always)]
-pub(super) fn handle(
-    before: Interval,
-    after: Interval,
-    duration: f64,
-    [left, right]: [f64; 2],
-) -> Vector {
+pub(super) fn handle<R: Real>(
+    before: Interval<R>,
+    after: Interval<R>,
+    duration: R,
+    [left, right]: [R; 2],
+) -> [R; 3] {
     let left = scaled(before.log, ratio(after.duration, before.duration) * left);
     let right = scaled(after.log, ratio(before.duration, after.duration) * right);
     let both = before.duration + after.duration;
-    scaled(sum(left, right), ratio(1.0, 3.0 * both) * duration)
+    scaled(
+        sum(left, right),
+        ratio(R::all(1.0), R::all(3.0) * both) * duration,
+    )
 }

@@ -1,7 +1,7 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, product, scaled, sum};
+use crate::branchless::{Algebra, Real as _, product, scaled, sum};
 use crate::joints::Joints;
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
@@ -39,12 +39,19 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         // The two-step's half-angle may truly approach pi: its sign is never
         // re-aligned.
         let two_step = product(before.step, after.step);
         let toward = sum(before.log, after.log);
-        let handle = scaled(algebra.log_toward(two_step, toward), 1.0 / 6.0);
+        let handle = scaled(
+            algebra.log_toward(two_step, toward),
+            A::Number::all(1.0 / 6.0),
+        );
         Handles {
             incoming: handle,
             outgoing: handle,

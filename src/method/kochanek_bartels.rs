@@ -4,7 +4,7 @@ use super::bessel_overhauser_mean::handle;
 use super::{
     Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends,
 };
-use crate::branchless::Algebra;
+use crate::branchless::{Algebra, Real as _};
 use crate::prepare::{HandleRule, Handles, Interval, Shape};
 use crate::reference;
 use crate::tracks::Track;
@@ -51,12 +51,17 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        _: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         let [tension, continuity, bias, _] = after.key;
-        let tight = 1.0 - tension;
-        let weights = |corner: f64| {
-            let left = tight * (1.0 + corner) * (1.0 + bias);
-            [left, tight * (1.0 - corner) * (1.0 - bias)]
+        let one = A::Number::all(1.0);
+        let tight = one - tension;
+        let weights = |corner| {
+            let left = tight * (one + corner) * (one + bias);
+            [left, tight * (one - corner) * (one - bias)]
         };
         Handles {
             incoming: handle(before, after, before.duration, weights(-continuity)),

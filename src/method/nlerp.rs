@@ -1,7 +1,7 @@
 //! Normalised linear interpolation.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Vector};
+use crate::branchless::{Algebra, Real as _, Vector};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -35,10 +35,14 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(_: &mut impl Algebra, _: Interval, _: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        _: &mut A,
+        _: Interval<A::Number>,
+        _: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         Handles {
-            incoming: [0.0; 3],
-            outgoing: [0.0; 3],
+            incoming: [A::Number::all(0.0); 3],
+            outgoing: [A::Number::all(0.0); 3],
         }
     }
 

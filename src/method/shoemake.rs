@@ -1,7 +1,7 @@
 //! Shoemake's first approach, as lectured, and the rule of all three.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Vector, dot, scaled, sum};
+use crate::branchless::{Algebra, Real as _, Vector, dot, scaled, sum};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -41,17 +41,28 @@ pub(super) struct Bisector<const PART: u8>;
 
 impl<const PART: u8> HandleRule for Bisector<PART> {
     #[inline(always)]
-    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
         let (a, b) = (before.step, after.step);
         let both = [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
-        let norm = dot(both, both).sqrt();
+        let norm = dot(both, both).root();
+        let (none, zero, one) = (
+            A::Number::all(1e-12),
+            A::Number::all(0.0),
+            A::Number::all(1.0),
+        );
         // Half a turn there and back: no bisector, no handle.
-        let exists = norm > 1e-12;
-        let scale = if exists { 1.0 / norm } else { 0.0 };
-        let w = if exists { both[3] * scale } else { 1.0 };
+        let scale = norm.up_to(none, zero, one / norm);
+        let w = norm.up_to(none, one, both[3] * scale);
         let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];
         let toward = sum(before.log, after.log);
-        let handle = scaled(algebra.log_toward(bisector, toward), 1.0 / f64::from(PART));
+        let handle = scaled(
+            algebra.log_toward(bisector, toward),
+            A::Number::all(1.0 / f64::from(PART)),
+        );
         Handles {
             incoming: handle,
             outgoing: handle,

@@ -1,7 +1,7 @@
 //! Spherical quadrangle interpolation.
 
 use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Vector, scaled, sum};
+use crate::branchless::{Algebra, Real as _, Vector, scaled, sum};
 use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
 use crate::reference;
 
@@ -33,11 +33,15 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles(_: &mut impl Algebra, before: Interval, after: Interval) -> Handles {
-        let bend = sum(after.log, scaled(before.log, -1.0));
+    fn handles<A: Algebra>(
+        _: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number> {
+        let bend = sum(after.log, scaled(before.log, A::Number::all(-1.0)));
         Handles {
-            incoming: scaled(bend, 0.25),
-            outgoing: scaled(bend, -0.25),
+            incoming: scaled(bend, A::Number::all(0.25)),
+            outgoing: scaled(bend, A::Number::all(-0.25)),
         }
     }
 

@@ -22,9 +22,6 @@ use crate::formula::{Numbers, Product};
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
-/// Powers of the parameter in a segment.
-const COEFFICIENTS: usize = 11;
-
 /// The most lanes that a vector has.
 pub(super) const MOST: usize = 8;
 

@@ -11,7 +11,8 @@ use std::ops::Range;
 use super::NONE;
 use super::curve::{Curve, Piece};
 use super::shape::Shape;
-use crate::branchless::{self, Quaternion, Vector};
+use crate::branchless::{self, Arithmetic, Quaternion, Vector, square};
+use crate::cpu::{Doubles, Lanes};
 use crate::method::Quantity;
 use crate::tracks::Track;
 
@@ -103,8 +104,6 @@ pub(crate) struct Intervals {
     pub(super) numbers: Vec<Lane>,
     /// How far the curve goes: the sum of the squares of its half-rotation vectors.
     pub(super) energies: Lane,
-    /// 0 where a pass has to be done again by what holds anywhere.
-    pub(super) holds: Lane,
 }
 
 impl Intervals {
@@ -130,7 +129,6 @@ impl Intervals {
             inward: [lane; 4],
             numbers: vec![lane; numbers],
             energies: lane,
-            holds: lane,
         }
     }
 
@@ -287,7 +285,42 @@ pub(super) fn put<const N: usize>(lanes: &mut [Lane; N], lane: usize, value: [f6
 
 /// The sum of the vectors' squares.
 #[inline(always)]
-pub(super) fn energy(vectors: [Vector; 3]) -> f64 {
-    let square = |[x, y, z]: Vector| x * x + y * y + z * z;
-    square(vectors[0]) + square(vectors[1]) + square(vectors[2])
+pub(super) fn energy<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
+    square(a) + square(b) + square(c)
+}
+
+/// Numbers of the lanes from `lane` on.
+#[inline(always)]
+pub(super) fn load<L: Lanes>(numbers: &[f64], lane: usize) -> L::Doubles {
+    L::Doubles::load(&numbers[lane..])
+}
+
+// Written out: closures are not always inlined.
+#[inline(always)]
+pub(super) fn load3<L: Lanes, const WIDTH: usize>(
+    [x, y, z]: &[[f64; WIDTH]; 3],
+    lane: usize,
+) -> [L::Doubles; 3] {
+    [load::<L>(x, lane), load::<L>(y, lane), load::<L>(z, lane)]
+}
+
+#[inline(always)]
+pub(super) fn load4<L: Lanes, const WIDTH: usize>(
+    [x, y, z, w]: &[[f64; WIDTH]; 4],
+    lane: usize,
+) -> [L::Doubles; 4] {
+    [
+        load::<L>(x, lane),
+        load::<L>(y, lane),
+        load::<L>(z, lane),
+        load::<L>(w, lane),
+    ]
+}
+
+/// Stores numbers to the lanes from `lane` on.
+#[inline(always)]
+pub(super) fn store<D: Doubles, const N: usize>(lanes: &mut [Lane; N], lane: usize, own: [D; N]) {
+    for c in 0..N {
+        own[c].store(&mut lanes[c][lane..]);
+    }
 }

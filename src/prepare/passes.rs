@@ -1,15 +1,15 @@
-//! Passes over the lanes of a block: plain loops, compiled for every vector width.
-//!
-//! Outputs are arguments of a loop's own function: so the compiler knows that they do not
-//! overlap what is read.
-// Loops over lanes index many arrays at once.
-#![allow(clippy::needless_range_loop)]
+//! Passes over the lanes of a block, in vectors.
 
 use std::marker::PhantomData;
 
-use super::intervals::{Intervals, LANES, Lane, ROOM, aligned, at, energy, put};
-use crate::branchless::{self, Algebra, Anywhere, Near, Quaternion, Vector, product, scaled, sum};
-use crate::cpu::{InLanes, Lanes};
+use super::fit::MOST;
+use super::intervals::{
+    Intervals, LANES, Lane, ROOM, aligned, at, energy, load, load3, load4, put, store,
+};
+use crate::branchless::{
+    self, Algebra, Anywhere, Near, Quaternion, Real, Vector, normalised, product, scaled, sum,
+};
+use crate::cpu::{Doubles, InLanes, Lanes};
 use crate::formula::Product;
 use crate::frame_clock::FrameClock;
 
@@ -19,47 +19,57 @@ pub(super) struct Steps<'a>(pub(super) &'a mut Intervals);
 impl InLanes for Steps<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let (whole, noise) = (self.0.whole(), self.0.noise);
-        let Intervals {
-            from,
-            to,
-            dots,
-            steps,
-            logs,
-            holds,
-            count,
-            ..
-        } = &mut *self.0;
-        step_lanes(whole, (from, to), noise, dots, steps, logs, holds);
-        for j in (0..*count).filter(|&j| holds[j] == 0.0) {
-            put(logs, j, branchless::log(at(steps, j)));
+        let own = &mut *self.0;
+        let noise = L::Doubles::all(own.noise);
+        let (one, minus_one) = (L::Doubles::all(1.0), L::Doubles::all(-1.0));
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let (from, to) = (units::<L>(&own.from, lane), units::<L>(&own.to, lane));
+            let [x, y, z, w] = branchless::step(from, to);
+            let flip = noise.up_to(w, one, minus_one);
+            let step = [x * flip, y * flip, z * flip, w * flip];
+            let mut near = Near::new();
+            let log = near.log(step);
+            w.store(&mut own.dots[lane..]);
+            store(&mut own.steps, lane, step);
+            store(&mut own.logs, lane, log);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane, own.count) {
+                    put(&mut own.logs, j, branchless::log(at(&own.steps, j)));
+                }
+            }
         }
     }
 }
 
-#[inline(always)]
-fn step_lanes(
-    count: usize,
-    (from, to): (&[[f32; 4]; ROOM], &[[f32; 4]; ROOM]),
-    noise: f64,
-    dots: &mut Lane,
-    steps: &mut [Lane; 4],
-    logs: &mut [Lane; 3],
-    holds: &mut Lane,
-) {
-    for j in 0..count {
-        let (from, to) = (branchless::unit(from[j]), branchless::unit(to[j]));
-        let [x, y, z, w] = branchless::step(from, to);
-        let flip = if w < noise { -1.0 } else { 1.0 };
-        let step = [x * flip, y * flip, z * flip, w * flip];
-        let mut near = Near::new();
-        let log = near.log(step);
-        dots[j] = w;
-        // Written out: with a loop over the components this one is not vectorised.
-        [steps[0][j], steps[1][j], steps[2][j], steps[3][j]] = step;
-        [logs[0][j], logs[1][j], logs[2][j]] = log;
-        holds[j] = near.holds;
+impl<D: Doubles> Near<D> {
+    #[inline(always)]
+    fn is_in_doubt(&self) -> bool {
+        !self.doubt.are_at_most(0.0)
     }
+
+    /// The lanes where it does not hold, of those from `lane` on and before `end`.
+    #[inline(never)]
+    fn lanes(&self, lane: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
+        let mut doubts = [0.0; MOST];
+        self.doubt.store(&mut doubts);
+        let lanes = (lane..end).zip(doubts);
+        lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane))
+    }
+}
+
+/// Keys in f64, normalised.
+#[inline(always)]
+fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
+    let [x, y, z, w] = L::load_rotations(&keys[lane..]);
+    normalised([x.widened(), y.widened(), z.widened(), w.widened()])
+}
+
+/// As [`aligned`], of the lanes from `lane` on.
+#[inline(always)]
+fn keys<L: Lanes>(keys: &[[f32; 4]; ROOM], signs: &Lane, lane: usize) -> [L::Doubles; 4] {
+    let [x, y, z, w] = units::<L>(keys, lane);
+    let sign = load::<L>(signs, lane);
+    [x * sign, y * sign, z * sign, w * sign]
 }
 
 /// Whether intervals hold a frame.
@@ -70,6 +80,8 @@ pub(super) struct FramesHeld<'a> {
 }
 
 impl InLanes for FramesHeld<'_> {
+    // Loops that the compiler makes vectors of.
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (mut from, mut to) = ([0.0; LANES], [0.0; LANES]);
@@ -86,31 +98,35 @@ impl InLanes for FramesHeld<'_> {
     }
 }
 
-/// A key interval as the rules for handles see it.
+/// A key interval as the rules for handles see it; or those of some lanes.
 #[derive(Clone, Copy)]
-pub(crate) struct Interval {
+pub(crate) struct Interval<R> {
     /// Seconds.
-    pub(crate) duration: f64,
+    pub(crate) duration: R,
     /// `q_i⁻¹ q_{i+1}`.
-    pub(crate) step: Quaternion,
+    pub(crate) step: [R; 4],
     /// Its logarithm, within 1e-12.
-    pub(crate) log: Vector,
+    pub(crate) log: [R; 3],
     /// Numbers that the method has for its first key.
-    pub(crate) key: [f64; 4],
+    pub(crate) key: [R; 4],
 }
 
 /// The handles of a key: half-rotation vectors from the key to its control
 /// rotations, `b_i = q_i exp(-incoming)` and `a_i = q_i exp(outgoing)`.
 #[derive(Clone, Copy)]
-pub(crate) struct Handles {
-    pub(crate) incoming: Vector,
-    pub(crate) outgoing: Vector,
+pub(crate) struct Handles<R> {
+    pub(crate) incoming: [R; 3],
+    pub(crate) outgoing: [R; 3],
 }
 
 /// A rule that gives the handles of a key from the intervals on both sides of it.
 pub(crate) trait HandleRule {
     /// `#[inline(always)]`, and without branches.
-    fn handles(algebra: &mut impl Algebra, before: Interval, after: Interval) -> Handles;
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number>;
 
     /// The handle of the first or of the last key of a track.
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
@@ -153,47 +169,45 @@ pub(crate) struct KeyHandles<'a, R> {
 impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let whole = self.intervals.whole();
-        let Intervals {
-            durations,
-            steps,
-            logs,
-            outward,
-            incoming,
-            outgoing,
-            holds,
-            count,
-            ..
-        } = &mut *self.intervals;
-        let interval = |j: usize| Interval {
-            duration: durations[j],
-            step: at(steps, j),
-            log: at(logs, j),
-            key: at(outward, j),
-        };
-        handle_lanes::<R>(whole, interval, incoming, outgoing, holds);
-        for j in (1..*count).filter(|&j| holds[j] == 0.0) {
-            let handles = R::handles(&mut Anywhere, interval(j - 1), interval(j));
-            put(incoming, j, handles.incoming);
-            put(outgoing, j, handles.outgoing);
+        let own = &mut *self.intervals;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let mut near = Near::new();
+            let (before, after) = (own.intervals::<L>(lane), own.intervals::<L>(lane + 1));
+            let handles = R::handles(&mut near, before, after);
+            store(&mut own.incoming, lane + 1, handles.incoming);
+            store(&mut own.outgoing, lane + 1, handles.outgoing);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane + 1, own.count) {
+                    own.handles_anywhere::<R>(j);
+                }
+            }
         }
     }
 }
 
-#[inline(always)]
-fn handle_lanes<R: HandleRule>(
-    count: usize,
-    interval: impl Fn(usize) -> Interval,
-    incoming: &mut [Lane; 3],
-    outgoing: &mut [Lane; 3],
-    holds: &mut Lane,
-) {
-    for j in 0..count {
-        let mut near = Near::new();
-        let handles = R::handles(&mut near, interval(j), interval(j + 1));
-        put(incoming, j + 1, handles.incoming);
-        put(outgoing, j + 1, handles.outgoing);
-        holds[j + 1] = near.holds;
+impl Intervals {
+    #[inline(always)]
+    fn intervals<L: Lanes>(&self, lane: usize) -> Interval<L::Doubles> {
+        Interval {
+            duration: load::<L>(&self.durations, lane),
+            step: load4::<L, ROOM>(&self.steps, lane),
+            log: load3::<L, ROOM>(&self.logs, lane),
+            key: load4::<L, ROOM>(&self.outward, lane),
+        }
+    }
+
+    /// The handles of the key that an interval starts with, by what holds anywhere.
+    #[inline(never)]
+    fn handles_anywhere<R: HandleRule>(&mut self, lane: usize) {
+        let interval = |lane: usize| Interval {
+            duration: self.durations[lane],
+            step: self.step(lane),
+            log: self.log(lane),
+            key: self.outward(lane),
+        };
+        let handles = R::handles(&mut Anywhere, interval(lane - 1), interval(lane));
+        self.set_incoming(lane, handles.incoming);
+        self.set_outgoing(lane, handles.outgoing);
     }
 }
 
@@ -204,50 +218,39 @@ pub(crate) struct BetweenHandles<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenHandles<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let whole = self.0.whole();
-        let Intervals {
-            from,
-            signs,
-            steps,
-            incoming,
-            outgoing,
-            numbers,
-            energies,
-            holds,
-            count,
-            ..
-        } = &mut *self.0;
-        let key = |j: usize| aligned(from[j], signs[j]);
-        let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
-        let (bases, vectors) = product_numbers(numbers);
-        between_lanes(whole, key, handles, bases, vectors, energies, holds);
-        for j in (0..*count).filter(|&j| holds[j] == 0.0) {
-            let (first, step, last) = handles(j);
-            let middle = between(&mut Anywhere, first, step, last);
-            put_vectors(vectors, j, [first, middle, last]);
-            energies[j] = energy([first, middle, last]);
+        let own = &mut *self.0;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let first = load3::<L, ROOM>(&own.outgoing, lane);
+            let step = load4::<L, ROOM>(&own.steps, lane);
+            let last = load3::<L, ROOM>(&own.incoming, lane + 1);
+            let mut near = Near::new();
+            let middle = between(&mut near, first, step, last);
+            let (bases, vectors) = product_numbers(&mut own.numbers);
+            store(bases, lane, keys::<L>(&own.from, &own.signs, lane));
+            store_vectors(vectors, lane, [first, middle, last]);
+            energy([first, middle, last]).store(&mut own.energies[lane..]);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane, own.count) {
+                    own.between_anywhere(j);
+                }
+            }
         }
     }
 }
 
-#[inline(always)]
-fn between_lanes(
-    count: usize,
-    key: impl Fn(usize) -> Quaternion,
-    handles: impl Fn(usize) -> (Vector, Quaternion, Vector),
-    bases: &mut [Lane; 4],
-    vectors: &mut [Lane; 9],
-    energies: &mut Lane,
-    holds: &mut Lane,
-) {
-    for j in 0..count {
-        let (first, step, last) = handles(j);
-        let mut near = Near::new();
-        let middle = between(&mut near, first, step, last);
-        put(bases, j, key(j));
-        put_vectors(vectors, j, [first, middle, last]);
-        energies[j] = energy([first, middle, last]);
-        holds[j] = near.holds;
+impl Intervals {
+    /// The curve of a lane between its handles, by what holds anywhere.
+    #[inline(never)]
+    fn between_anywhere(&mut self, lane: usize) {
+        let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
+        let middle = between(&mut Anywhere, first, self.step(lane), last);
+        let (_, vectors) = product_numbers(&mut self.numbers);
+        for (own, numbers) in vectors.chunks_exact_mut(3).zip([first, middle, last]) {
+            for (lanes, number) in own.iter_mut().zip(numbers) {
+                lanes[lane] = number;
+            }
+        }
+        self.energies[lane] = energy([first, middle, last]);
     }
 }
 
@@ -263,21 +266,22 @@ fn product_numbers(numbers: &mut [Lane]) -> (&mut [Lane; 4], &mut [Lane; 9]) {
 }
 
 #[inline(always)]
-fn put_vectors(lanes: &mut [Lane; 9], lane: usize, [a, b, c]: [Vector; 3]) {
+fn store_vectors<D: Doubles>(lanes: &mut [Lane; 9], lane: usize, [a, b, c]: [[D; 3]; 3]) {
     let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
-    put(lanes, lane, all);
+    store(lanes, lane, all);
 }
 
 /// `log(a⁻¹ b)`.
 #[inline(always)]
-fn between(
-    algebra: &mut impl Algebra,
-    outgoing: Vector,
-    step: Quaternion,
-    incoming: Vector,
-) -> Vector {
-    let from_a = product(algebra.exp(scaled(outgoing, -1.0)), step);
-    let middle = product(from_a, algebra.exp(scaled(incoming, -1.0)));
+fn between<A: Algebra>(
+    algebra: &mut A,
+    outgoing: [A::Number; 3],
+    step: [A::Number; 4],
+    incoming: [A::Number; 3],
+) -> [A::Number; 3] {
+    let back = A::Number::all(-1.0);
+    let from_a = product(algebra.exp(scaled(outgoing, back)), step);
+    let middle = product(from_a, algebra.exp(scaled(incoming, back)));
     algebra.log(middle)
 }
 
@@ -339,45 +343,25 @@ pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenNeighbours<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let whole = self.0.whole();
-        let Intervals {
-            from,
-            signs,
-            logs,
-            numbers,
-            energies,
-            holds,
-            count,
-            ..
-        } = &mut *self.0;
-        let key = |j: usize| aligned(from[j], signs[j]);
-        let log = |j: usize| at(logs, j);
-        let (bases, vectors) = product_numbers(numbers);
-        neighbour_lanes(whole, key, log, bases, vectors, energies, holds);
-        for j in (1..*count).filter(|&j| holds[j] == 0.0) {
-            let back = branchless::exp(scaled(log(j - 1), -1.0));
-            put(bases, j, product(key(j), back));
+        let own = &mut *self.0;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let before = load3::<L, ROOM>(&own.logs, lane);
+            let log = load3::<L, ROOM>(&own.logs, lane + 1);
+            let after = load3::<L, ROOM>(&own.logs, lane + 2);
+            let mut near = Near::new();
+            let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
+            let base = product(keys::<L>(&own.from, &own.signs, lane + 1), back);
+            let (bases, vectors) = product_numbers(&mut own.numbers);
+            store(bases, lane + 1, base);
+            store_vectors(vectors, lane + 1, [before, log, after]);
+            energy([before, log, after]).store(&mut own.energies[lane + 1..]);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane + 1, own.count) {
+                    let back = branchless::exp(scaled(own.log(j - 1), -1.0));
+                    let base = product(own.key(j), back);
+                    put(product_numbers(&mut own.numbers).0, j, base);
+                }
+            }
         }
-    }
-}
-
-#[inline(always)]
-fn neighbour_lanes(
-    count: usize,
-    key: impl Fn(usize) -> Quaternion,
-    log: impl Fn(usize) -> Vector,
-    bases: &mut [Lane; 4],
-    vectors: &mut [Lane; 9],
-    energies: &mut Lane,
-    holds: &mut Lane,
-) {
-    for j in 0..count {
-        let (before, own, after) = (log(j), log(j + 1), log(j + 2));
-        put_vectors(vectors, j + 1, [before, own, after]);
-        energies[j + 1] = energy([before, own, after]);
-        let mut near = Near::new();
-        let back = near.exp(scaled(before, -1.0));
-        put(bases, j + 1, product(key(j + 1), back));
-        holds[j + 1] = near.holds;
     }
 }

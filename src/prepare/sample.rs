@@ -1,11 +1,11 @@
 //! Samples of cubics, in vector lanes: the first half of a fit.
 
 use super::fit::{FitBlock, Lane64, MOST, Samples, Tier};
+use super::intervals::{LANES, load, load3, load4};
 use super::nodes::Nodes;
 use super::shape::Sampling;
 use crate::branchless::{
-    self, Arithmetic, LONG_SQUARE, Real as _, SHORT_SQUARE, long_waves, product, scaled,
-    short_waves,
+    self, LONG_SQUARE, Real as _, SHORT_SQUARE, long_waves, product, scaled, short_waves, square,
 };
 use crate::cpu::{Doubles, Lanes, Number, short_sine_and_fall, sine_and_fall};
 use crate::formula::{Numbers, Product};
@@ -44,7 +44,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
         let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
-        let base = load4::<L>(&block.numbers, 0, lane);
+        let base = load4::<L, LANES>(from(&block.numbers, 0), lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
         block.interpolate(lane, nodes, &samples, segments);
     }
@@ -75,7 +75,7 @@ impl<L: Lanes> Factor<L> {
     ) -> Self {
         let place = Product::BASIS + 4 * j;
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load4::<L>(&block.numbers, place, lane)
+            load4::<L, LANES>(from(&block.numbers, place), lane)
         } else {
             [
                 all::<L>(shared[place]),
@@ -92,8 +92,8 @@ impl<L: Lanes> Factor<L> {
                 load::<L>(&block.widths, lane),
             )
         };
-        let vector = load3::<L>(&block.numbers, Product::VECTORS + 3 * j, lane);
-        let square = square_of(vector);
+        let vector = load3::<L, LANES>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let squared = square(vector);
         let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
         // B_j(middle + s width) - B_j(middle), in powers of s.
         let two = all::<L>(2.0);
@@ -113,9 +113,9 @@ impl<L: Lanes> Factor<L> {
                 L::rounded(vector[1]),
                 L::rounded(vector[2]),
             ],
-            square: L::rounded(square),
+            square: L::rounded(squared),
             powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
-            reach: square * far,
+            reach: squared * far,
         }
     }
 }
@@ -123,15 +123,15 @@ impl<L: Lanes> Factor<L> {
 /// The exponentials of half-rotation vectors; fastest where all are short.
 #[inline(always)]
 fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
-    let square = square_of(vector);
+    let squared = square(vector);
     let (limit, (sinc, cosine)) = if SHORT {
-        (SHORT_SQUARE, short_waves(square))
+        (SHORT_SQUARE, short_waves(squared))
     } else {
-        (LONG_SQUARE, long_waves(square))
+        (LONG_SQUARE, long_waves(squared))
     };
     let [x, y, z] = scaled(vector, sinc);
     let turn = [x, y, z, cosine];
-    if square.are_at_most(limit) {
+    if squared.are_at_most(limit) {
         return turn;
     }
     let mut lanes = Turns::default();
@@ -160,7 +160,7 @@ impl Turns {
         for lane in 0..MOST {
             let vector = self.vectors.map(|lanes| lanes[lane]);
             // NaN is none.
-            if !(square_of(vector) <= limit) {
+            if !(square(vector) <= limit) {
                 let turn = branchless::exp(vector);
                 for c in 0..4 {
                     self.turns[c][lane] = turn[c];
@@ -168,11 +168,6 @@ impl Turns {
             }
         }
     }
-}
-
-#[inline(always)]
-fn square_of<N: Arithmetic>([x, y, z]: [N; 3]) -> N {
-    x * x + y * y + z * z
 }
 
 /// `a v`, `v` a vector.
@@ -305,26 +300,10 @@ fn all<L: Lanes>(value: f64) -> L::Doubles {
     L::Doubles::all(value)
 }
 
+/// So many numbers from a place on.
 #[inline(always)]
-fn load<L: Lanes>(lanes: &Lane64, lane: usize) -> L::Doubles {
-    L::Doubles::load(&lanes[lane..])
-}
-
-/// Three numbers from a place on.
-#[inline(always)]
-fn load3<L: Lanes>(numbers: &[Lane64], place: usize, lane: usize) -> [L::Doubles; 3] {
-    [
-        load::<L>(&numbers[place], lane),
-        load::<L>(&numbers[place + 1], lane),
-        load::<L>(&numbers[place + 2], lane),
-    ]
-}
-
-/// Four numbers from a place on.
-#[inline(always)]
-fn load4<L: Lanes>(numbers: &[Lane64], place: usize, lane: usize) -> [L::Doubles; 4] {
-    let [x, y, z] = load3::<L>(numbers, place, lane);
-    [x, y, z, load::<L>(&numbers[place + 3], lane)]
+fn from<const N: usize>(numbers: &[Lane64], place: usize) -> &[Lane64; N] {
+    numbers[place..].first_chunk().expect("a product's numbers")
 }
 
 #[inline(always)]

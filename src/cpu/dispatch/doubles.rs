@@ -1,19 +1,14 @@
 //! [`Doubles`](crate::cpu::lanes::Doubles) as two vectors, each with half of the samples.
 
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{
-    __m128d as Pair, _mm_add_pd as add, _mm_cmple_pd, _mm_cvtpd_ps, _mm_max_pd as larger,
-    _mm_movelh_ps, _mm_movemask_pd, _mm_mul_pd as mul, _mm_set1_pd as all, _mm_sub_pd as sub,
-};
-
-#[cfg(not(target_arch = "x86_64"))]
-use glam::DVec2 as Pair;
 use glam::Vec4;
+
+use pair::Pair;
 
 /// Makes two vectors of so many numbers by these functions of one, which `$run` calls.
 macro_rules! doubles {
     ($name:ident: $vector:ident, $count:literal, $run:ident, $all:path, $add:path, $sub:path,
-     $mul:path, $max:path, $are_at_most:path) => {
+     $mul:path, $div:path, $negated:path, $root:path, $min:path, $max:path, $up_to:path,
+     $are_at_most:path) => {
         /// As many numbers as a vector of f32 has lanes.
         #[derive(Clone, Copy)]
         pub(crate) struct $name(pub(super) [$vector; 2]);
@@ -48,10 +43,55 @@ macro_rules! doubles {
             }
         }
 
+        impl std::ops::Div for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn div(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$div(a, c), $div(b, d)]))
+            }
+        }
+
+        impl std::ops::Neg for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let Self([a, b]) = self;
+                Self([$negated(a), $negated(b)])
+            }
+        }
+
         impl $crate::branchless::Real for $name {
             #[inline(always)]
             fn all(value: f64) -> Self {
                 Self([$run!($all(value)); 2])
+            }
+
+            #[inline(always)]
+            fn root(self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$root(a), $root(b)]))
+            }
+
+            #[inline(always)]
+            fn smaller(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$min(a, c), $min(b, d)]))
+            }
+
+            #[inline(always)]
+            fn larger(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$max(a, c), $max(b, d)]))
+            }
+
+            #[inline(always)]
+            fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self {
+                let ([a, b], [c, d]) = (self.0, limit.0);
+                let ([e, f], [g, h]) = (then.0, otherwise.0);
+                Self([$up_to(a, c, e, g), $up_to(b, d, f, h)])
             }
         }
 
@@ -69,22 +109,15 @@ macro_rules! doubles {
             }
 
             #[inline(always)]
-            fn larger(self, Self([c, d]): Self) -> Self {
-                let Self([a, b]) = self;
-                Self($run!([$max(a, c), $max(b, d)]))
-            }
-
-            #[inline(always)]
             fn are_at_most(self, limit: f64) -> bool {
                 let Self([a, b]) = self;
-                $run!({
-                    let limit = $all(limit);
-                    $are_at_most(a, limit) && $are_at_most(b, limit)
-                })
+                let limit = $run!($all(limit));
+                $are_at_most(a, limit) && $are_at_most(b, limit)
             }
         }
     };
 }
+#[cfg(target_arch = "x86_64")]
 pub(super) use doubles;
 
 /// What every processor of the target does.
@@ -102,12 +135,9 @@ macro_rules! baseline {
     };
 }
 
-#[cfg(target_arch = "x86_64")]
-doubles!(Four: Pair, 2, baseline, all, add, sub, mul, larger, are_at_most);
-#[cfg(not(target_arch = "x86_64"))]
 doubles!(
-    Four: Pair, 2, baseline, Pair::splat, std::ops::Add::add, std::ops::Sub::sub,
-    std::ops::Mul::mul, larger, are_at_most
+    Four: Pair, 2, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div,
+    pair::negated, pair::root, pair::smaller, pair::larger, pair::up_to, pair::are_at_most
 );
 
 impl Four {
@@ -115,32 +145,119 @@ impl Four {
     #[inline(always)]
     pub(crate) fn rounded(self) -> Vec4 {
         let Self([a, b]) = self;
-        rounded(a, b)
+        pair::rounded(a, b)
+    }
+
+    /// The same in f64.
+    #[inline(always)]
+    pub(crate) fn of(numbers: Vec4) -> Self {
+        Self(pair::widened(numbers))
     }
 }
 
+/// Two numbers, by SSE2.
 #[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn are_at_most(numbers: Pair, limit: Pair) -> bool {
-    baseline!(_mm_movemask_pd(_mm_cmple_pd(numbers, limit)) == 0b11)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn rounded(a: Pair, b: Pair) -> Vec4 {
-    Vec4::from(baseline!(_mm_movelh_ps(_mm_cvtpd_ps(a), _mm_cvtpd_ps(b))))
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-use pair::{are_at_most, larger, rounded};
-
-#[cfg(not(target_arch = "x86_64"))]
 mod pair {
-    use super::{Pair, Vec4};
+    use std::arch::x86_64::{
+        __m128, _mm_and_pd, _mm_andnot_pd, _mm_cmple_pd, _mm_cvtpd_ps, _mm_cvtps_pd, _mm_movehl_ps,
+        _mm_movelh_ps, _mm_movemask_pd, _mm_or_pd, _mm_set1_pd, _mm_xor_pd,
+    };
+    pub(super) use std::arch::x86_64::{
+        __m128d as Pair, _mm_add_pd as add, _mm_div_pd as div, _mm_max_pd as larger,
+        _mm_min_pd as smaller, _mm_mul_pd as mul, _mm_set1_pd as all, _mm_sqrt_pd as root,
+        _mm_sub_pd as sub,
+    };
+
+    use super::Vec4;
 
     #[inline(always)]
-    pub(super) fn larger(own: Pair, other: Pair) -> Pair {
-        Pair::select(own.cmpgt(other), own, other)
+    pub(super) fn negated(numbers: Pair) -> Pair {
+        baseline!(_mm_xor_pd(numbers, _mm_set1_pd(-0.0)))
+    }
+
+    #[inline(always)]
+    pub(super) fn up_to(numbers: Pair, limit: Pair, then: Pair, otherwise: Pair) -> Pair {
+        baseline! {
+            let within = _mm_cmple_pd(numbers, limit);
+            _mm_or_pd(_mm_and_pd(within, then), _mm_andnot_pd(within, otherwise))
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn are_at_most(numbers: Pair, limit: Pair) -> bool {
+        baseline!(_mm_movemask_pd(_mm_cmple_pd(numbers, limit)) == 0b11)
+    }
+
+    #[inline(always)]
+    pub(super) fn rounded(a: Pair, b: Pair) -> Vec4 {
+        Vec4::from(baseline!(_mm_movelh_ps(_mm_cvtpd_ps(a), _mm_cvtpd_ps(b))))
+    }
+
+    #[inline(always)]
+    pub(super) fn widened(numbers: Vec4) -> [Pair; 2] {
+        let numbers = __m128::from(numbers);
+        baseline!([
+            _mm_cvtps_pd(numbers),
+            _mm_cvtps_pd(_mm_movehl_ps(numbers, numbers))
+        ])
+    }
+}
+
+/// Two numbers, by what the compiler makes of them.
+#[cfg(not(target_arch = "x86_64"))]
+mod pair {
+    pub(super) use glam::DVec2 as Pair;
+
+    use super::Vec4;
+
+    #[inline(always)]
+    pub(super) fn all(value: f64) -> Pair {
+        Pair::splat(value)
+    }
+
+    #[inline(always)]
+    pub(super) fn add(a: Pair, b: Pair) -> Pair {
+        a + b
+    }
+
+    #[inline(always)]
+    pub(super) fn sub(a: Pair, b: Pair) -> Pair {
+        a - b
+    }
+
+    #[inline(always)]
+    pub(super) fn mul(a: Pair, b: Pair) -> Pair {
+        a * b
+    }
+
+    #[inline(always)]
+    pub(super) fn div(a: Pair, b: Pair) -> Pair {
+        a / b
+    }
+
+    #[inline(always)]
+    pub(super) fn negated(numbers: Pair) -> Pair {
+        -numbers
+    }
+
+    #[inline(always)]
+    pub(super) fn root(numbers: Pair) -> Pair {
+        Pair::new(numbers.x.sqrt(), numbers.y.sqrt())
+    }
+
+    #[inline(always)]
+    pub(super) fn smaller(a: Pair, b: Pair) -> Pair {
+        Pair::select(a.cmplt(b), a, b)
+    }
+
+    #[inline(always)]
+    pub(super) fn larger(a: Pair, b: Pair) -> Pair {
+        Pair::select(a.cmpgt(b), a, b)
+    }
+
+    #[inline(always)]
+    pub(super) fn up_to(numbers: Pair, limit: Pair, then: Pair, otherwise: Pair) -> Pair {
+        Pair::select(numbers.cmple(limit), then, otherwise)
     }
 
     #[inline(always)]
@@ -151,6 +268,12 @@ mod pair {
     #[inline(always)]
     pub(super) fn rounded(a: Pair, b: Pair) -> Vec4 {
         Vec4::new(a.x as f32, a.y as f32, b.x as f32, b.y as f32)
+    }
+
+    #[inline(always)]
+    pub(super) fn widened(numbers: Vec4) -> [Pair; 2] {
+        let [x, y, z, w] = numbers.to_array().map(f64::from);
+        [Pair::new(x, y), Pair::new(z, w)]
     }
 }
 
@@ -168,13 +291,22 @@ pub(crate) mod tests {
         let mut stored = vec![0.0; L::COUNT];
         let mut rounded = vec![0.0; L::COUNT];
         L::rounded(found).store(&mut rounded);
+        let widened = L::load(&rounded).widened();
         type Same = fn(f64) -> f64;
-        let cases: [(L::Doubles, Same); 5] = [
+        let cases: [(L::Doubles, Same); 11] = [
             (found, |x| x),
+            (widened, |x| f64::from(x as f32)),
             (found + two, |x| x + 2.0),
             (found - two, |x| x - 2.0),
             (found * two, |x| x * 2.0),
-            (found.larger(two - two), |x| if x > 0.0 { x } else { 0.0 }),
+            (two / found, |x| 2.0 / x),
+            (-found, |x| -x),
+            ((found * found).root(), f64::abs),
+            (found.smaller(two), |x| if x < 2.0 { x } else { 2.0 }),
+            (found.larger(two), |x| if x > 2.0 { x } else { 2.0 }),
+            (found.up_to(two, found, -two), |x| {
+                if x <= 2.0 { x } else { -2.0 }
+            }),
         ];
         for (doubles, same) in cases {
             doubles.store(&mut stored);
@@ -189,9 +321,15 @@ pub(crate) mod tests {
                 assert!(L::Doubles::load(&all).are_at_most(4.0));
                 all[k] = other;
                 assert!(!L::Doubles::load(&all).are_at_most(4.0));
-                let larger = L::Doubles::load(&all).larger(two);
-                larger.store(&mut stored);
-                assert_eq!(stored[k], if other > 2.0 { other } else { 2.0 });
+                let own = L::Doubles::load(&all);
+                for (doubles, of_none) in [
+                    (own.larger(two), 2.0),
+                    (own.smaller(two), 2.0),
+                    (own.up_to(two, own, two + two), 4.0),
+                ] {
+                    doubles.store(&mut stored);
+                    assert!(!other.is_nan() || stored[k] == of_none);
+                }
             }
         }
     }

@@ -2,11 +2,13 @@
 
 use std::arch::x86_64::{
     __m256, __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_pd, _mm256_add_ps,
-    _mm256_and_ps, _mm256_blendv_ps, _mm256_castps_pd, _mm256_cmp_pd, _mm256_cmp_ps,
-    _mm256_cvtpd_ps, _mm256_max_pd, _mm256_max_ps, _mm256_movemask_pd, _mm256_movemask_ps,
-    _mm256_mul_pd, _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set_m128, _mm256_set1_pd,
-    _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sub_pd, _mm256_sub_ps,
-    _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
+    _mm256_and_ps, _mm256_blendv_pd, _mm256_blendv_ps, _mm256_castps_pd, _mm256_castps256_ps128,
+    _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd,
+    _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
+    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set_m128,
+    _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sqrt_pd,
+    _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd,
+    _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -115,12 +117,25 @@ impl Eight {
 
 doubles!(
     EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
-    _mm256_mul_pd, _mm256_max_pd, are_at_most
+    _mm256_mul_pd, _mm256_div_pd, negated, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to,
+    are_at_most
 );
 
-/// Only with AVX2.
 #[inline(always)]
-unsafe fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
+fn negated(numbers: __m256d) -> __m256d {
+    avx2!(_mm256_xor_pd(numbers, _mm256_set1_pd(-0.0)))
+}
+
+#[inline(always)]
+fn up_to(numbers: __m256d, limit: __m256d, then: __m256d, otherwise: __m256d) -> __m256d {
+    avx2! {
+        let within = _mm256_cmp_pd::<_CMP_LE_OQ>(numbers, limit);
+        _mm256_blendv_pd(otherwise, then, within)
+    }
+}
+
+#[inline(always)]
+fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
     avx2! {
         let within = _mm256_cmp_pd::<_CMP_LE_OQ>(numbers, limit);
         _mm256_movemask_pd(within) == 0b1111
@@ -137,6 +152,19 @@ impl Lanes for Eight {
         Self(avx2! {
             let samples = _mm256_set_m128(_mm256_cvtpd_ps(b), _mm256_cvtpd_ps(a));
             _mm256_permutevar8x32_ps(samples, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7))
+        })
+    }
+
+    #[inline(always)]
+    fn widened(self) -> EightDoubles {
+        EightDoubles(avx2! {
+            let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+            let samples = _mm256_permutevar8x32_ps(self.0, order);
+            let (low, high) = (
+                _mm256_castps256_ps128(samples),
+                _mm256_extractf128_ps::<1>(samples),
+            );
+            [_mm256_cvtps_pd(low), _mm256_cvtps_pd(high)]
         })
     }
 
