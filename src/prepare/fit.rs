@@ -92,7 +92,7 @@ pub(super) struct FitBlock {
 }
 
 /// The rotations at the nodes of curves: those of the middle, and differences from it at
-/// each pair of nodes, their mean and half of what they differ by.
+/// each pair of nodes, their sum and what they differ by.
 pub(super) struct Samples<N, const PAIRS: usize> {
     pub(super) middle: [N; 4],
     pub(super) even: [[N; 4]; PAIRS],

@@ -102,8 +102,8 @@ fn sample<const PAIRS: usize>(
         for (k, [before, after]) in pairs.iter().enumerate() {
             let rise = (after[c] - between[c]) / unit;
             let fall = (before[c] - between[c]) / unit;
-            even[k][c][lane] = ((rise + fall) * 0.5) as f32;
-            odd[k][c][lane] = ((rise - fall) * 0.5) as f32;
+            even[k][c][lane] = (rise + fall) as f32;
+            odd[k][c][lane] = (rise - fall) as f32;
         }
     }
     unit as f32

@@ -226,14 +226,13 @@ impl<L: Lanes> Expanded<L> {
         &self,
         nodes: &Nodes<PAIRS>,
     ) -> Samples<L, PAIRS> {
-        let half = L::all(0.5);
         let mut samples = Samples::all(L::all(0.0));
         samples.middle = self.terms[0];
         for k in 0..PAIRS {
             let [before, after] = self.differences::<SHORT>(L::all(nodes.at[k]));
             for c in 0..4 {
-                samples.even[k][c] = (after[c] + before[c]) * half;
-                samples.odd[k][c] = (after[c] - before[c]) * half;
+                samples.even[k][c] = after[c] + before[c];
+                samples.odd[k][c] = after[c] - before[c];
             }
         }
         samples
@@ -254,21 +253,23 @@ impl<L: Lanes> Expanded<L> {
             let sc = s2 + s2 * f3;
             let ss = s2 * s3;
             let cc = L::all(1.0) + both;
+            let c1 = L::all(1.0) + f1;
+            let weights = [
+                both + cc * f1,
+                cs * c1,
+                sc * c1,
+                ss * c1,
+                cc * s1,
+                cs * s1,
+                sc * s1,
+                ss * s1,
+            ];
             for c in 0..4 {
-                let terms = [
-                    self.terms[0][c],
-                    self.terms[1][c],
-                    self.terms[2][c],
-                    self.terms[3][c],
-                    self.terms[4][c],
-                    self.terms[5][c],
-                    self.terms[6][c],
-                    self.terms[7][c],
-                ];
-                let rest = terms[1] * cs + terms[2] * sc + terms[3] * ss;
-                let even = terms[0] * both + rest;
-                let odd = terms[4] * cc + terms[5] * cs + terms[6] * sc + terms[7] * ss;
-                differences[i][c] = even + (terms[0] + even) * f1 + odd * s1;
+                let first = self.terms[0][c] * weights[0] + self.terms[1][c] * weights[1];
+                let second = self.terms[2][c] * weights[2] + self.terms[3][c] * weights[3];
+                let third = self.terms[4][c] * weights[4] + self.terms[5][c] * weights[5];
+                let fourth = self.terms[6][c] * weights[6] + self.terms[7][c] * weights[7];
+                differences[i][c] = (first + second) + (third + fourth);
             }
         }
         differences

@@ -166,8 +166,8 @@ impl<F: Formula> Sampling for Directly<F> {
                 let after = [x.0, y.0, z.0, w.0];
                 for c in 0..4 {
                     let middle = middles[c][lane];
-                    even[k][c][lane] = (((after[c] - middle) + (before[c] - middle)) * 0.5) as f32;
-                    odd[k][c][lane] = ((after[c] - before[c]) * 0.5) as f32;
+                    even[k][c][lane] = ((after[c] - middle) + (before[c] - middle)) as f32;
+                    odd[k][c][lane] = (after[c] - before[c]) as f32;
                 }
                 doubts[lane] += doubt(before) + doubt(after);
             }
@@ -203,9 +203,9 @@ fn sample_anywhere<F: Formula, const PAIRS: usize>(
         let before: Quaternion = F::rotation(&numbers, block.middles[lane] - reach);
         let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
         for c in 0..4 {
-            let mean = ((after[c] - between[c]) + (before[c] - between[c])) * 0.5;
-            even[k][c][lane] = mean as f32;
-            odd[k][c][lane] = ((after[c] - before[c]) * 0.5) as f32;
+            let sum = (after[c] - between[c]) + (before[c] - between[c]);
+            even[k][c][lane] = sum as f32;
+            odd[k][c][lane] = (after[c] - before[c]) as f32;
         }
     }
 }
