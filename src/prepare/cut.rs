@@ -79,29 +79,25 @@ impl Cutter {
             let block = self.block.get_or_insert_with(new);
             block.clear();
             let some = done..self.waiting.len().min(done + LANES);
-            for part in &mut self.waiting[some.clone()] {
+            for part in &self.waiting[some.clone()] {
                 block.push(&self.curves[part.curve], part.piece);
-                part.segment = self.spare.pop().or_else(|| {
+                if self.spare.len() < block.count() {
+                    self.spare.push(segments.len());
                     segments.push(PolynomialSegment::zeroed());
-                    Some(segments.len() - 1)
-                });
+                }
             }
-            let places = self.waiting[some.clone()].iter();
-            block.run(segments, places.filter_map(|part| part.segment));
+            let first = self.spare.len() - block.count();
+            block.run(segments, self.spare.drain(first..));
             for (lane, part) in some.clone().enumerate() {
                 let part = self.waiting[part];
-                if part
-                    .segment
-                    .is_some_and(|own| block.fits(lane, &segments[own]))
-                {
-                    self.parts.push(part);
+                if block.fits(lane, segments) {
+                    self.parts.push(Part {
+                        segment: Some(block.place(lane)),
+                        ..part
+                    });
                     continue;
                 }
-                self.spare.extend(part.segment);
-                let part = Part {
-                    segment: None,
-                    ..part
-                };
+                self.spare.push(block.place(lane));
                 if part.piece.is_finest() {
                     self.parts.push(part);
                 } else {

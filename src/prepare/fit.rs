@@ -150,6 +150,11 @@ impl FitBlock {
         self.tier
     }
 
+    /// The segment that the curve in a lane has become.
+    pub(super) fn place(&self, lane: usize) -> usize {
+        self.places[lane]
+    }
+
     /// How many curves it has.
     pub(super) fn count(&self) -> usize {
         self.count
@@ -272,15 +277,15 @@ impl FitBlock {
         }
     }
 
-    /// Whether the polynomial of a lane, which has become a segment, is near enough to its
-    /// curve.
-    pub(super) fn fits(&self, lane: usize, segment: &PolynomialSegment) -> bool {
+    /// Whether the polynomial of a lane is near enough to its curve.
+    pub(super) fn fits(&self, lane: usize, segments: &[PolynomialSegment]) -> bool {
         let reach = match self.tier {
             Tier::Gentle | Tier::Full => SHORT_REACH,
             Tier::Piece => REACH,
         };
         let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= reach * reach;
-        is_near && segment.coefficients[0].iter().all(|c| c.is_finite())
+        let [middle, ..] = &segments[self.places[lane]].coefficients;
+        is_near && middle.iter().all(|c| c.is_finite())
     }
 
     /// From the differences at the nodes to the coefficients.

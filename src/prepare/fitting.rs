@@ -153,11 +153,11 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     let Segments::Polynomial(segments) = &mut prepared.segments else {
         unreachable!("the method's form")
     };
-    block.run(segments, places.clone());
+    block.run(segments, places);
     if !block.is_trusted() {
-        for ((lane, &span), place) in own.iter().enumerate().zip(places) {
-            if !block.fits(lane, &segments[place]) {
-                cutter.push(span, block.curve(lane), Some(place));
+        for (lane, &span) in own.iter().enumerate() {
+            if !block.fits(lane, segments) {
+                cutter.push(span, block.curve(lane), Some(block.place(lane)));
             }
         }
     }
