@@ -3,14 +3,21 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::branchless::{arc_tangent, near_arc_square, near_waves, sine_cosine};
+use crate::branchless::{Real, arc_tangent, near_arc_square, near_waves, sine_cosine};
 
 /// A number that depends on time.
 pub(crate) trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// A number that does not.
-    fn constant(value: f64) -> Self;
+    /// What does not depend on it: f64, or a vector of them.
+    type Constant: Real;
+    /// A number that does not depend on time.
+    fn constant(value: Self::Constant) -> Self;
+    /// The same for all.
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        Self::constant(Self::Constant::all(value))
+    }
     /// `sin(x)/x` and `cos(x)`, given `x²`: both are smooth in it, also at 0.
     fn waves(self) -> (Self, Self);
     /// `x²`, given `sin²(x/2)`, 0 to 1: for `x` up to pi.
@@ -20,6 +27,8 @@ pub(crate) trait Scalar:
 }
 
 impl Scalar for f64 {
+    type Constant = Self;
+
     #[inline(always)]
     fn constant(value: f64) -> Self {
         value
@@ -49,18 +58,22 @@ impl Scalar for f64 {
 
     #[inline(always)]
     fn reciprocal_root(self) -> f64 {
-        // What is no curve any more shall still be a number.
-        let root = self.sqrt();
-        1.0 / if root > 1e-150 { root } else { 1e-150 }
+        reciprocal_root(self)
     }
 }
 
-/// As f64, for lanes: by polynomials alone, without a range reduction, a root or a division
-/// for each angle. NaN, which stays, where an angle is more than pi/2.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Near(pub(crate) f64);
+/// `1/√x`; what is no curve any more shall still be a number.
+#[inline(always)]
+fn reciprocal_root<R: Real>(x: R) -> R {
+    R::all(1.0) / x.root().larger(R::all(1e-150))
+}
 
-impl Add for Near {
+/// By polynomials alone, without a range reduction, a root or a division for each angle.
+/// NaN, which stays, where an angle is more than pi/2.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near<R>(pub(crate) R);
+
+impl<R: Real> Add for Near<R> {
     type Output = Self;
 
     #[inline(always)]
@@ -69,7 +82,7 @@ impl Add for Near {
     }
 }
 
-impl Sub for Near {
+impl<R: Real> Sub for Near<R> {
     type Output = Self;
 
     #[inline(always)]
@@ -78,7 +91,7 @@ impl Sub for Near {
     }
 }
 
-impl Mul for Near {
+impl<R: Real> Mul for Near<R> {
     type Output = Self;
 
     #[inline(always)]
@@ -87,9 +100,11 @@ impl Mul for Near {
     }
 }
 
-impl Scalar for Near {
+impl<R: Real> Scalar for Near<R> {
+    type Constant = R;
+
     #[inline(always)]
-    fn constant(value: f64) -> Self {
+    fn constant(value: R) -> Self {
         Self(value)
     }
 
@@ -106,7 +121,7 @@ impl Scalar for Near {
 
     #[inline(always)]
     fn reciprocal_root(self) -> Self {
-        Self(self.0.reciprocal_root())
+        Self(reciprocal_root(self.0))
     }
 }
 
@@ -184,6 +199,8 @@ fn series(coefficients: &[f64], x: f64) -> [f64; 3] {
 }
 
 impl Scalar for Jet {
+    type Constant = f64;
+
     fn constant(value: f64) -> Self {
         Self {
             value,

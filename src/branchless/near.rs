@@ -186,7 +186,7 @@ pub(crate) fn short_waves<R: Real>(square: R) -> (R, R) {
 
 /// `sin(x)/x` and `cos(x)` by `x²`, which is at most (pi/2)²; else NaN.
 #[inline(always)]
-pub(crate) fn near_waves(square: f64) -> (f64, f64) {
+pub(crate) fn near_waves<R: Real>(square: R) -> (R, R) {
     let doubt = near_or_nan(square, LONG_SQUARE);
     let (sinc, cosine) = long_waves(square);
     (sinc + doubt, cosine + doubt)
@@ -194,14 +194,14 @@ pub(crate) fn near_waves(square: f64) -> (f64, f64) {
 
 /// `x²` by `sin²(x/2)`, which is at most 1/2; else NaN.
 #[inline(always)]
-pub(crate) fn near_arc_square(v: f64) -> f64 {
-    4.0 * v * one_plus(&ARC_SQUARE, v) + near_or_nan(v, 0.5)
+pub(crate) fn near_arc_square<R: Real>(v: R) -> R {
+    R::all(4.0) * v * one_plus(&ARC_SQUARE, v) + near_or_nan(v, 0.5)
 }
 
 /// 0 up to a limit, else NaN.
 #[inline(always)]
-fn near_or_nan(value: f64, limit: f64) -> f64 {
-    if value <= limit { 0.0 } else { f64::NAN }
+fn near_or_nan<R: Real>(value: R, limit: f64) -> R {
+    value.up_to(R::all(limit), R::all(0.0), R::all(f64::NAN))
 }
 
 impl<R: Real> Near<R> {

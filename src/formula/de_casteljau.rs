@@ -4,14 +4,14 @@
 //! signs give. Cutting such a curve by the construction does not reproduce it, as it
 //! does in flat space.
 
-use super::{Formula, Numbers, quaternion, slerp};
+use super::{Formula, NUMBERS, quaternion, slerp};
 use crate::scalar::Scalar;
 
 pub(crate) struct DeCasteljau;
 
 impl Formula for DeCasteljau {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let (q0, a) = (quaternion(numbers, 0), quaternion(numbers, 4));
         let (b, q1) = (quaternion(numbers, 8), quaternion(numbers, 12));
         let middle = slerp(a, b, t);

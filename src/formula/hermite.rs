@@ -1,6 +1,6 @@
 //! Curves in the four components, normalised: straight lines, and the cubics of glTF.
 
-use super::{Formula, Numbers, normalised, quaternion, weighted};
+use super::{Formula, NUMBERS, normalised, quaternion, weighted};
 use crate::scalar::Scalar;
 
 /// `((1-t) q0 + t q1) / |…|`. Numbers: `q0`, two that are not used, `q1`.
@@ -8,8 +8,8 @@ pub(crate) struct Linear;
 
 impl Formula for Linear {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
-        let rest = S::constant(1.0) - t;
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let rest = S::all(1.0) - t;
         normalised(weighted(
             quaternion(numbers, 0),
             rest,
@@ -26,12 +26,12 @@ pub(crate) struct Hermite;
 
 impl Formula for Hermite {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
-        let one = S::constant(1.0);
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let one = S::all(1.0);
         let rest = one - t;
-        let two = S::constant(2.0);
+        let two = S::all(2.0);
         let start = (one + two * t) * rest * rest;
-        let end = t * t * (S::constant(3.0) - two * t);
+        let end = t * t * (S::all(3.0) - two * t);
         let leaving = t * rest * rest;
         let arriving = t * t * (t - one);
         let keys = weighted(quaternion(numbers, 0), start, quaternion(numbers, 12), end);

@@ -1,14 +1,14 @@
 //! A straight line in the four components. Numbers: where it is at 0, and its slope.
 
-use super::{Formula, Numbers, quaternion, weighted};
+use super::{Formula, NUMBERS, quaternion, weighted};
 use crate::scalar::Scalar;
 
 pub(crate) struct Line;
 
 impl Formula for Line {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let start = quaternion(numbers, 0);
-        weighted(start, S::constant(1.0), quaternion(numbers, 4), t)
+        weighted(start, S::all(1.0), quaternion(numbers, 4), t)
     }
 }

@@ -28,13 +28,14 @@ pub(crate) type Numbers = [f64; NUMBERS];
 
 /// A curve in the rotations.
 pub(crate) trait Formula: 'static {
-    /// The rotation at `t`; `#[inline(always)]` and without branches.
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4];
+    /// The rotation at `t`; `#[inline(always)]` and without branches. A vector of times takes
+    /// vectors of numbers.
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4];
 }
 
 /// The quaternion that starts at a place among the numbers.
 #[inline(always)]
-fn quaternion<S: Scalar>(numbers: &Numbers, place: usize) -> [S; 4] {
+fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize) -> [S; 4] {
     [
         S::constant(numbers[place]),
         S::constant(numbers[place + 1]),
@@ -45,7 +46,7 @@ fn quaternion<S: Scalar>(numbers: &Numbers, place: usize) -> [S; 4] {
 
 /// The vector that starts at a place among the numbers, times `k`.
 #[inline(always)]
-fn vector<S: Scalar>(numbers: &Numbers, place: usize, k: S) -> [S; 3] {
+fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize, k: S) -> [S; 3] {
     [
         S::constant(numbers[place]) * k,
         S::constant(numbers[place + 1]) * k,
@@ -96,11 +97,11 @@ fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
 /// the chord between the ends: there is no special case for a small angle.
 #[inline(always)]
 fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
-    let minus = S::constant(-1.0);
-    let [x, y, z, w] = weighted(b, S::constant(1.0), a, minus);
-    let chord = (x * x + y * y + z * z + w * w) * S::constant(0.25);
+    let minus = S::all(-1.0);
+    let [x, y, z, w] = weighted(b, S::all(1.0), a, minus);
+    let chord = (x * x + y * y + z * z + w * w) * S::all(0.25);
     let square = chord.arc_square();
-    let rest = S::constant(1.0) - t;
+    let rest = S::all(1.0) - t;
     let (to_b, _) = (t * t * square).waves();
     let (to_a, _) = (rest * rest * square).waves();
     normalised(weighted(a, rest * to_a, b, t * to_b))

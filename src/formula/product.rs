@@ -4,7 +4,7 @@
 //! Numbers: the base, the three half-rotation vectors, and for each of the three
 //! cumulative basis functions the coefficients of 1, t, t², t³.
 
-use super::{Formula, Numbers, exp, product, quaternion, vector};
+use super::{Formula, NUMBERS, Numbers, exp, product, quaternion, vector};
 use crate::scalar::Scalar;
 
 pub(crate) struct Product;
@@ -16,7 +16,7 @@ impl Product {
     /// The numbers of cumulative Bernstein, `1-(1-t)³`, `t²(3-2t)`, `t³`, before any
     /// base or vector.
     pub(crate) const BERNSTEIN: Numbers = {
-        let mut numbers = [0.0; super::NUMBERS];
+        let mut numbers = [0.0; NUMBERS];
         let basis = [
             [0.0, 3.0, -3.0, 1.0],
             [0.0, 0.0, 3.0, -2.0],
@@ -33,7 +33,7 @@ impl Product {
 
 impl Formula for Product {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let factor = |j: usize| {
             let [c0, c1, c2, c3] = quaternion::<S>(numbers, Self::BASIS + 4 * j);
             let weight = ((c3 * t + c2) * t + c1) * t + c0;

@@ -2,14 +2,14 @@
 //!
 //! Numbers: the base and the three half-rotation vectors.
 
-use super::{Formula, Numbers, exp, product, quaternion, vector};
+use super::{Formula, NUMBERS, exp, product, quaternion, vector};
 use crate::scalar::Scalar;
 
 pub(crate) struct RotationVector;
 
 impl Formula for RotationVector {
     #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &Numbers, t: S) -> [S; 4] {
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let square = t * t;
         let first = vector(numbers, 4, t);
         let second = vector(numbers, 7, square);

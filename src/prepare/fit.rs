@@ -111,10 +111,10 @@ impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
     }
 }
 
-impl<const PAIRS: usize> Samples<Lane32, PAIRS> {
+impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
     /// Those of the lanes from `lane` on.
     #[inline(always)]
-    fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
+    pub(super) fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
         let mut own = Samples::all(L::all(0.0));
         for c in 0..4 {
             own.middle[c] = L::load(&self.middle[c][lane..]);
@@ -124,6 +124,22 @@ impl<const PAIRS: usize> Samples<Lane32, PAIRS> {
             }
         }
         own
+    }
+}
+
+impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
+    /// Every lane's.
+    #[inline(always)]
+    pub(super) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {
+        let mut lanes = Samples::all([0.0; MOST]);
+        for c in 0..4 {
+            self.middle[c].store(&mut lanes.middle[c][..L::COUNT]);
+            for k in 0..PAIRS {
+                self.even[k][c].store(&mut lanes.even[k][c][..L::COUNT]);
+                self.odd[k][c].store(&mut lanes.odd[k][c][..L::COUNT]);
+            }
+        }
+        lanes
     }
 }
 
@@ -219,7 +235,6 @@ impl FitBlock {
     }
 
     /// A curve's own numbers; 0 behind them.
-    #[inline(always)]
     pub(super) fn numbers_of(&self, lane: usize) -> Numbers {
         let own = &self.numbers[..];
         array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
@@ -288,21 +303,7 @@ impl FitBlock {
         is_near && middle.iter().all(|c| c.is_finite())
     }
 
-    /// From the differences at the nodes to the coefficients.
-    #[inline(always)]
-    pub(super) fn interpolate_all<L: Lanes, const PAIRS: usize>(
-        &mut self,
-        count: usize,
-        nodes: &Nodes<PAIRS>,
-        samples: &Samples<Lane32, PAIRS>,
-        segments: &mut [PolynomialSegment],
-    ) {
-        for lane in (0..count).step_by(L::COUNT) {
-            self.interpolate(lane, nodes, &samples.at::<L>(lane), segments);
-        }
-    }
-
-    /// As [`FitBlock::interpolate_all`], of the vector of lanes from `lane` on.
+    /// From the differences at the nodes of the curves from `lane` on to the coefficients.
     #[inline(always)]
     pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
         &mut self,

@@ -317,6 +317,11 @@ pub(super) fn load4<L: Lanes, const WIDTH: usize>(
     ]
 }
 
+#[inline(always)]
+pub(super) fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
+    [L::rounded(x), L::rounded(y), L::rounded(z), L::rounded(w)]
+}
+
 /// Stores numbers to the lanes from `lane` on.
 #[inline(always)]
 pub(super) fn store<D: Doubles, const N: usize>(lanes: &mut [Lane; N], lane: usize, own: [D; N]) {

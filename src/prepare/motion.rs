@@ -68,8 +68,10 @@ impl Fit<'_> {
         for (lane, scale) in scales[..count].iter_mut().enumerate() {
             *scale = sample(self.0, lane, nodes, &mut samples);
         }
-        self.0
-            .interpolate_all::<L, PAIRS>(count, nodes, &samples, self.1);
+        for lane in (0..count).step_by(L::COUNT) {
+            self.0
+                .interpolate(lane, nodes, &samples.at::<L>(lane), self.1);
+        }
         self.0.scale(&scales, self.1);
     }
 }

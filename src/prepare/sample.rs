@@ -1,7 +1,7 @@
 //! Samples of cubics, in vector lanes: the first half of a fit.
 
 use super::fit::{FitBlock, Lane64, MOST, Samples, Tier};
-use super::intervals::{LANES, load, load3, load4};
+use super::intervals::{LANES, load, load3, load4, rounded};
 use super::nodes::Nodes;
 use super::shape::Sampling;
 use crate::branchless::{
@@ -305,9 +305,4 @@ fn all<L: Lanes>(value: f64) -> L::Doubles {
 #[inline(always)]
 fn from<const N: usize>(numbers: &[Lane64], place: usize) -> &[Lane64; N] {
     numbers[place..].first_chunk().expect("a product's numbers")
-}
-
-#[inline(always)]
-fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
-    [L::rounded(x), L::rounded(y), L::rounded(z), L::rounded(w)]
 }

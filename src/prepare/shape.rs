@@ -2,12 +2,12 @@
 
 use std::marker::PhantomData;
 
-use super::fit::{FitBlock, Lane32, Samples, Tier};
-use super::intervals::LANES;
+use super::fit::{FitBlock, MOST, Samples, Tier};
+use super::intervals::{load, rounded};
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::Expansion;
-use crate::branchless::Quaternion;
-use crate::cpu::{InLanes, Lanes, in_lanes};
+use crate::branchless::{Quaternion, Real};
+use crate::cpu::{Doubles as _, InLanes, Lanes, in_lanes};
 use crate::formula::{
     DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
 };
@@ -140,63 +140,67 @@ impl<F: Formula> Sampling for Directly<F> {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        let count = block.whole();
-        let mut samples = Samples::all([0.0; LANES]);
-        let Samples { middle, even, odd } = &mut samples;
-        let mut middles = [[0.0; LANES]; 4];
-        let mut doubts = [0.0; LANES];
-        for lane in 0..count {
-            let numbers = block.numbers_of(lane);
-            let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane]));
-            let rotation = [x.0, y.0, z.0, w.0];
-            for c in 0..4 {
-                middles[c][lane] = rotation[c];
-                middle[c][lane] = rotation[c] as f32;
+        for lane in (0..block.whole()).step_by(L::COUNT) {
+            let mut numbers = [L::Doubles::all(0.0); NUMBERS];
+            for (own, lanes) in numbers.iter_mut().zip(&block.numbers) {
+                *own = load::<L>(lanes, lane);
             }
-            doubts[lane] = doubt(rotation);
-        }
-        for (k, &node) in nodes.at.iter().enumerate() {
-            let node = f64::from(node);
-            for lane in 0..count {
-                let numbers = block.numbers_of(lane);
-                let reach = node * block.widths[lane];
-                let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane] - reach));
-                let before = [x.0, y.0, z.0, w.0];
-                let [x, y, z, w] = F::rotation(&numbers, Near(block.middles[lane] + reach));
-                let after = [x.0, y.0, z.0, w.0];
+            let at = load::<L>(&block.middles, lane);
+            let width = load::<L>(&block.widths, lane);
+            let middle = rotation::<F, _>(&numbers, at);
+            let mut doubt = doubt(middle);
+            let mut samples = Samples::all(L::all(0.0));
+            samples.middle = rounded::<L>(middle);
+            for k in 0..PAIRS {
+                let reach = L::Doubles::all(f64::from(nodes.at[k])) * width;
+                let before = rotation::<F, _>(&numbers, at - reach);
+                let after = rotation::<F, _>(&numbers, at + reach);
                 for c in 0..4 {
-                    let middle = middles[c][lane];
-                    even[k][c][lane] = ((after[c] - middle) + (before[c] - middle)) as f32;
-                    odd[k][c][lane] = (after[c] - before[c]) as f32;
+                    let sum = (after[c] - middle[c]) + (before[c] - middle[c]);
+                    samples.even[k][c] = L::rounded(sum);
+                    samples.odd[k][c] = L::rounded(after[c] - before[c]);
                 }
-                doubts[lane] += doubt(before) + doubt(after);
+                doubt = doubt + self::doubt(before) + self::doubt(after);
             }
+            if !doubt.are_at_most(0.0) {
+                let mut doubts = [0.0; MOST];
+                doubt.store(&mut doubts);
+                let mut lanes = samples.lanes();
+                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
+                    sample_anywhere::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
+                }
+                samples = lanes.at(0);
+            }
+            block.interpolate(lane, nodes, &samples, segments);
         }
-        for lane in (0..count).filter(|&lane| doubts[lane].is_nan()) {
-            sample_anywhere::<F, PAIRS>(block, lane, nodes, &mut samples);
-        }
-        block.interpolate_all::<L, PAIRS>(count, nodes, &samples, segments);
     }
+}
+
+#[inline(always)]
+fn rotation<F: Formula, R: Real>(numbers: &[R; NUMBERS], t: R) -> [R; 4] {
+    let [x, y, z, w] = F::rotation(numbers, Near(t));
+    [x.0, y.0, z.0, w.0]
 }
 
 /// NaN where any of a rotation's components is none, or not finite; else 0.
 #[inline(always)]
-fn doubt([x, y, z, w]: Quaternion) -> f64 {
-    (x + y + z + w) * 0.0
+fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
+    (x + y + z + w) * R::all(0.0)
 }
 
-/// Samples a lane whose angles are too long for [`Near`].
+/// Samples the curve in a lane, whose angles are too long for [`Near`], to the `j`th of some.
 #[inline(never)]
 fn sample_anywhere<F: Formula, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<[f32; MOST], PAIRS>,
+    j: usize,
 ) {
     let numbers = block.numbers_of(lane);
     let between: Quaternion = F::rotation(&numbers, block.middles[lane]);
     for c in 0..4 {
-        middle[c][lane] = between[c] as f32;
+        middle[c][j] = between[c] as f32;
     }
     for (k, &node) in nodes.at.iter().enumerate() {
         let reach = f64::from(node) * block.widths[lane];
@@ -204,8 +208,8 @@ fn sample_anywhere<F: Formula, const PAIRS: usize>(
         let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
         for c in 0..4 {
             let sum = (after[c] - between[c]) + (before[c] - between[c]);
-            even[k][c][lane] = sum as f32;
-            odd[k][c][lane] = (after[c] - before[c]) as f32;
+            even[k][c][j] = sum as f32;
+            odd[k][c][j] = (after[c] - before[c]) as f32;
         }
     }
 }
