@@ -142,7 +142,7 @@ pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
     normalised(q)
 }
 
-/// As [`unit`], of its components in f64.
+/// As [`unit()`], of its components in f64.
 #[inline(always)]
 pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
     let square = dot(q, q);

@@ -244,13 +244,9 @@ impl Intervals {
     fn between_anywhere(&mut self, lane: usize) {
         let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
         let middle = between(&mut Anywhere, first, self.step(lane), last);
-        let (_, vectors) = product_numbers(&mut self.numbers);
-        for (own, numbers) in vectors.chunks_exact_mut(3).zip([first, middle, last]) {
-            for (lanes, number) in own.iter_mut().zip(numbers) {
-                lanes[lane] = number;
-            }
-        }
-        self.energies[lane] = energy([first, middle, last]);
+        let vectors = [first, middle, last];
+        self.set_numbers(lane, Product::VECTORS, vectors.as_flattened());
+        self.set_energy(lane, vectors);
     }
 }
 
@@ -359,7 +355,7 @@ impl InLanes for BetweenNeighbours<'_> {
                 for j in near.lanes(lane + 1, own.count) {
                     let back = branchless::exp(scaled(own.log(j - 1), -1.0));
                     let base = product(own.key(j), back);
-                    put(product_numbers(&mut own.numbers).0, j, base);
+                    own.set_numbers(j, 0, &base);
                 }
             }
         }

@@ -134,20 +134,16 @@ fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     if squared.are_at_most(limit) {
         return turn;
     }
-    let mut lanes = Turns::default();
-    for c in 0..3 {
-        vector[c].store(&mut lanes.vectors[c]);
-    }
-    for c in 0..4 {
-        turn[c].store(&mut lanes.turns[c]);
-    }
+    let mut lanes = Turns {
+        vectors: lanes(vector),
+        turns: lanes(turn),
+    };
     lanes.beyond(limit);
     let [x, y, z, w] = &lanes.turns;
     [D::load(x), D::load(y), D::load(z), D::load(w)]
 }
 
 /// Half-rotation vectors and their exponentials.
-#[derive(Default)]
 struct Turns {
     vectors: [[f64; MOST]; 3],
     turns: [[f64; MOST]; 4],
@@ -159,15 +155,25 @@ impl Turns {
     fn beyond(&mut self, limit: f64) {
         for lane in 0..MOST {
             let vector = self.vectors.map(|lanes| lanes[lane]);
-            // NaN is none.
-            if !(square(vector) <= limit) {
+            let squared = square(vector);
+            if squared > limit || squared.is_nan() {
                 let turn = branchless::exp(vector);
-                for c in 0..4 {
-                    self.turns[c][lane] = turn[c];
+                for (lanes, component) in self.turns.iter_mut().zip(turn) {
+                    lanes[lane] = component;
                 }
             }
         }
     }
+}
+
+/// Each vector's lanes.
+#[inline(always)]
+fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
+    let mut lanes = [[0.0; MOST]; N];
+    for (lanes, vector) in lanes.iter_mut().zip(vectors) {
+        vector.store(lanes);
+    }
+    lanes
 }
 
 /// `a v`, `v` a vector.
@@ -264,12 +270,12 @@ impl<L: Lanes> Expanded<L> {
                 sc * s1,
                 ss * s1,
             ];
-            for c in 0..4 {
+            for (c, difference) in differences[i].iter_mut().enumerate() {
                 let first = self.terms[0][c] * weights[0] + self.terms[1][c] * weights[1];
                 let second = self.terms[2][c] * weights[2] + self.terms[3][c] * weights[3];
                 let third = self.terms[4][c] * weights[4] + self.terms[5][c] * weights[5];
                 let fourth = self.terms[6][c] * weights[6] + self.terms[7][c] * weights[7];
-                differences[i][c] = (first + second) + (third + fourth);
+                *difference = (first + second) + (third + fourth);
             }
         }
         differences
