@@ -27,7 +27,7 @@ pub const B_SPLINE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 310.0,
+        key: 220.0,
         rotation: 3.0,
     },
     reference: reference::Kind::BSpline,

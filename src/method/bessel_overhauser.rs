@@ -24,7 +24,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 270.0,
+        key: 210.0,
         rotation: 2.8,
     },
     reference: reference::Kind::BesselOverhauser,

@@ -25,7 +25,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2400.0,
+        key: 840.0,
         rotation: 3.2,
     },
     reference: reference::Kind::BesselOverhauserMean,

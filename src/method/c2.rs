@@ -35,7 +35,7 @@ pub const C2: Method = Method {
     ends: Ends::Secant,
     path: None,
     cost: Cost {
-        key: 1400.0,
+        key: 1100.0,
         rotation: 3.2,
     },
     reference: reference::Kind::C2,

@@ -24,7 +24,7 @@ pub const CATMULL_ROM: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 190.0,
+        key: 150.0,
         rotation: 2.6,
     },
     reference: reference::Kind::CatmullRom,

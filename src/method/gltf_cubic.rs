@@ -27,7 +27,7 @@ pub const GLTF_CUBIC: Method = Method {
     ends: Ends::Parabolic,
     path: Some(Path::AsAuthored),
     cost: Cost {
-        key: 1400.0,
+        key: 350.0,
         rotation: 3.8,
     },
     reference: reference::Kind::GltfCubic,

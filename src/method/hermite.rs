@@ -25,7 +25,7 @@ pub const HERMITE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 220.0,
+        key: 160.0,
         rotation: 2.8,
     },
     reference: reference::Kind::Hermite,

@@ -28,7 +28,7 @@ pub const KOCHANEK_BARTELS: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2400.0,
+        key: 860.0,
         rotation: 3.2,
     },
     reference: reference::Kind::KochanekBartels,

@@ -23,7 +23,7 @@ pub const NLERP: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 300.0,
+        key: 150.0,
         rotation: 2.8,
     },
     reference: reference::Kind::Nlerp,

@@ -23,7 +23,7 @@ pub const SHOEMAKE: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 4500.0,
+        key: 1500.0,
         rotation: 4.1,
     },
     reference: reference::Kind::Shoemake,

@@ -22,7 +22,7 @@ pub const SHOEMAKE_1985: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 1600.0,
+        key: 530.0,
         rotation: 2.8,
     },
     reference: reference::Kind::Shoemake1985,

@@ -22,7 +22,7 @@ pub const SHOEMAKE_2: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 2100.0,
+        key: 700.0,
         rotation: 3.1,
     },
     reference: reference::Kind::Shoemake2,

@@ -21,7 +21,7 @@ pub const SQUAD: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost {
-        key: 960.0,
+        key: 300.0,
         rotation: 2.9,
     },
     reference: reference::Kind::Squad,
