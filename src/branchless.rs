@@ -3,7 +3,8 @@
 //! multiplication, division and square root, each rounded once as IEEE 754 says, so
 //! that every machine and every vector width gives the same bits.
 //!
-//! Plain arrays, `x y z w`: a vector type would keep such a loop scalar.
+//! Plain arrays, `x y z w`: glam's types would keep such a loop scalar. What is generic over
+//! [`Real`] is written for vectors of f64 too.
 
 mod near;
 

@@ -179,7 +179,8 @@ impl Kernels {
 }
 
 /// Work over lanes: `run` is compiled for each vector width. Implementations are
-/// `#[inline(always)]`, and have no branches, calls or intrinsics in their loops.
+/// `#[inline(always)]`. Loops that are not written in vectors have no branches, calls or
+/// intrinsics, so that the compiler makes vectors of them.
 pub(crate) trait InLanes {
     /// `L`: the vectors, for work that is written in them.
     fn run<L: Lanes>(&mut self);

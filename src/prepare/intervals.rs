@@ -1,5 +1,5 @@
-//! Key intervals side by side, and what the methods make of them: each pass is a
-//! plain loop over lanes, compiled for every vector width.
+//! Key intervals side by side, and what the methods make of them: each pass goes over
+//! the lanes in vectors, compiled for every width.
 //!
 //! A lane is one key interval. Intervals of one track that follow one another are a
 //! stretch; on either side of it a lane of context holds the neighbouring interval,
