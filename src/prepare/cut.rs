@@ -19,8 +19,6 @@ pub(super) struct Cutter {
     curves: Vec<Curve>,
     waiting: Vec<Part>,
     parts: Vec<Part>,
-    /// Places of segments that nothing has become yet.
-    spare: Vec<usize>,
 }
 
 /// A part of a curve.
@@ -31,8 +29,29 @@ pub(super) struct Part {
     /// Its place among the curves given.
     curve: usize,
     pub(super) piece: Piece,
-    /// Its place among the segments; nothing where even the finest does not fit.
+    /// Its place among the segments, given when it is fitted; nothing where even the finest
+    /// does not fit.
     pub(super) segment: Option<usize>,
+}
+
+impl Part {
+    /// The first takes its segment: so those that are evaluated one after the other lie one
+    /// after the other, or nearly.
+    fn halves(self) -> [Self; 2] {
+        let [first, second] = self.piece.halves();
+        let second = Self {
+            piece: second,
+            segment: None,
+            ..self
+        };
+        [
+            Self {
+                piece: first,
+                ..self
+            },
+            second,
+        ]
+    }
 }
 
 impl Cutter {
@@ -44,31 +63,30 @@ impl Cutter {
             curves: Vec::new(),
             waiting: Vec::new(),
             parts: Vec::new(),
-            spare: Vec::new(),
         }
     }
 
-    /// Adds the curve of a span: at least two parts will come of it. It may have a segment.
-    pub(super) fn push(&mut self, span: usize, curve: Curve, segment: Option<usize>) {
-        self.push_pieces(span, &curve.piece.halves());
+    /// Adds the curve of a span that has a segment: at least two parts will come of it.
+    pub(super) fn push(&mut self, span: usize, curve: Curve, segment: usize) {
+        let whole = self.part(span, &curve, Some(segment));
+        self.waiting.extend(whole.halves());
         self.curves.push(curve);
-        self.spare.extend(segment);
     }
 
     /// Adds the curve of a span, to be cut where it does not fit whole.
     pub(super) fn push_whole(&mut self, span: usize, curve: Curve) {
-        self.push_pieces(span, &[curve.piece]);
+        self.waiting.push(self.part(span, &curve, None));
         self.curves.push(curve);
     }
 
-    /// Of the curve that is given next.
-    fn push_pieces(&mut self, span: usize, pieces: &[Piece]) {
-        self.waiting.extend(pieces.iter().map(|&piece| Part {
+    /// All of the curve that is given next.
+    fn part(&self, span: usize, curve: &Curve, segment: Option<usize>) -> Part {
+        Part {
             span,
             curve: self.curves.len(),
-            piece,
-            segment: None,
-        }));
+            piece: curve.piece,
+            segment,
+        }
     }
 
     /// Cuts the curves given.
@@ -79,38 +97,32 @@ impl Cutter {
             let block = self.block.get_or_insert_with(new);
             block.clear();
             let some = done..self.waiting.len().min(done + LANES);
-            for part in &self.waiting[some.clone()] {
+            for part in &mut self.waiting[some.clone()] {
                 block.push(&self.curves[part.curve], part.piece);
-                if self.spare.len() < block.count() {
-                    self.spare.push(segments.len());
+                if part.segment.is_none() {
+                    part.segment = Some(segments.len());
                     segments.push(PolynomialSegment::zeroed());
                 }
             }
-            let first = self.spare.len() - block.count();
-            block.run(segments, self.spare.drain(first..));
+            let places = self.waiting[some.clone()].iter();
+            block.run(segments, places.filter_map(|part| part.segment));
             for (lane, part) in some.clone().enumerate() {
                 let part = self.waiting[part];
                 if block.fits(lane, segments) {
+                    self.parts.push(part);
+                } else if part.piece.is_finest() {
+                    segments[block.place(lane)] = PolynomialSegment::zeroed();
                     self.parts.push(Part {
-                        segment: Some(block.place(lane)),
+                        segment: None,
                         ..part
                     });
-                    continue;
-                }
-                self.spare.push(block.place(lane));
-                if part.piece.is_finest() {
-                    self.parts.push(part);
                 } else {
-                    let half = |piece| Part { piece, ..part };
-                    self.waiting.extend(part.piece.halves().map(half));
+                    self.waiting.extend(part.halves());
                 }
             }
             done = some.end;
         }
         self.waiting.clear();
-        for place in self.spare.drain(..) {
-            segments[place] = PolynomialSegment::zeroed();
-        }
         // Most are in order.
         self.parts.sort_by_key(|part| (part.span, part.piece.from));
     }

@@ -1,6 +1,8 @@
 //! Curves to segments: they wait in lanes until a block of them is full. Each becomes one
 //! span at once, and several where it turns out that it is to be cut.
 
+use std::ops::Range;
+
 use bytemuck::Zeroable;
 
 use super::curve::Curve;
@@ -63,28 +65,35 @@ impl Fitting {
         }
     }
 
-    /// Takes the curve in a lane of `curves`, which are to be [brought](Fitting::bring)
-    /// before they are others.
+    /// Takes the curves in some lanes of `curves`, which are to be [brought](Fitting::bring)
+    /// before they are others: each is the source of the next span.
     #[inline]
     pub(super) fn take(
         &mut self,
         prepared: &mut Prepared,
         curves: &Intervals,
-        lane: usize,
-    ) -> Source {
-        let span = prepared.spans.sources.len();
-        let queue = match tier(curves.energies[lane]) {
-            Tier::Gentle => &mut self.gentle,
-            Tier::Full => &mut self.full,
-            Tier::Piece => {
-                let curve = curves.curve(lane, self.shape, self.quantity);
-                self.cutter.push(span, curve, None);
-                return UNTRIED;
-            }
-        };
-        queue.lanes.push(lane as u8);
-        queue.spans.push(span);
-        new_segment(prepared).0
+        lanes: Range<usize>,
+    ) {
+        let segments = polynomials(prepared);
+        let places = segments.len()..segments.len() + lanes.len();
+        segments.resize(places.end, PolynomialSegment::zeroed());
+        let sources = &mut prepared.spans.sources;
+        let first_span = sources.len();
+        sources.extend(places.clone().map(|place| Source::Segment(place as u32)));
+        for (i, lane) in lanes.enumerate() {
+            let span = first_span + i;
+            let queue = match tier(curves.energies[lane]) {
+                Tier::Gentle => &mut self.gentle,
+                Tier::Full => &mut self.full,
+                Tier::Piece => {
+                    let curve = curves.curve(lane, self.shape, self.quantity);
+                    self.cutter.push(span, curve, places.start + i);
+                    continue;
+                }
+            };
+            queue.lanes.push(lane as u8);
+            queue.spans.push(span);
+        }
     }
 
     /// Brings the curves that were taken into blocks.
@@ -157,7 +166,7 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     if !block.is_trusted() {
         for (lane, &span) in own.iter().enumerate() {
             if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), Some(block.place(lane)));
+                cutter.push(span, block.curve(lane), block.place(lane));
             }
         }
     }

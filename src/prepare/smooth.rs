@@ -260,7 +260,17 @@ impl SmoothPreparation {
         let keys = (0..starts.len()).map(|i| stretch.key_at(i));
         prepared.spans.keys.extend(keys);
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
-        for (i, lane) in stretch.lanes().enumerate() {
+        let lanes = stretch.lanes();
+        let is_gentle = |lane| self.gentle.as_ref().is_some_and(|all| all.holds(lane));
+        let fits_alike = !is_steady
+            && !self.is_frozen()
+            && lanes
+                .clone()
+                .all(|lane| holds_frame[lane] && !is_gentle(lane));
+        if fits_alike {
+            self.fitting.take(prepared, &self.intervals, lanes.clone());
+        }
+        for (i, lane) in lanes.enumerate().filter(|_| !fits_alike) {
             let source = if !holds_frame[lane] {
                 Source::Constant(NONE)
             } else if is_steady {
@@ -271,7 +281,8 @@ impl SmoothPreparation {
                 gentle.write(lane, &mut polynomials(prepared)[place]);
                 source
             } else if !self.holds(stretch, lane) {
-                self.fitting.take(prepared, &self.intervals, lane)
+                self.fitting.take(prepared, &self.intervals, lane..lane + 1);
+                continue;
             } else if stretch.key != NONE {
                 Source::Constant(stretch.key_at(i))
             } else {
