@@ -59,14 +59,17 @@ impl SampleBlock {
     #[inline(always)]
     fn arcs<L: Lanes>(&mut self) {
         let mut arcs = Arcs::<L>::new();
-        for j in (0..self.count).step_by(L::COUNT) {
-            let from = L::load_rotations(&self.from[j..]);
-            arcs.put(j, from, L::load_rotations(&self.to[j..]));
-        }
-        for j in (0..self.count).step_by(L::COUNT) {
-            let (sign, parameter) = (L::load(&self.signs[j..]), L::load(&self.parameters[j..]));
-            let rotations = &mut self.rotations[j..j + L::COUNT];
-            L::store_rotations(arcs.at(j, sign, parameter), rotations);
+        for first in (0..self.count).step_by(VECTORS * L::COUNT) {
+            let end = self.count.min(first + VECTORS * L::COUNT);
+            for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                let from = L::load_rotations(&self.from[j..]);
+                arcs.put(vector, from, L::load_rotations(&self.to[j..]));
+            }
+            for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                let (sign, parameter) = (L::load(&self.signs[j..]), L::load(&self.parameters[j..]));
+                let rotations = &mut self.rotations[j..j + L::COUNT];
+                L::store_rotations(arcs.at(vector, sign, parameter), rotations);
+            }
         }
         if arcs.any_in_doubt {
             for lane in 0..self.count {
@@ -103,12 +106,14 @@ impl SampleBlock {
     }
 }
 
-/// The arcs of a block, in vectors. First all of them are made and then all rotations: a
-/// processor looks ahead a vector or two, and one that goes all the way is a long chain to
-/// wait for.
+/// Vectors of arcs that are made before the first is evaluated: a processor looks ahead a
+/// vector or two, and one that goes all the way is a long chain to wait for.
+const VECTORS: usize = 8;
+
+/// Arcs in vectors.
 struct Arcs<L> {
-    middles: [[L; 4]; LANES / 4],
-    tangents: [[L; 4]; LANES / 4],
+    middles: [[L; 4]; VECTORS],
+    tangents: [[L; 4]; VECTORS],
     any_in_doubt: bool,
 }
 
@@ -116,26 +121,29 @@ impl<L: Lanes> Arcs<L> {
     #[inline(always)]
     fn new() -> Self {
         Self {
-            middles: [[L::all(0.0); 4]; LANES / 4],
-            tangents: [[L::all(0.0); 4]; LANES / 4],
+            middles: [[L::all(0.0); 4]; VECTORS],
+            tangents: [[L::all(0.0); 4]; VECTORS],
             any_in_doubt: false,
         }
     }
 
-    /// The arcs of a vector whose first lane is `lane`.
+    /// The arcs of a vector.
     #[inline(always)]
-    fn put(&mut self, lane: usize, from: [L; 4], to: [L; 4]) {
+    fn put(&mut self, vector: usize, from: [L; 4], to: [L; 4]) {
         let arcs = arc_in_lanes(from, to);
-        self.middles[lane / L::COUNT] = arcs.middle;
-        self.tangents[lane / L::COUNT] = arcs.tangent;
+        self.middles[vector % VECTORS] = arcs.middle;
+        self.tangents[vector % VECTORS] = arcs.tangent;
         self.any_in_doubt |= arcs.any_in_doubt;
     }
 
     /// Their rotations.
     #[inline(always)]
-    fn at(&self, lane: usize, sign: L, parameter: L) -> [L; 4] {
-        let vector = lane / L::COUNT;
-        at(self.middles[vector], self.tangents[vector], sign, parameter)
+    fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
+        let (middle, tangent) = (
+            self.middles[vector % VECTORS],
+            self.tangents[vector % VECTORS],
+        );
+        at(middle, tangent, sign, parameter)
     }
 }
 
@@ -175,14 +183,17 @@ impl InLanes for ArcRun<'_> {
                 parameters[j] = sample.parameter;
             }
             arcs.any_in_doubt = false;
-            for j in (0..count).step_by(L::COUNT) {
-                let start = L::gather_rotations(self.keys, &from[j..]);
-                arcs.put(j, start, L::gather_rotations(self.keys, &to[j..]));
-            }
             let sign = L::all(self.sign);
-            for j in (0..count).step_by(L::COUNT) {
-                let found = arcs.at(j, sign, L::load(&parameters[j..]));
-                L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
+            for first in (0..count).step_by(VECTORS * L::COUNT) {
+                let end = count.min(first + VECTORS * L::COUNT);
+                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                    let start = L::gather_rotations(self.keys, &from[j..]);
+                    arcs.put(vector, start, L::gather_rotations(self.keys, &to[j..]));
+                }
+                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                    let found = arcs.at(vector, sign, L::load(&parameters[j..]));
+                    L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
+                }
             }
             if arcs.any_in_doubt || any & HELD != 0 {
                 for j in 0..count {
