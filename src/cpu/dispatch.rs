@@ -6,6 +6,8 @@
 mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod eight;
+#[cfg(target_arch = "x86_64")]
+mod sixteen;
 
 use std::str::FromStr;
 use std::sync::OnceLock;
@@ -15,6 +17,8 @@ use glam::Vec4;
 pub(crate) use doubles::Four;
 #[cfg(target_arch = "x86_64")]
 use eight::Eight;
+#[cfg(target_arch = "x86_64")]
+use sixteen::Sixteen;
 
 use super::evaluate::Evaluate;
 use super::lanes::Lanes;
@@ -213,7 +217,7 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 
 #[cfg(target_arch = "x86_64")]
 macro_rules! compiled_for {
-    ($width:ident, $features:literal) => {
+    ($width:ident, $features:literal, $lanes:ident) => {
         mod $width {
             use super::{Cycle, Evaluate, FramesError, InLanes, Kernel, PartRef, Timeline};
 
@@ -225,12 +229,12 @@ macro_rules! compiled_for {
                 cycle: &Cycle,
                 output: &mut [[f32; 4]],
             ) -> Result<(), FramesError> {
-                super::row::<super::Eight, S>(part, segments, timeline, cycle, output)
+                super::row::<super::$lanes, S>(part, segments, timeline, cycle, output)
             }
 
             #[target_feature(enable = $features)]
             pub(super) fn in_lanes<W: InLanes>(work: &mut W) {
-                work.run::<super::Eight>();
+                work.run::<super::$lanes>();
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {
@@ -241,9 +245,9 @@ macro_rules! compiled_for {
 }
 
 #[cfg(target_arch = "x86_64")]
-compiled_for!(avx2, "avx2");
+compiled_for!(avx2, "avx2", Eight);
 #[cfg(target_arch = "x86_64")]
-compiled_for!(avx512, "avx512f,avx512dq,avx512vl,avx512bw");
+compiled_for!(avx512, "avx512f,avx512dq,avx512vl,avx512bw", Sixteen);
 
 #[cfg(test)]
 pub(crate) mod tests {

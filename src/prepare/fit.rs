@@ -23,7 +23,7 @@ use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
 /// The most lanes that a vector has.
-pub(super) const MOST: usize = 8;
+pub(super) const MOST: usize = 16;
 
 /// How many powers a curve needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
