@@ -46,8 +46,17 @@ pub(crate) trait Vectors: Number {
     /// Of [`Vectors::COUNT`] samples.
     fn load(samples: &[f32]) -> Self;
 
-    /// Puts `x y z w` together, as [`Vectors::COUNT`] rotations.
-    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]);
+    /// As many rotations.
+    type Rotations: AsRef<[[f32; 4]]>;
+
+    /// Puts `x y z w` together.
+    fn rotations(components: [Self; 4]) -> Self::Rotations;
+
+    /// The same, to [`Vectors::COUNT`] places.
+    #[inline(always)]
+    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(Self::rotations(components).as_ref());
+    }
 }
 
 /// Vectors that preparing and everything else is written in, too.
@@ -123,9 +132,11 @@ impl Vectors for Vec4 {
         Self::from_slice(samples)
     }
 
+    type Rotations = [[f32; 4]; 4];
+
     #[inline(always)]
-    fn store_rotations([x, y, z, w]: [Self; 4], rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d());
+    fn rotations([x, y, z, w]: [Self; 4]) -> Self::Rotations {
+        Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d()
     }
 }
 

@@ -348,10 +348,9 @@ fn store<L: Lanes>(
     places: &[usize; MOST],
     power: usize,
 ) {
-    let mut rotations = [[0.0; 4]; MOST];
-    L::store_rotations(canonical(own), &mut rotations[..L::COUNT]);
-    for lane in 0..L::COUNT {
-        segments[places[lane]].coefficients[power] = rotations[lane];
+    let rotations = L::rotations(canonical(own));
+    for (&place, rotation) in places.iter().zip(rotations.as_ref()) {
+        segments[place].coefficients[power] = *rotation;
     }
 }
 

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use super::curve::Curve;
 use super::cut::{Cutter, Part as CurvePart};
 use super::fit::{FitBlock, Tier, tier};
-use super::intervals::Intervals;
+use super::intervals::{Intervals, LANES};
 use super::shape::Shape;
 use super::steady::SteadyBlock;
 use super::{NONE, Part, Prepared, Source, Spans};
@@ -76,7 +76,7 @@ impl Fitting {
     ) {
         let segments = polynomials(prepared);
         let places = segments.len()..segments.len() + lanes.len();
-        segments.resize(places.end, PolynomialSegment::zeroed());
+        segments.extend_from_slice(&ZERO[..lanes.len()]);
         let sources = &mut prepared.spans.sources;
         let first_span = sources.len();
         sources.extend(places.clone().map(|place| Source::Segment(place as u32)));
@@ -173,6 +173,11 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     spans.drain(..block.count());
     block.clear();
 }
+
+/// Segments that are not fitted yet; to copy them takes half as long as to write each.
+static ZERO: [PolynomialSegment; LANES] = [PolynomialSegment {
+    coefficients: [[0.0; 4]; 11],
+}; LANES];
 
 /// Of curves that are cut untried.
 const UNTRIED: Source = Source::Segment(NONE);

@@ -156,11 +156,12 @@ impl Vectors for Eight {
         })
     }
 
+    type Rotations = [[f32; 4]; 8];
+
     #[inline(always)]
-    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
+    fn rotations(components: [Self; 4]) -> Self::Rotations {
         let [a, b, c, d] = Self::transposed(components);
-        let pairs: [[f32; 4]; 8] = bytemuck::cast([a.0, b.0, c.0, d.0]);
-        rotations.copy_from_slice(&pairs);
+        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 }
 

@@ -141,11 +141,12 @@ impl Vectors for Sixteen {
         Self(bytemuck::cast(samples)).reordered()
     }
 
+    type Rotations = [[f32; 4]; 16];
+
     #[inline(always)]
-    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
+    fn rotations(components: [Self; 4]) -> Self::Rotations {
         let [a, b, c, d] = Self::transposed(components);
-        let fours: [[f32; 4]; 16] = bytemuck::cast([a.0, b.0, c.0, d.0]);
-        rotations.copy_from_slice(&fours);
+        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 }
 
