@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::lanes::{Number, Vectors};
+use super::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
 /// So few samples are evaluated one by one: a vector would be mostly waste.
@@ -55,14 +55,14 @@ pub(super) fn are_exact(first: i32, count: usize) -> bool {
 /// Evaluates frames `first`, `first + 1`, … into `output[..count]`. What lies behind
 /// `count` may be overwritten up to the end of a vector. Distances [`are_exact`].
 #[inline(always)]
-pub(super) fn frames<L: Vectors, S: Evaluate>(
+pub(super) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     first: i32,
     count: usize,
     output: &mut [[f32; 4]],
 ) {
-    // All of one width: what is left of a run goes into one more vector.
+    // What is left of a longer run goes into one more wide vector.
     if L::COUNT > L::Narrow::COUNT && count <= L::Narrow::COUNT {
         frames_alike::<L::Narrow, S>(segment, affine, first, count, output);
     } else {
@@ -72,7 +72,7 @@ pub(super) fn frames<L: Vectors, S: Evaluate>(
 
 /// In vectors of one width.
 #[inline(always)]
-fn frames_alike<L: Vectors, S: Evaluate>(
+fn frames_alike<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     first: i32,
@@ -99,7 +99,7 @@ const STEPS: [f32; 16] = [
 /// Evaluates the first `count` samples of those whose distances from the middle are given;
 /// behind `count` there are more, up to the end of a vector.
 #[inline(always)]
-pub(super) fn distances<L: Vectors, S: Evaluate>(
+pub(super) fn distances<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     distances: &[f32],
@@ -137,7 +137,7 @@ struct Frames<L> {
     step: L,
 }
 
-impl<L: Vectors> Distances<L> for Frames<L> {
+impl<L: Lanes> Distances<L> for Frames<L> {
     #[inline(always)]
     fn next(&mut self) -> L {
         let own = self.next;
@@ -148,7 +148,7 @@ impl<L: Vectors> Distances<L> for Frames<L> {
 
 struct Listed<'a>(&'a [f32]);
 
-impl<L: Vectors> Distances<L> for Listed<'_> {
+impl<L: Lanes> Distances<L> for Listed<'_> {
     #[inline(always)]
     fn next(&mut self) -> L {
         let (own, rest) = self.0.split_at(L::COUNT);
@@ -158,7 +158,7 @@ impl<L: Vectors> Distances<L> for Listed<'_> {
 }
 
 #[inline(always)]
-fn run<L: Vectors, S: Evaluate>(
+fn run<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     count: usize,
@@ -174,7 +174,7 @@ fn run<L: Vectors, S: Evaluate>(
 
 /// Evaluated and put together a vector at a time.
 #[inline(always)]
-fn vectors<L: Vectors, S: Evaluate, const FILTER: bool>(
+fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
@@ -202,7 +202,7 @@ fn vectors<L: Vectors, S: Evaluate, const FILTER: bool>(
 struct Rotations([[f32; 4]; STEPS.len()]);
 
 #[inline(always)]
-fn vector<L: Vectors, S: Evaluate, const FILTER: bool>(
+fn vector<L: Lanes, S: Evaluate, const FILTER: bool>(
     segment: &S,
     constant: L,
     parameter: L,

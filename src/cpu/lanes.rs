@@ -36,31 +36,16 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 }
 
 /// The numbers of several consecutive samples, in an order of their own.
-pub(crate) trait Vectors: Number {
+pub(crate) trait Lanes: Number {
     /// How many.
     const COUNT: usize;
 
-    /// What evaluates those that are too few for a vector: not wider than eight.
-    type Narrow: Vectors;
-
-    /// Of [`Vectors::COUNT`] samples.
-    fn load(samples: &[f32]) -> Self;
+    /// What evaluates runs of few: these, or vectors half as wide.
+    type Narrow: Lanes;
 
     /// As many rotations.
     type Rotations: AsRef<[[f32; 4]]>;
 
-    /// Puts `x y z w` together.
-    fn rotations(components: [Self; 4]) -> Self::Rotations;
-
-    /// The same, to [`Vectors::COUNT`] places.
-    #[inline(always)]
-    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(Self::rotations(components).as_ref());
-    }
-}
-
-/// Vectors that preparing and everything else is written in, too.
-pub(crate) trait Lanes: Vectors {
     /// As many in f64.
     type Doubles: Doubles;
 
@@ -70,17 +55,29 @@ pub(crate) trait Lanes: Vectors {
     /// The same in f64.
     fn widened(self) -> Self::Doubles;
 
-    /// To [`Vectors::COUNT`] samples.
+    /// Of [`Lanes::COUNT`] samples.
+    fn load(samples: &[f32]) -> Self;
+
+    /// To [`Lanes::COUNT`] samples.
     fn store(self, samples: &mut [f32]);
 
-    /// `x y z w` of [`Vectors::COUNT`] rotations.
+    /// `x y z w` of [`Lanes::COUNT`] rotations.
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4];
 
-    /// The same of rotations that lie anywhere: the first [`Vectors::COUNT`] of the `places`.
+    /// The same of rotations that lie anywhere: the first [`Lanes::COUNT`] of the `places`.
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
 
-    /// The inner products of [`Vectors::COUNT`] pairs of rotations.
+    /// The inner products of [`Lanes::COUNT`] pairs of rotations.
     fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self;
+
+    /// Puts `x y z w` together.
+    fn rotations(components: [Self; 4]) -> Self::Rotations;
+
+    /// The same, to [`Lanes::COUNT`] places.
+    #[inline(always)]
+    fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(Self::rotations(components).as_ref());
+    }
 
     /// -1 where a number is less than 0, else 1.
     fn sign(self) -> Self;
@@ -122,25 +119,11 @@ impl Number for Vec4 {
     }
 }
 
-impl Vectors for Vec4 {
+impl Lanes for Vec4 {
     const COUNT: usize = 4;
 
     type Narrow = Self;
-
-    #[inline(always)]
-    fn load(samples: &[f32]) -> Self {
-        Self::from_slice(samples)
-    }
-
     type Rotations = [[f32; 4]; 4];
-
-    #[inline(always)]
-    fn rotations([x, y, z, w]: [Self; 4]) -> Self::Rotations {
-        Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d()
-    }
-}
-
-impl Lanes for Vec4 {
     type Doubles = Four;
 
     #[inline(always)]
@@ -151,6 +134,11 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn widened(self) -> Four {
         Four::of(self)
+    }
+
+    #[inline(always)]
+    fn load(samples: &[f32]) -> Self {
+        Self::from_slice(samples)
     }
 
     #[inline(always)]
@@ -188,6 +176,11 @@ impl Lanes for Vec4 {
             Self::from(from[3]) * Self::from(to[3]),
         ));
         x + y + z + w
+    }
+
+    #[inline(always)]
+    fn rotations([x, y, z, w]: [Self; 4]) -> Self::Rotations {
+        Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d()
     }
 
     #[inline(always)]
@@ -230,8 +223,9 @@ pub(crate) mod tests {
         numbers.iter().map(|number| number.to_bits()).collect()
     }
 
-    /// So many samples of each component, small and large.
-    fn columns(count: usize) -> [Vec<f32>; 4] {
+    /// Catches lanes that are put together in another order than they were loaded in, and a
+    /// comparison that is off by one bit.
+    pub(crate) fn lanes_are_samples<L: Lanes>() {
         let tiny = f32::from_bits(TINY_BITS);
         let below = f32::from_bits(TINY_BITS - 1);
         let samples = |c: usize| -> Vec<f32> {
@@ -240,37 +234,14 @@ pub(crate) mod tests {
                 0 => special[(k + 2 * c) % special.len()],
                 _ => (10 * k + c) as f32,
             };
-            (0..count).map(sample).collect()
+            (0..L::COUNT).map(sample).collect()
         };
-        [0, 1, 2, 3].map(samples)
-    }
-
-    /// Catches lanes that are put together in another order than they were loaded in.
-    pub(crate) fn vectors_are_samples<V: Vectors>() {
-        let columns = columns(V::COUNT);
-        let components = [0, 1, 2, 3].map(|c| V::load(&columns[c]));
-        let mut found = vec![[9.0; 4]; V::COUNT];
-        V::store_rotations(components, &mut found);
-        let mut filtered = found.clone();
-        V::store_rotations(components.map(V::canonical), &mut filtered);
-        for k in 0..V::COUNT {
-            for c in 0..4 {
-                let expected = columns[c][k];
-                assert_eq!(found[k][c].to_bits(), expected.to_bits());
-                let expected = crate::numeric::canonical(expected);
-                assert_eq!(filtered[k][c].to_bits(), expected.to_bits());
-            }
-        }
-    }
-
-    /// Catches also what is loaded in another order than it is put together, and a comparison
-    /// that is off by one bit.
-    pub(crate) fn lanes_are_samples<L: Lanes>() {
-        vectors_are_samples::<L>();
-        let columns = columns(L::COUNT);
+        let columns = [0, 1, 2, 3].map(samples);
         let components = [0, 1, 2, 3].map(|c| L::load(&columns[c]));
         let mut found = vec![[9.0; 4]; L::COUNT];
         L::store_rotations(components, &mut found);
+        let mut filtered = found.clone();
+        L::store_rotations(components.map(L::canonical), &mut filtered);
         let loaded = L::load_rotations(&found);
         let backward: Vec<u32> = (0..L::COUNT as u32).rev().collect();
         let gathered = L::gather_rotations(&found, &backward);
@@ -302,6 +273,14 @@ pub(crate) mod tests {
             assert!(loaded[c].any_within(least) && !loaded[c].any_within(least.next_down()));
             let least = columns[c].iter().copied().fold(f32::MAX, f32::min);
             assert!(loaded[c].any_at_most(least) && !loaded[c].any_at_most(least.next_down()));
+        }
+        for k in 0..L::COUNT {
+            for c in 0..4 {
+                let expected = columns[c][k];
+                assert_eq!(found[k][c].to_bits(), expected.to_bits());
+                let expected = crate::numeric::canonical(expected);
+                assert_eq!(filtered[k][c].to_bits(), expected.to_bits());
+            }
         }
     }
 

@@ -4,7 +4,7 @@
 use std::marker::PhantomData;
 
 use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
-use super::lanes::Vectors;
+use super::lanes::Lanes;
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::numeric::round_f32;
@@ -17,7 +17,7 @@ const CHUNK: usize = 64;
 /// The samples of one part of a track in a cycle, into `output`, which
 /// starts with the first of them.
 #[inline(always)]
-pub(super) fn row<L: Vectors, S: Evaluate>(
+pub(super) fn row<L: Lanes, S: Evaluate>(
     PartRef { prepared, part }: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
@@ -65,7 +65,7 @@ struct Row<'a, L, S> {
     lanes: PhantomData<L>,
 }
 
-impl<L: Vectors, S: Evaluate> Emit for Row<'_, L, S> {
+impl<L: Lanes, S: Evaluate> Emit for Row<'_, L, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let prepared = self.part.prepared;
@@ -95,7 +95,7 @@ impl<L: Vectors, S: Evaluate> Emit for Row<'_, L, S> {
                         *own = self.part.distance(distance, self.timeline, &run, start + j);
                     }
                     let output = &mut output[start..];
-                    distances::<L::Narrow, S>(segment, affine, &from_middle, count, output);
+                    distances::<L, S>(segment, affine, &from_middle, count, output);
                 }
             }
             RunSource::Exact { index, parameter } => {

@@ -77,7 +77,7 @@ pub(crate) struct LaneArcs<L> {
     pub(crate) any_in_doubt: bool,
 }
 
-/// The arcs between [`Lanes::COUNT`] pairs of keys.
+/// The arcs between as many pairs of keys as a vector has lanes.
 #[inline(always)]
 pub(crate) fn arc_in_lanes<L: Lanes>(from: [L; 4], to: [L; 4]) -> LaneArcs<L> {
     let dot = inner(from, to);

@@ -13,7 +13,7 @@ use std::arch::x86_64::{
 use std::ops::{Add, Mul, Neg, Sub};
 
 use super::doubles::doubles;
-use crate::cpu::lanes::{Lanes, Number, Vectors};
+use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
 /// What only processors with AVX2 do.
@@ -142,30 +142,11 @@ fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
     }
 }
 
-impl Vectors for Eight {
+impl Lanes for Eight {
     const COUNT: usize = 8;
 
     type Narrow = Self;
-
-    #[inline(always)]
-    fn load(samples: &[f32]) -> Self {
-        let samples: [f32; 8] = *samples.first_chunk().expect("eight samples");
-        Self(avx2! {
-            let order = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
-            _mm256_permutevar8x32_ps(bytemuck::cast(samples), order)
-        })
-    }
-
     type Rotations = [[f32; 4]; 8];
-
-    #[inline(always)]
-    fn rotations(components: [Self; 4]) -> Self::Rotations {
-        let [a, b, c, d] = Self::transposed(components);
-        bytemuck::cast([a.0, b.0, c.0, d.0])
-    }
-}
-
-impl Lanes for Eight {
     type Doubles = EightDoubles;
 
     #[inline(always)]
@@ -186,6 +167,15 @@ impl Lanes for Eight {
                 _mm256_extractf128_ps::<1>(samples),
             );
             [_mm256_cvtps_pd(low), _mm256_cvtps_pd(high)]
+        })
+    }
+
+    #[inline(always)]
+    fn load(samples: &[f32]) -> Self {
+        let samples: [f32; 8] = *samples.first_chunk().expect("eight samples");
+        Self(avx2! {
+            let order = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
+            _mm256_permutevar8x32_ps(bytemuck::cast(samples), order)
         })
     }
 
@@ -231,6 +221,12 @@ impl Lanes for Eight {
             Self(d) * Self(h),
         ]);
         x + y + z + w
+    }
+
+    #[inline(always)]
+    fn rotations(components: [Self; 4]) -> Self::Rotations {
+        let [a, b, c, d] = Self::transposed(components);
+        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 
     #[inline(always)]

@@ -15,7 +15,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use super::Eight;
 use super::doubles::doubles;
-use crate::cpu::lanes::{Lanes, Number, Vectors};
+use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
 /// What only processors with AVX-512 do.
@@ -130,26 +130,6 @@ impl Sixteen {
     }
 }
 
-impl Vectors for Sixteen {
-    const COUNT: usize = 16;
-
-    type Narrow = Eight;
-
-    #[inline(always)]
-    fn load(samples: &[f32]) -> Self {
-        let samples: [f32; 16] = *samples.first_chunk().expect("sixteen samples");
-        Self(bytemuck::cast(samples)).reordered()
-    }
-
-    type Rotations = [[f32; 4]; 16];
-
-    #[inline(always)]
-    fn rotations(components: [Self; 4]) -> Self::Rotations {
-        let [a, b, c, d] = Self::transposed(components);
-        bytemuck::cast([a.0, b.0, c.0, d.0])
-    }
-}
-
 doubles!(
     SixteenDoubles: __m512d, 8, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
     _mm512_mul_pd, _mm512_div_pd, negated, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to,
@@ -175,6 +155,10 @@ fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
 }
 
 impl Lanes for Sixteen {
+    const COUNT: usize = 16;
+
+    type Narrow = Eight;
+    type Rotations = [[f32; 4]; 16];
     type Doubles = SixteenDoubles;
 
     #[inline(always)]
@@ -190,6 +174,12 @@ impl Lanes for Sixteen {
             let high = _mm512_extractf32x8_ps::<1>(samples.0);
             [_mm512_cvtps_pd(low), _mm512_cvtps_pd(high)]
         })
+    }
+
+    #[inline(always)]
+    fn load(samples: &[f32]) -> Self {
+        let samples: [f32; 16] = *samples.first_chunk().expect("sixteen samples");
+        Self(bytemuck::cast(samples)).reordered()
     }
 
     #[inline(always)]
@@ -241,6 +231,12 @@ impl Lanes for Sixteen {
             Self(d) * Self(h),
         ]);
         x + y + z + w
+    }
+
+    #[inline(always)]
+    fn rotations(components: [Self; 4]) -> Self::Rotations {
+        let [a, b, c, d] = Self::transposed(components);
+        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 
     #[inline(always)]
