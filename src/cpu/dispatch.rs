@@ -7,6 +7,8 @@ mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod eight;
 #[cfg(target_arch = "x86_64")]
+mod operators;
+#[cfg(target_arch = "x86_64")]
 mod sixteen;
 
 use std::str::FromStr;

@@ -10,9 +10,9 @@ use std::arch::x86_64::{
     _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd,
     _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
-use std::ops::{Add, Mul, Neg, Sub};
 
 use super::doubles::doubles;
+use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
@@ -30,42 +30,7 @@ macro_rules! avx2 {
 #[derive(Clone, Copy)]
 pub(super) struct Eight(__m256);
 
-impl Add for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(avx2!(_mm256_add_ps(self.0, other.0)))
-    }
-}
-
-impl Sub for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(avx2!(_mm256_sub_ps(self.0, other.0)))
-    }
-}
-
-impl Neg for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        let sign = Self::all(-0.0);
-        Self(avx2!(_mm256_xor_ps(self.0, sign.0)))
-    }
-}
-
-impl Mul for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(avx2!(_mm256_mul_ps(self.0, other.0)))
-    }
-}
+operators!(Eight: avx2, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_xor_ps);
 
 impl Number for Eight {
     #[inline(always)]

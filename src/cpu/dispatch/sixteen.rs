@@ -11,10 +11,10 @@ use std::arch::x86_64::{
     _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
     _mm512_xor_pd, _mm512_xor_ps,
 };
-use std::ops::{Add, Mul, Neg, Sub};
 
 use super::Eight;
 use super::doubles::doubles;
+use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
 use crate::segment::shader::TINY_BITS;
 
@@ -32,42 +32,7 @@ macro_rules! avx512 {
 #[derive(Clone, Copy)]
 pub(super) struct Sixteen(__m512);
 
-impl Add for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(avx512!(_mm512_add_ps(self.0, other.0)))
-    }
-}
-
-impl Sub for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(avx512!(_mm512_sub_ps(self.0, other.0)))
-    }
-}
-
-impl Mul for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(avx512!(_mm512_mul_ps(self.0, other.0)))
-    }
-}
-
-impl Neg for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        let sign = Self::all(-0.0);
-        Self(avx512!(_mm512_xor_ps(self.0, sign.0)))
-    }
-}
+operators!(Sixteen: avx512, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_xor_ps);
 
 impl Number for Sixteen {
     #[inline(always)]
