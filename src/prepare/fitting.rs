@@ -174,7 +174,7 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     block.clear();
 }
 
-/// Segments that are not fitted yet; to copy them takes half as long as to write each.
+/// Segments that are not fitted yet: as a constant, so many of them are cleared at once.
 static ZERO: [PolynomialSegment; LANES] = [PolynomialSegment {
     coefficients: [[0.0; 4]; 11],
 }; LANES];

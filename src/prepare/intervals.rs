@@ -251,7 +251,8 @@ impl Intervals {
         [self.from[lane], self.to[lane]]
     }
 
-    /// Lanes to work out: whole vectors of them.
+    /// Lanes to work out: whole vectors of eight. Wider ones go on behind them, where there
+    /// is [`ROOM`].
     #[inline(always)]
     pub(super) fn whole(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
