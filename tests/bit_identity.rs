@@ -9,8 +9,8 @@ use support::{
 };
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path, Reads,
-    Rotations, TrackSet, Transfer, VectorWidth, method,
+    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside, Path,
+    Reads, Rotations, TrackSet, Transfer, VectorWidth, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -507,6 +507,73 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
                 assert_everywhere(&expected, &set, interpolation, frames);
             }
+        }
+    }
+}
+
+/// Curves that turn little, moderately and far are made in different ways, those of many
+/// tracks side by side: a track's bits are its own, whatever lies beside it.
+#[test]
+fn tracks_have_the_same_bits_whatever_is_beside_them() {
+    let mut random = Random(84);
+    let mut tracks = Vec::new();
+    for track in 0..60 {
+        // First two keys alone, with nothing before them in their block.
+        let count = [2, 3, 4, 26, 2, 27, 64, 5, 65, 2, 130, 66][track % 12];
+        let longest = random.pick(&[0.03, 0.3, 0.7, 1.2, 3.1]);
+        let (mut times, mut keys) = (Vec::new(), Vec::new());
+        let (mut time, mut key) = (random.between(0.0, 1.0), random.rotation());
+        for _ in 0..count {
+            times.push(time);
+            keys.push(key.as_quat() * random.pick(&[1.0, 1.0, -1.0]));
+            let far = random.pick(&[longest, longest, longest, 2.5]);
+            let turn = random.between(0.01, far);
+            key = (key * DQuat::from_axis_angle(random.direction(), turn)).normalize();
+            time += random.between(0.02, 0.4);
+        }
+        tracks.push((times, keys));
+    }
+    let set_of = |tracks: &[(Vec<f64>, Vec<Quat>)]| {
+        let mut set = TrackSet::new();
+        for (times, keys) in tracks {
+            set.push("", times, keys).unwrap();
+        }
+        set
+    };
+    let mut closed = tracks.clone();
+    for (_, keys) in &mut closed {
+        let last = keys.len() - 1;
+        keys[last] = keys[0];
+    }
+    let frames = Frames::fps(240).between(-1.0, 4.0);
+    let ends = [Ends::Parabolic, Ends::Natural, Ends::Loop, Ends::Frozen];
+    let outside = [Outside::Hold, Outside::Extrapolate];
+    for (method, path) in [
+        (method::CATMULL_ROM, Path::Shortest),
+        (method::BESSEL_OVERHAUSER, Path::Shortest),
+        (method::BESSEL_OVERHAUSER, Path::AsAuthored),
+    ] {
+        for (ends, after) in ends.into_iter().flat_map(|end| outside.map(|o| (end, o))) {
+            let interpolation = Interpolation {
+                path,
+                ends,
+                after,
+                ..method.into()
+            };
+            let evaluate = |set: &TrackSet| {
+                let rotations = cpu().evaluate(set, interpolation, &frames).unwrap();
+                rotations.as_quats().to_vec()
+            };
+            let mut tracks = match ends {
+                Ends::Loop => closed.clone(),
+                _ => tracks.clone(),
+            };
+            let alone = tracks.chunks(1).map(|track| evaluate(&set_of(track)));
+            let mut alone: Vec<Vec<Quat>> = alone.collect();
+            assert_same_bits(&alone.concat(), &evaluate(&set_of(&tracks)), method.name);
+            tracks.reverse();
+            alone.reverse();
+            assert_same_bits(&alone.concat(), &evaluate(&set_of(&tracks)), method.name);
         }
     }
 }

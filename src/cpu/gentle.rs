@@ -2,6 +2,7 @@
 
 use super::evaluate::canonical;
 use super::evaluate_arc::square;
+use crate::branchless::{Arithmetic, scaled, sum};
 use crate::segment::Joint;
 use crate::segment::shader::{
     B_111_1, B_111_2, B_111_3, B_111_4, B_111_5, B_111_6, B_122_1, B_122_2, B_122_3, B_122_4,
@@ -16,10 +17,10 @@ type Quaternion = [f32; 4];
 
 /// A rotation as what it is more than none.
 #[derive(Clone, Copy)]
-struct Turn {
-    vector: Vector,
+pub(crate) struct Turn<N> {
+    pub(crate) vector: [N; 3],
     /// The cosine - 1.
-    fall: f32,
+    pub(crate) fall: N,
 }
 
 /// A cubic that turns little.
@@ -31,22 +32,12 @@ pub(crate) struct Gentle {
 }
 
 #[inline(always)]
-fn sum(a: Vector, b: Vector) -> Vector {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn minus(a: Vector, b: Vector) -> Vector {
+pub(crate) fn minus<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn scaled(a: Vector, k: f32) -> Vector {
-    [a[0] * k, a[1] * k, a[2] * k]
-}
-
-#[inline(always)]
-fn across(a: Vector, b: Vector) -> Vector {
+fn across<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -55,17 +46,17 @@ fn across(a: Vector, b: Vector) -> Vector {
 }
 
 #[inline(always)]
-fn along(a: Vector, b: Vector) -> f32 {
+fn along<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-fn chord_of(a: Quaternion, b: Quaternion) -> Quaternion {
+pub(crate) fn chord_of<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]]
 }
 
 #[inline(always)]
-fn step_vector(a: Quaternion, chord: Quaternion) -> Vector {
+pub(crate) fn step_vector<N: Arithmetic>(a: [N; 4], chord: [N; 4]) -> [N; 3] {
     [
         a[3] * chord[0] - chord[3] * a[0] - (a[1] * chord[2] - a[2] * chord[1]),
         a[3] * chord[1] - chord[3] * a[1] - (a[2] * chord[0] - a[0] * chord[2]),
@@ -81,7 +72,7 @@ fn short_log(v: Vector) -> Vector {
 }
 
 #[inline(always)]
-fn short_exp(v: Vector) -> Turn {
+fn short_exp(v: Vector) -> Turn<f32> {
     let x = along(v, v);
     let sinc = (SINC_2 * x + SINC_1) * x;
     Turn {
@@ -91,7 +82,7 @@ fn short_exp(v: Vector) -> Turn {
 }
 
 #[inline(always)]
-fn both(a: Turn, b: Turn) -> Turn {
+pub(crate) fn both<N: Arithmetic>(a: Turn<N>, b: Turn<N>) -> Turn<N> {
     let apart = sum(a.vector, b.vector);
     let shortened = sum(scaled(a.vector, b.fall), scaled(b.vector, a.fall));
     Turn {
@@ -101,7 +92,7 @@ fn both(a: Turn, b: Turn) -> Turn {
 }
 
 #[inline(always)]
-fn brought_behind(v: Vector, r: Turn) -> Vector {
+pub(crate) fn brought_behind<N: Arithmetic>(v: [N; 3], r: Turn<N>) -> [N; 3] {
     let once = across(r.vector, v);
     let twice = sum(once, once);
     let back = sum(scaled(twice, r.fall), twice);

@@ -34,6 +34,7 @@ pub(super) fn controls<R: HandleRule>(
 fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     in_lanes(&mut KeyHandles::<R> {
         intervals,
+        stretches,
         rule: PhantomData,
     });
     for stretch in stretches {

@@ -39,14 +39,14 @@ pub(super) enum Tier {
 
 /// Sums of the three half-rotation vectors' squares below this are fitted within 2e-8
 /// by degree 6.
-const GENTLE: f64 = 0.002;
+pub(super) const GENTLE: f64 = 0.002;
 
 /// Above this hardly any curve is fitted whole.
-const LONGEST_WHOLE: f64 = 0.2;
+pub(super) const LONGEST_WHOLE: f64 = 0.2;
 
 /// An estimate of twice what a fit leaves out may be this much: from the last two
 /// Chebyshev coefficients.
-const TOLERANCE: f32 = 1.5e-7;
+pub(super) const TOLERANCE: f32 = 1.5e-7;
 
 /// How far the angles may go from the middle of a piece, and of a whole curve: the
 /// polynomials of sine and cosine hold to pi/2 and to pi/4.
@@ -128,6 +128,16 @@ impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
 }
 
 impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
+    /// Sets what the rotations before and after the middle are more than it, at the `k`th
+    /// pair of nodes.
+    #[inline(always)]
+    pub(super) fn set_differences(&mut self, k: usize, [before, after]: [[L; 4]; 2]) {
+        for c in 0..4 {
+            self.even[k][c] = after[c] + before[c];
+            self.odd[k][c] = after[c] - before[c];
+        }
+    }
+
     /// Every lane's.
     #[inline(always)]
     pub(super) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {
@@ -312,32 +322,45 @@ impl FitBlock {
         samples: &Samples<L, PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        let means = coefficients(&nodes.even, &samples.even);
-        let halves = coefficients(&nodes.odd, &samples.odd);
-        let entire = self.is_entire();
-        let mut tails = L::all(0.0);
-        for c in 0..4 {
-            let last_even = means[PAIRS - 1][c].magnitude();
-            let last_odd = halves[PAIRS - 1][c].magnitude();
-            let before_last = means[PAIRS - 2][c].magnitude() + halves[PAIRS - 2][c].magnitude();
-            let tail = if entire {
-                last_even + L::all(0.125) * last_odd
-            } else {
-                last_even + last_odd + L::all(0.25) * before_last
-            };
-            tails = tail.larger(tails);
-        }
-        tails.store(&mut self.tails[lane..lane + L::COUNT]);
         let mut places = [0; MOST];
         places[..L::COUNT].copy_from_slice(&self.places[lane..lane + L::COUNT]);
-        store(samples.middle, segments, &places, 0);
-        for power in 0..PAIRS {
-            let odd = of_power(&ODD_POWERS, &halves, power);
-            store(odd, segments, &places, 2 * power + 1);
-            let even = of_power(&EVEN_POWERS, &means, power);
-            store(even, segments, &places, 2 * power + 2);
-        }
+        let tails = interpolate(self.is_entire(), nodes, samples, &places, segments);
+        tails.store(&mut self.tails[lane..lane + L::COUNT]);
     }
+}
+
+/// From the differences at the nodes to the coefficients, in each lane's segment; and what
+/// the fits leave out, twice, about. Curves are [entire](super::shape::Shape::entire), or not.
+#[inline(always)]
+pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
+    are_entire: bool,
+    nodes: &Nodes<PAIRS>,
+    samples: &Samples<L, PAIRS>,
+    places: &[usize; MOST],
+    segments: &mut [PolynomialSegment],
+) -> L {
+    let means = coefficients(&nodes.even, &samples.even);
+    let halves = coefficients(&nodes.odd, &samples.odd);
+    let mut tails = L::all(0.0);
+    for c in 0..4 {
+        let last_even = means[PAIRS - 1][c].magnitude();
+        let last_odd = halves[PAIRS - 1][c].magnitude();
+        let before_last = means[PAIRS - 2][c].magnitude() + halves[PAIRS - 2][c].magnitude();
+        let tail = if are_entire {
+            last_even + L::all(0.125) * last_odd
+        } else {
+            last_even + last_odd + L::all(0.25) * before_last
+        };
+        tails = tail.larger(tails);
+    }
+    store(samples.middle, segments, places, 0);
+    for power in 0..PAIRS {
+        let odd = of_power(&ODD_POWERS, &halves, power);
+        store(odd, segments, places, 2 * power + 1);
+        let even = of_power(&EVEN_POWERS, &means, power);
+        store(even, segments, places, 2 * power + 2);
+    }
+    tails
 }
 
 /// Stores the coefficients of a power to each lane's segment.

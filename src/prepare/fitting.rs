@@ -74,26 +74,34 @@ impl Fitting {
         curves: &Intervals,
         lanes: Range<usize>,
     ) {
-        let segments = polynomials(prepared);
-        let places = segments.len()..segments.len() + lanes.len();
-        segments.extend_from_slice(&ZERO[..lanes.len()]);
-        let sources = &mut prepared.spans.sources;
-        let first_span = sources.len();
-        sources.extend(places.clone().map(|place| Source::Segment(place as u32)));
-        for (i, lane) in lanes.enumerate() {
-            let span = first_span + i;
-            let queue = match tier(curves.energies[lane]) {
-                Tier::Gentle => &mut self.gentle,
-                Tier::Full => &mut self.full,
-                Tier::Piece => {
-                    let curve = curves.curve(lane, self.shape, self.quantity);
-                    self.cutter.push(span, curve, places.start + i);
-                    continue;
-                }
-            };
-            queue.lanes.push(lane as u8);
-            queue.spans.push(span);
+        let (spans, _) = prepared.new_segments(lanes.len());
+        for (span, lane) in spans.zip(lanes) {
+            self.queue(prepared, curves, lane, span);
         }
+    }
+
+    /// As [`Fitting::take`], the curve of a span that has its segment.
+    #[inline]
+    pub(super) fn queue(
+        &mut self,
+        prepared: &Prepared,
+        curves: &Intervals,
+        lane: usize,
+        span: usize,
+    ) {
+        let queue = match tier(curves.energies[lane]) {
+            Tier::Gentle => &mut self.gentle,
+            Tier::Full => &mut self.full,
+            Tier::Piece => {
+                let curve = curves.curve(lane, self.shape, self.quantity);
+                if let Source::Segment(place) = prepared.spans.sources[span] {
+                    self.cutter.push(span, curve, place as usize);
+                }
+                return;
+            }
+        };
+        queue.lanes.push(lane as u8);
+        queue.spans.push(span);
     }
 
     /// Brings the curves that were taken into blocks.
@@ -191,6 +199,19 @@ pub(super) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
 }
 
 impl Prepared {
+    /// As many segments, which are zero, each the source of the next span: which spans and
+    /// which segments these are.
+    #[inline]
+    pub(super) fn new_segments(&mut self, count: usize) -> (Range<usize>, Range<usize>) {
+        let segments = polynomials(self);
+        let places = segments.len()..segments.len() + count;
+        segments.extend_from_slice(&ZERO[..count]);
+        let sources = &mut self.spans.sources;
+        let first_span = sources.len();
+        sources.extend(places.clone().map(|place| Source::Segment(place as u32)));
+        (first_span..first_span + count, places)
+    }
+
     /// Puts the parts of curves that were cut where these are among the spans.
     fn put_parts(&mut self, cutter: &Cutter, uncut: &mut Spans) {
         let mut cut = cutter.parts();

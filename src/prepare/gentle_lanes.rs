@@ -4,11 +4,11 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
+use super::key_joints::KeyJoints;
+use super::key_steps::KeySteps;
 use crate::cpu::{Gentle, InLanes, Lanes, gentle, in_lanes, signed};
-use crate::joints::{Joints, UNKNOWN};
-use crate::method::{Ends, Path};
+use crate::segment::PolynomialSegment;
 use crate::segment::shader::{INNER, LONGEST_STEP};
-use crate::segment::{Joint, PolynomialSegment};
 
 /// Lanes of the widest vectors.
 const VECTOR: usize = 16;
@@ -18,132 +18,72 @@ const FEW: usize = 6;
 
 /// The curves of a block's intervals.
 pub(super) struct GentleLanes {
-    rule: Joints,
-    /// At a track's ends.
-    end: Joint,
-    is_loop: bool,
-    may_flip: bool,
-    /// -1 where the sign of an interval's second key is turned.
-    pub(super) flips: [f32; ROOM],
     /// Whether the keys of the interval, and of both beside it, are near each other.
     near: [bool; ROOM],
     /// Whole vectors of lanes, behind which no lane holds such a curve.
     wanted: usize,
-    /// Of the key that an interval starts with.
-    joints: [Joint; ROOM],
     powers: [[[f32; 4]; ROOM]; 7],
-    holds: [bool; ROOM],
+    /// Whether a lane has its curve.
+    pub(super) holds: [bool; ROOM],
 }
 
 impl GentleLanes {
-    pub(super) fn new(rule: Joints, ends: Ends, path: Path) -> Self {
-        let end = Joints::end(ends);
+    pub(super) fn new() -> Self {
         Self {
-            rule,
-            end,
-            is_loop: ends == Ends::Loop,
-            may_flip: path == Path::Shortest,
-            flips: [1.0; ROOM],
             near: [false; ROOM],
             wanted: 0,
-            joints: [end; ROOM],
             powers: [[[0.0; 4]; ROOM]; 7],
             holds: [false; ROOM],
         }
     }
 
-    /// Finds out which keys are near each other; whether any curve may turn little, and
-    /// whether all do.
-    pub(super) fn look(&mut self, intervals: &Intervals, stretches: &[Stretch]) -> (bool, bool) {
-        in_lanes(&mut Chords {
-            lanes: self,
-            intervals,
-        });
-        self.holds = [false; ROOM];
-        let (mut last, mut others) = (None, 0);
-        for lanes in stretches.iter().map(Stretch::lanes) {
-            let near = &self.near[lanes.clone()];
-            let place = near.iter().rposition(|&near| near);
-            last = place.map(|place| lanes.start + place).or(last);
-            others += near.iter().map(|&near| usize::from(!near)).sum::<usize>();
+    /// Finds out which keys are near each other; whether any curve may turn little.
+    pub(super) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) -> bool {
+        for j in 1..LANES {
+            let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
+            self.near[j] = (chords[0] <= LONGEST_STEP)
+                & (chords[1] <= LONGEST_STEP)
+                & (chords[2] <= LONGEST_STEP);
         }
-        let Some(last) = last else {
-            return (false, false);
-        };
+        self.holds = [false; ROOM];
+        let mut last = None;
+        for lanes in stretches.iter().map(Stretch::lanes) {
+            let place = self.near[lanes.clone()].iter().rposition(|&near| near);
+            last = place.map(|place| lanes.start + place).or(last);
+        }
         // A lane's curve is worked out one lane before it.
-        self.wanted = last.next_multiple_of(VECTOR);
-        (true, others == 0)
+        self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
+        last.is_some()
     }
 
     /// Prepares them; the signs of the intervals' first keys are known.
-    pub(super) fn prepare(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
+    pub(super) fn prepare(
+        &mut self,
+        intervals: &Intervals,
+        steps: &KeySteps,
+        joints: &KeyJoints,
+        stretches: &[Stretch],
+    ) {
         let own = stretches.iter().flat_map(Stretch::lanes);
         let near: Vec<usize> = own.filter(|&lane| self.near[lane]).collect();
-        let are_few = near.len() <= FEW;
-        if are_few {
-            let durations = &intervals.durations;
-            for key in near.iter().flat_map(|&lane| [lane, lane + 1]) {
-                self.joints[key] = self.rule.between(durations[key - 1], durations[key]);
-            }
-        } else {
-            in_lanes(&mut JointLanes {
-                lanes: self,
-                intervals,
-            });
-        }
-        for stretch in stretches.iter().filter(|_| !self.is_loop) {
-            let end = match stretch.all {
-                1 => UNKNOWN,
-                _ => self.end,
-            };
-            if let Some(lane) = stretch.first() {
-                self.joints[lane] = end;
-            }
-            if let Some(lane) = stretch.last() {
-                self.joints[lane + 1] = end;
-            }
-        }
-        if !are_few {
-            in_lanes(&mut Curves {
-                lanes: self,
-                intervals,
-            });
+        let mut curves = Curves {
+            lanes: self,
+            intervals,
+            steps,
+            joints,
+        };
+        if near.len() > FEW {
+            in_lanes(&mut curves);
             return;
         }
         for lane in near {
-            let curve = self.curve(intervals, lane - 1);
-            for (powers, power) in self.powers.iter_mut().zip(curve.powers) {
+            let curve = curves.curve(lane - 1);
+            let own = &mut *curves.lanes;
+            for (powers, power) in own.powers.iter_mut().zip(curve.powers) {
                 powers[lane] = power;
             }
-            self.holds[lane] = curve.holds;
+            own.holds[lane] = curve.holds;
         }
-    }
-
-    /// The curve of lane `j + 1`.
-    #[inline(always)]
-    fn curve(&self, intervals: &Intervals, j: usize) -> Gentle {
-        let Intervals {
-            from, to, signs, ..
-        } = intervals;
-        let flips = &self.flips;
-        let own = signs[j + 1] as f32;
-        let sign_before = own * flips[j];
-        let sign_end = own * flips[j + 1];
-        let sign_after = sign_end * flips[j + 2];
-        let (first, last) = (self.joints[j + 1], self.joints[j + 2]);
-        let start = signed(from[j + 1], own);
-        let end = signed(to[j + 1], sign_end);
-        let before = signed(from[j], sign_before);
-        let after = signed(to[j + 2], sign_after);
-        // Where there is no neighbour, the key again.
-        let before = either(first.kind == INNER, before, start);
-        let after = either(last.kind == INNER, after, end);
-        gentle([before, start, end, after], first, last)
-    }
-
-    /// Whether a lane has its curve.
-    pub(super) fn holds(&self, lane: usize) -> bool {
-        self.holds[lane]
     }
 
     /// Writes it.
@@ -155,53 +95,35 @@ impl GentleLanes {
     }
 }
 
-struct Chords<'a> {
-    lanes: &'a mut GentleLanes,
-    intervals: &'a Intervals,
-}
-
-impl InLanes for Chords<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let (mut flips, mut own, mut near) = ([1.0; ROOM], [false; ROOM], [false; ROOM]);
-        let Intervals { from, to, .. } = self.intervals;
-        let turned = if self.lanes.may_flip { -1.0 } else { 1.0 };
-        for j in 0..self.intervals.whole32() {
-            let ([ax, ay, az, aw], [bx, by, bz, bw]) = (from[j], to[j]);
-            let dot = ax * bx + ay * by + az * bz + aw * bw;
-            let flip = if dot < 0.0 { turned } else { 1.0 };
-            let (x, y) = (bx * flip - ax, by * flip - ay);
-            let (z, w) = (bz * flip - az, bw * flip - aw);
-            flips[j] = flip;
-            own[j] = x * x + y * y + z * z + w * w <= LONGEST_STEP;
-        }
-        for j in 1..LANES {
-            near[j] = own[j - 1] & own[j] & own[j + 1];
-        }
-        (self.lanes.flips, self.lanes.near) = (flips, near);
-    }
-}
-
-struct JointLanes<'a> {
-    lanes: &'a mut GentleLanes,
-    intervals: &'a Intervals,
-}
-
-impl InLanes for JointLanes<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let mut joints = self.lanes.joints;
-        let durations = &self.intervals.durations;
-        for j in 0..LANES {
-            joints[j + 1] = self.lanes.rule.between(durations[j], durations[j + 1]);
-        }
-        self.lanes.joints = joints;
-    }
-}
-
 struct Curves<'a> {
     lanes: &'a mut GentleLanes,
     intervals: &'a Intervals,
+    steps: &'a KeySteps,
+    joints: &'a KeyJoints,
+}
+
+impl Curves<'_> {
+    /// The curve of lane `j + 1`.
+    #[inline(always)]
+    fn curve(&self, j: usize) -> Gentle {
+        let Intervals {
+            from, to, signs, ..
+        } = self.intervals;
+        let flips = &self.steps.flips;
+        let own = signs[j + 1] as f32;
+        let sign_before = own * flips[j];
+        let sign_end = own * flips[j + 1];
+        let sign_after = sign_end * flips[j + 2];
+        let (first, last) = (self.joints.at(j + 1), self.joints.at(j + 2));
+        let start = signed(from[j + 1], own);
+        let end = signed(to[j + 1], sign_end);
+        let before = signed(from[j], sign_before);
+        let after = signed(to[j + 2], sign_after);
+        // Where there is no neighbour, the key again.
+        let before = either(first.kind == INNER, before, start);
+        let after = either(last.kind == INNER, after, end);
+        gentle([before, start, end, after], first, last)
+    }
 }
 
 impl InLanes for Curves<'_> {
@@ -210,9 +132,8 @@ impl InLanes for Curves<'_> {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
         // The lane before each is context, at least.
-        let lanes = &*self.lanes;
-        for j in 0..lanes.wanted.min(LANES) {
-            let curve = lanes.curve(self.intervals, j);
+        for j in 0..self.lanes.wanted.min(LANES) {
+            let curve = self.curve(j);
             for power in 0..7 {
                 for c in 0..4 {
                     powers[power][c][j + 1] = curve.powers[power][c];

@@ -149,6 +149,17 @@ impl Intervals {
         self.count = lanes.end;
     }
 
+    /// Adds some lanes of other intervals, as they were pushed, with their signs; there is
+    /// room for them.
+    pub(super) fn push_from(&mut self, other: &Self, lanes: Range<usize>) {
+        let own = self.count..self.count + lanes.len();
+        self.from[own.clone()].copy_from_slice(&other.from[lanes.clone()]);
+        self.to[own.clone()].copy_from_slice(&other.to[lanes.clone()]);
+        self.durations[own.clone()].copy_from_slice(&other.durations[lanes.clone()]);
+        self.signs[own.clone()].copy_from_slice(&other.signs[lanes]);
+        self.count = own.end;
+    }
+
     /// Sets the method's own numbers of the keys that an interval starts and ends with.
     pub(super) fn set_given(&mut self, lane: usize, outward: [f64; 4], inward: [f64; 4]) {
         put(&mut self.outward, lane, outward);
@@ -162,6 +173,11 @@ impl Intervals {
         (self.from[lane], self.to[lane]) = (identity, identity);
         self.durations[lane] = 1.0;
         self.count += 1;
+    }
+
+    /// Forgets them.
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
     }
 
     pub(crate) fn duration(&self, lane: usize) -> f64 {

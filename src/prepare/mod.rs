@@ -7,10 +7,13 @@ mod arcs;
 mod clip_data;
 mod curve;
 mod cut;
+mod direct;
 mod fit;
 mod fitting;
 mod gentle_lanes;
 mod intervals;
+mod key_joints;
+mod key_steps;
 mod motion;
 mod nodes;
 mod pace;
@@ -22,7 +25,10 @@ mod shape;
 mod smooth;
 mod steady;
 mod steps;
+mod turns;
 mod vectors;
+mod whole_fit;
+mod whole_lanes;
 
 pub(crate) use arc_lanes::{
     LANES as ARC_LANES, any_turns, arc_anyhow, arc_in_lanes, arcs, flip, may_turn, whole,

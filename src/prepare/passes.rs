@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::fit::MOST;
 use super::intervals::{
-    Intervals, LANES, Lane, ROOM, aligned, at, energy, load, load3, load4, put, store,
+    Intervals, LANES, Lane, ROOM, Stretch, aligned, at, energy, load, load3, load4, put, store,
 };
 use crate::branchless::{
     self, Algebra, Anywhere, Near, Quaternion, Real, Vector, normalised, product, scaled, sum,
@@ -163,6 +163,7 @@ pub(crate) enum EndHandle {
 /// The handles of every key that an interval starts with, or ends with.
 pub(crate) struct KeyHandles<'a, R> {
     pub(crate) intervals: &'a mut Intervals,
+    pub(crate) stretches: &'a [Stretch],
     pub(crate) rule: PhantomData<R>,
 }
 
@@ -177,7 +178,12 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
             store(&mut own.incoming, lane + 1, handles.incoming);
             store(&mut own.outgoing, lane + 1, handles.outgoing);
             if near.is_in_doubt() {
-                for j in near.lanes(lane + 1, own.count) {
+                // Between the context of one stretch and that of the next is no key.
+                let is_key = |j: &usize| {
+                    let mut stretches = self.stretches.iter().map(Stretch::lanes);
+                    stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
+                };
+                for j in near.lanes(lane + 1, own.count).filter(is_key) {
                     own.handles_anywhere::<R>(j);
                 }
             }

@@ -187,72 +187,59 @@ fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     ]
 }
 
+/// The sine of an angle divided by the length of its vector, and its cosine less 1.
+pub(super) type SineAndFall<L> = (L, L);
+
 /// Cubics about the middle of their pieces, expanded, a lane to each: with `c_j` the cosine
 /// of the j-th angle and `s_j` its sine divided by the length of its vector,
 /// `q = Σ terms[4a+2b+c] {c,s}_1 {c,s}_2 {c,s}_3`.
+pub(super) struct Terms<L>([[L; 4]; 8]);
+
+/// The same with what the angles are made of.
 struct Expanded<L> {
-    terms: [[L; 4]; 8],
+    terms: Terms<L>,
     squares: [L; 3],
     powers: [[L; 3]; 3],
 }
 
-impl<L: Lanes> Expanded<L> {
+impl<L: Lanes> Terms<L> {
+    /// Of half-rotation vectors that are brought behind what follows them:
+    /// `m exp(v_1 b_1) exp(v_2 b_2) exp(v_3 b_3)`.
     #[inline(always)]
-    fn new(base: [L::Doubles; 4], [first, second, third]: [Factor<L>; 3]) -> Self {
-        // What the rotations so far have made of it.
-        let base1 = product(base, first.turn);
-        let base2 = product(base1, second.turn);
-        let base3 = product(base2, third.turn);
-        let (r2, r3) = (rounded::<L>(second.turn), rounded::<L>(third.turn));
-        let (v1, v2, v3) = (first.vector, second.vector, third.vector);
-        let of_none = rounded::<L>(base3);
-        let of_second = product(about(rounded::<L>(base2), v2), r3);
-        let to_second = product(about(rounded::<L>(base1), v1), r2);
-        let of_both = product(about(to_second, v2), r3);
-        let of_first = product(to_second, r3);
-        Self {
-            terms: [
-                of_none,
-                about(of_none, v3),
-                of_second,
-                about(of_second, v3),
-                of_first,
-                about(of_first, v3),
-                of_both,
-                about(of_both, v3),
-            ],
-            squares: [first.square, second.square, third.square],
-            powers: [first.powers, second.powers, third.powers],
-        }
+    pub(super) fn about_middle(m: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
+        let of_first = about(m, v1);
+        Self::new([m, about(m, v2), of_first, about(of_first, v2)], v3)
     }
 
-    /// Samples them at every node.
+    /// From those without the third sine.
     #[inline(always)]
-    fn sample<const PAIRS: usize, const SHORT: bool>(
-        &self,
-        nodes: &Nodes<PAIRS>,
-    ) -> Samples<L, PAIRS> {
-        let mut samples = Samples::all(L::all(0.0));
-        samples.middle = self.terms[0];
-        for k in 0..PAIRS {
-            let [before, after] = self.differences::<SHORT>(L::all(nodes.at[k]));
-            for c in 0..4 {
-                samples.even[k][c] = after[c] + before[c];
-                samples.odd[k][c] = after[c] - before[c];
-            }
-        }
-        samples
+    fn new([of_none, of_second, of_first, of_both]: [[L; 4]; 4], v3: [L; 3]) -> Self {
+        Self([
+            of_none,
+            about(of_none, v3),
+            of_second,
+            about(of_second, v3),
+            of_first,
+            about(of_first, v3),
+            of_both,
+            about(of_both, v3),
+        ])
     }
 
-    /// `q(-s) - q(0)` and `q(s) - q(0)`, side by side: each is a long chain.
+    /// The rotation of the middle.
     #[inline(always)]
-    fn differences<const SHORT: bool>(&self, s: L) -> [[L; 4]; 2] {
-        let first = self.turns::<SHORT>(0, s);
-        let second = self.turns::<SHORT>(1, s);
-        let third = self.turns::<SHORT>(2, s);
-        let mut differences = [self.terms[0]; 2];
+    pub(super) fn middle(&self) -> [L; 4] {
+        self.0[0]
+    }
+
+    /// What the rotations before and after the middle are more than it, side by side: each
+    /// is a long chain.
+    #[inline(always)]
+    pub(super) fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
+        let terms = &self.0;
+        let mut differences = [terms[0]; 2];
         for i in 0..2 {
-            let ((s1, f1), (s2, f2), (s3, f3)) = (first[i], second[i], third[i]);
+            let [(s1, f1), (s2, f2), (s3, f3)] = sides[i];
             // With cosines as 1 + fall, nothing is lost where the angles are small.
             let both = f2 + f3 + f2 * f3;
             let cs = s3 + f2 * s3;
@@ -271,19 +258,65 @@ impl<L: Lanes> Expanded<L> {
                 ss * s1,
             ];
             for (c, difference) in differences[i].iter_mut().enumerate() {
-                let first = self.terms[0][c] * weights[0] + self.terms[1][c] * weights[1];
-                let second = self.terms[2][c] * weights[2] + self.terms[3][c] * weights[3];
-                let third = self.terms[4][c] * weights[4] + self.terms[5][c] * weights[5];
-                let fourth = self.terms[6][c] * weights[6] + self.terms[7][c] * weights[7];
+                let first = terms[0][c] * weights[0] + terms[1][c] * weights[1];
+                let second = terms[2][c] * weights[2] + terms[3][c] * weights[3];
+                let third = terms[4][c] * weights[4] + terms[5][c] * weights[5];
+                let fourth = terms[6][c] * weights[6] + terms[7][c] * weights[7];
                 *difference = (first + second) + (third + fourth);
             }
         }
         differences
     }
+}
 
-    /// Sine over length, and cosine less 1, of the j-th angle at `-s` and at `s`.
+impl<L: Lanes> Expanded<L> {
     #[inline(always)]
-    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> [(L, L); 2] {
+    fn new(base: [L::Doubles; 4], [first, second, third]: [Factor<L>; 3]) -> Self {
+        // What the rotations so far have made of it.
+        let base1 = product(base, first.turn);
+        let base2 = product(base1, second.turn);
+        let base3 = product(base2, third.turn);
+        let (r2, r3) = (rounded::<L>(second.turn), rounded::<L>(third.turn));
+        let (v1, v2) = (first.vector, second.vector);
+        let of_second = product(about(rounded::<L>(base2), v2), r3);
+        let to_second = product(about(rounded::<L>(base1), v1), r2);
+        let of_both = product(about(to_second, v2), r3);
+        let of_first = product(to_second, r3);
+        let of_none = rounded::<L>(base3);
+        Self {
+            terms: Terms::new([of_none, of_second, of_first, of_both], third.vector),
+            squares: [first.square, second.square, third.square],
+            powers: [first.powers, second.powers, third.powers],
+        }
+    }
+
+    /// Samples them at every node.
+    #[inline(always)]
+    fn sample<const PAIRS: usize, const SHORT: bool>(
+        &self,
+        nodes: &Nodes<PAIRS>,
+    ) -> Samples<L, PAIRS> {
+        let mut samples = Samples::all(L::all(0.0));
+        samples.middle = self.terms.middle();
+        for k in 0..PAIRS {
+            let s = L::all(nodes.at[k]);
+            let first = self.turns::<SHORT>(0, s);
+            let second = self.turns::<SHORT>(1, s);
+            let third = self.turns::<SHORT>(2, s);
+            samples.set_differences(
+                k,
+                self.terms.differences([
+                    [first[0], second[0], third[0]],
+                    [first[1], second[1], third[1]],
+                ]),
+            );
+        }
+        samples
+    }
+
+    /// Of the j-th angle, at `-s` and at `s`.
+    #[inline(always)]
+    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> [SineAndFall<L>; 2] {
         let [linear, quadratic, cubic] = self.powers[j];
         let rise = cubic * s;
         // The same as with -s, to the bit.

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use super::fitting::{Fitting, new_segment, polynomials};
-use super::gentle_lanes::GentleLanes;
+use super::direct::Direct;
+use super::fitting::Fitting;
 use super::intervals::{Intervals, LANES, Stretch};
 use super::passes::{FramesHeld, Steps};
 use super::retime::{Place, Waiting};
@@ -39,7 +39,7 @@ pub(crate) struct SmoothPreparation {
     stretches: Vec<Stretch>,
     fitting: Fitting,
     /// Where the method has such curves.
-    gentle: Option<Box<GentleLanes>>,
+    direct: Option<Box<Direct>>,
     /// Curves that are to be run through at constant speed.
     waiting: Waiting,
     /// What the signs of the keys so far make of the next.
@@ -53,9 +53,9 @@ impl SmoothPreparation {
         let path = interpolation.method.path.unwrap_or(interpolation.path);
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
-        let gentle = smooth.gentle.filter(|_| suits);
+        let rule = smooth.gentle.filter(|_| suits);
         Self {
-            gentle: gentle.map(|rule| Box::new(GentleLanes::new(rule, interpolation.ends, path))),
+            direct: rule.map(|rule| Box::new(Direct::new(rule, smooth, interpolation.ends, path))),
             interpolation: Interpolation {
                 path,
                 ..*interpolation
@@ -158,6 +158,9 @@ impl Prepare for SmoothPreparation {
 
     fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
         self.flush(prepared)?;
+        if let Some(direct) = &mut self.direct {
+            direct.finish(prepared, &mut self.fitting);
+        }
         self.waiting.finish(prepared, &mut self.fitting);
         self.fitting.finish(prepared);
         Ok(std::mem::replace(&mut self.sign, 1.0) as f32)
@@ -206,10 +209,11 @@ impl SmoothPreparation {
 
     /// Makes the intervals that wait into curves, and has them fitted.
     fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
-        self.curves()?;
-        for stretch in std::mem::take(&mut self.stretches) {
-            self.end_values(prepared, &stretch);
-            self.beyond(prepared, &stretch);
+        let is_exact = self.curves()?;
+        let stretches = std::mem::take(&mut self.stretches);
+        for stretch in &stretches {
+            self.end_values(prepared, stretch);
+            self.beyond(prepared, stretch);
             let latest = prepared.parts[stretch.part].end;
             let mut holds_frame = [true; LANES];
             if let Some((rate, start)) = self.frames {
@@ -222,13 +226,19 @@ impl SmoothPreparation {
                 holds_frame = held.held;
             }
             if self.interpolation.speed == Speed::Constant {
-                self.wait(&stretch);
+                self.wait(stretch);
             } else {
-                self.push_spans(prepared, &stretch, &holds_frame);
+                self.push_spans(prepared, stretch, &holds_frame);
             }
         }
+        if let Some(direct) = &mut self.direct {
+            let (intervals, fitting) = (&mut self.intervals, &mut self.fitting);
+            direct.fit(prepared, intervals, &stretches, is_exact, fitting);
+        }
         self.fitting.bring(prepared, &self.intervals);
-        self.intervals.count = 0;
+        self.intervals.clear();
+        self.stretches = stretches;
+        self.stretches.clear();
         Ok(())
     }
 
@@ -261,14 +271,10 @@ impl SmoothPreparation {
         prepared.spans.keys.extend(keys);
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
         let lanes = stretch.lanes();
-        let is_gentle = |lane| self.gentle.as_ref().is_some_and(|all| all.holds(lane));
-        let fits_alike = !is_steady
-            && !self.is_frozen()
-            && lanes
-                .clone()
-                .all(|lane| holds_frame[lane] && !is_gentle(lane));
+        let all_hold = lanes.clone().all(|lane| holds_frame[lane]);
+        let fits_alike = !is_steady && !self.is_frozen() && all_hold;
         if fits_alike {
-            self.fitting.take(prepared, &self.intervals, lanes.clone());
+            self.take(prepared, lanes.clone());
         }
         for (i, lane) in lanes.enumerate().filter(|_| !fits_alike) {
             let source = if !holds_frame[lane] {
@@ -276,12 +282,8 @@ impl SmoothPreparation {
             } else if is_steady {
                 let keys = self.intervals.keys(lane);
                 self.fitting.take_steady(prepared, keys)
-            } else if let Some(gentle) = self.gentle.as_ref().filter(|all| all.holds(lane)) {
-                let (source, place) = new_segment(prepared);
-                gentle.write(lane, &mut polynomials(prepared)[place]);
-                source
             } else if !self.holds(stretch, lane) {
-                self.fitting.take(prepared, &self.intervals, lane..lane + 1);
+                self.take(prepared, lane..lane + 1);
                 continue;
             } else if stretch.key != NONE {
                 Source::Constant(stretch.key_at(i))
@@ -305,28 +307,33 @@ impl SmoothPreparation {
         *spans = start..first_span + stretch.intervals.len();
     }
 
-    /// Makes the intervals that wait into curves, in f64 only where there are others than
-    /// those that turn little.
-    fn curves(&mut self) -> Result<(), InterpolationError> {
-        let (mut any, mut all) = (false, false);
-        if let Some(gentle) = &mut self.gentle {
-            (any, all) = gentle.look(&self.intervals, &self.stretches);
+    /// Takes the curves in some lanes: each is the source of the next span.
+    fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>) {
+        match &mut self.direct {
+            Some(direct) => direct.take(prepared, lanes),
+            None => self.fitting.take(prepared, &self.intervals, lanes),
         }
-        let of_formula = |outside| self.goes_on(outside);
-        let sides = [self.interpolation.before, self.interpolation.after];
-        all &= !sides.into_iter().any(of_formula) && !self.is_frozen();
-        if !all {
+    }
+
+    /// Makes the intervals that wait into curves; whether in f64.
+    fn curves(&mut self) -> Result<bool, InterpolationError> {
+        let is_sure = match &mut self.direct {
+            Some(direct) => direct.find_steps(&self.intervals),
+            None => false,
+        };
+        if !is_sure {
             in_lanes(&mut Steps(&mut self.intervals));
         }
-        self.align(!all)?;
-        if let Some(gentle) = self.gentle.as_mut().filter(|_| any) {
-            gentle.prepare(&self.intervals, &self.stretches);
-            let mut lanes = self.stretches.iter().flat_map(Stretch::lanes);
-            if all && lanes.all(|lane| gentle.holds(lane)) {
-                return Ok(());
+        self.align(!is_sure)?;
+        if let Some(direct) = &mut self.direct {
+            direct.find_curves(&self.intervals, &self.stretches);
+            let sides = [self.interpolation.before, self.interpolation.after];
+            let is_wanted = sides.into_iter().any(|side| self.goes_on(side)) || self.is_frozen();
+            if !is_wanted {
+                return Ok(false);
             }
         }
-        if all {
+        if is_sure {
             in_lanes(&mut Steps(&mut self.intervals));
         }
         (self.smooth.curves)(
@@ -334,7 +341,7 @@ impl SmoothPreparation {
             &self.stretches,
             self.interpolation.ends,
         );
-        Ok(())
+        Ok(true)
     }
 
     /// The signs of the intervals' first keys; by the steps between them, or where all are
@@ -346,8 +353,8 @@ impl SmoothPreparation {
             }
             for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
                 self.intervals.signs[lane] = self.sign;
-                if let (false, Some(gentle)) = (by_steps, &self.gentle) {
-                    self.sign *= f64::from(gentle.flips[lane]);
+                if let (false, Some(direct)) = (by_steps, &self.direct) {
+                    self.sign *= direct.flip(lane);
                     continue;
                 }
                 let dot = self.intervals.dots[lane];

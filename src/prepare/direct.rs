@@ -1,0 +1,256 @@
+//! Smooth curves straight from keys, in f32: those that turn little as a series, others by
+//! a fit of the whole. What is left over waits for a block of its own, in f64.
+
+use std::ops::Range;
+
+use super::Prepared;
+use super::fit::{GENTLE, LONGEST_WHOLE, TOLERANCE};
+use super::fitting::{Fitting, polynomials};
+use super::gentle_lanes::GentleLanes;
+use super::intervals::{Intervals, LANES, ROOM, Stretch};
+use super::key_joints::KeyJoints;
+use super::key_steps::{FindSteps, KeySteps};
+use super::nodes::{FULL_NODES, GENTLE_NODES};
+use super::passes::Steps;
+use super::whole_fit::List;
+use super::whole_lanes::{FindCurves, FindHandles, WholeLanes};
+use crate::cpu::in_lanes;
+use crate::joints::Joints;
+use crate::method::{Ends, Path, Smooth};
+
+/// Where more than one interval of so many is left over, all of a block is worked out in
+/// f64: alone each would bring two neighbours.
+const MOST_ALONE: usize = 3;
+
+/// The curves of a block that come straight from keys.
+pub(super) struct Direct {
+    steps: KeySteps,
+    joints: KeyJoints,
+    gentle: GentleLanes,
+    whole: WholeLanes,
+    /// The spans and the segments that lanes become.
+    spans: [u32; ROOM],
+    places: [u32; ROOM],
+    /// Lanes to fit, with few powers and with all.
+    few_powers: List,
+    all_powers: List,
+    /// Lanes that are left over.
+    left_over: Vec<usize>,
+    /// Where they wait; made when there is one.
+    rest: Option<Box<Rest>>,
+    smooth: Smooth,
+    ends: Ends,
+    path: Path,
+}
+
+impl Direct {
+    pub(super) fn new(rule: Joints, smooth: Smooth, ends: Ends, path: Path) -> Self {
+        Self {
+            steps: KeySteps::new(path),
+            joints: KeyJoints::new(rule, ends),
+            gentle: GentleLanes::new(),
+            whole: WholeLanes::new(),
+            spans: [0; ROOM],
+            places: [0; ROOM],
+            // Always near enough.
+            few_powers: List::new(f32::INFINITY),
+            all_powers: List::new(TOLERANCE),
+            left_over: Vec::new(),
+            rest: None,
+            smooth,
+            ends,
+            path,
+        }
+    }
+
+    /// Finds the steps between keys; whether it is sure of their signs.
+    pub(super) fn find_steps(&mut self, intervals: &Intervals) -> bool {
+        in_lanes(&mut FindSteps {
+            steps: &mut self.steps,
+            intervals,
+        });
+        !self.steps.are_in_doubt
+    }
+
+    /// -1 where the sign of an interval's second key is turned.
+    pub(super) fn flip(&self, lane: usize) -> f64 {
+        f64::from(self.steps.flips[lane])
+    }
+
+    /// Finds what curves are made of; the signs of the intervals' first keys are known.
+    pub(super) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
+        self.joints.bring(intervals, stretches);
+        if self.gentle.look(&self.steps, stretches) {
+            (self.gentle).prepare(intervals, &self.steps, &self.joints, stretches);
+        }
+        self.whole.wanted.fill(false);
+        for lanes in stretches.iter().map(Stretch::lanes) {
+            let are_gentle = &self.gentle.holds[lanes.clone()];
+            for (wanted, is_gentle) in self.whole.wanted[lanes].iter_mut().zip(are_gentle) {
+                *wanted = !is_gentle;
+            }
+        }
+        in_lanes(&mut FindHandles {
+            lanes: &mut self.whole,
+            steps: &self.steps,
+            joints: &self.joints,
+            intervals,
+        });
+        in_lanes(&mut FindCurves {
+            lanes: &mut self.whole,
+            steps: &self.steps,
+            joints: &self.joints,
+            intervals,
+        });
+    }
+
+    /// Takes the curves in some lanes: each becomes the source of the next span.
+    pub(super) fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>) {
+        let (spans, places) = prepared.new_segments(lanes.len());
+        for (own, span) in self.spans[lanes.clone()].iter_mut().zip(spans) {
+            *own = span as u32;
+        }
+        for (own, place) in self.places[lanes.clone()].iter_mut().zip(places) {
+            *own = place as u32;
+        }
+        let energies = self.whole.energies[lanes.clone()].iter();
+        let are_gentle = self.gentle.holds[lanes.clone()].iter();
+        for (lane, (&energy, &is_gentle)) in lanes.zip(energies.zip(are_gentle)) {
+            let is_whole = energy <= LONGEST_WHOLE as f32;
+            let is_short = energy <= GENTLE as f32;
+            // Which lanes are which cannot be foreseen.
+            self.few_powers.push_if(is_short & !is_gentle, lane);
+            (self.all_powers).push_if(is_whole & !is_short & !is_gentle, lane);
+            if is_gentle {
+                let place = self.places[lane] as usize;
+                self.gentle.write(lane, &mut polynomials(prepared)[place]);
+            } else if !is_whole {
+                self.left_over.push(lane);
+            }
+        }
+    }
+
+    /// Fits the curves that were taken. What is left over waits, here or in `fitting`;
+    /// `is_exact` where the intervals' numbers in f64 are there.
+    pub(super) fn fit(
+        &mut self,
+        prepared: &mut Prepared,
+        intervals: &mut Intervals,
+        stretches: &[Stretch],
+        is_exact: bool,
+        fitting: &mut Fitting,
+    ) {
+        self.fit_whole(prepared);
+        let are_many = MOST_ALONE * self.left_over.len() > intervals.count;
+        if are_many && !is_exact {
+            in_lanes(&mut Steps(intervals));
+            (self.smooth.curves)(intervals, stretches, self.ends);
+        }
+        if are_many || is_exact {
+            for lane in self.left_over.drain(..) {
+                fitting.queue(prepared, intervals, lane, self.spans[lane] as usize);
+            }
+            return;
+        }
+        let mut left_over = &self.left_over[..];
+        for stretch in stretches {
+            let end = stretch.lanes().end;
+            let (own, others) = left_over.split_at(left_over.partition_point(|&lane| lane < end));
+            left_over = others;
+            for run in own.chunk_by(|a, b| a + 1 == *b) {
+                let new = || Box::new(Rest::new(self.path, self.smooth, self.ends));
+                let rest = self.rest.get_or_insert_with(new);
+                if !rest.has_room(run.len()) {
+                    rest.flush(prepared, fitting);
+                }
+                let lanes = run[0]..run[0] + run.len();
+                rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
+            }
+        }
+        self.left_over.clear();
+    }
+
+    /// Has what was left over fitted.
+    pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        if let Some(rest) = &mut self.rest {
+            rest.flush(prepared, fitting);
+        }
+    }
+
+    fn fit_whole(&mut self, prepared: &mut Prepared) {
+        let segments = polynomials(prepared);
+        let (whole, places) = (&self.whole, &self.places);
+        let unfit = &mut self.left_over;
+        (self.few_powers).fit(whole, &GENTLE_NODES, places, segments, unfit);
+        (self.all_powers).fit(whole, &FULL_NODES, places, segments, unfit);
+        self.left_over.sort_unstable();
+    }
+}
+
+/// Intervals that are left over, each between its neighbours.
+struct Rest {
+    intervals: Intervals,
+    stretches: Vec<Stretch>,
+    spans: Vec<u32>,
+    smooth: Smooth,
+    ends: Ends,
+}
+
+impl Rest {
+    fn new(path: Path, smooth: Smooth, ends: Ends) -> Self {
+        Self {
+            intervals: Intervals::new(path.flips_below(), smooth.shape.own),
+            stretches: Vec::new(),
+            spans: Vec::new(),
+            smooth,
+            ends,
+        }
+    }
+
+    /// Whether there is room for so many that follow one another.
+    fn has_room(&self, count: usize) -> bool {
+        self.intervals.count + count + 2 <= LANES
+    }
+
+    /// Takes some intervals of a stretch, which are to become these spans; there is room.
+    fn push(
+        &mut self,
+        intervals: &Intervals,
+        stretch: &Stretch,
+        lanes: Range<usize>,
+        spans: &[u32],
+    ) {
+        let first = stretch.intervals.start + (lanes.start - stretch.lane);
+        self.stretches.push(Stretch {
+            lane: self.intervals.count + 1,
+            intervals: first..first + lanes.len(),
+            ..stretch.clone()
+        });
+        if stretch.all == 1 {
+            self.intervals.push_nothing();
+            self.intervals.push_from(intervals, lanes);
+            self.intervals.push_nothing();
+        } else {
+            let context = lanes.start - 1..lanes.end + 1;
+            self.intervals.push_from(intervals, context);
+        }
+        self.spans.extend(spans);
+    }
+
+    /// Makes all of them into curves, which then wait for their fit.
+    fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        if self.spans.is_empty() {
+            return;
+        }
+        in_lanes(&mut Steps(&mut self.intervals));
+        (self.smooth.curves)(&mut self.intervals, &self.stretches, self.ends);
+        let lanes = self.stretches.iter().flat_map(Stretch::lanes);
+        for (lane, &span) in lanes.zip(&self.spans) {
+            fitting.queue(prepared, &self.intervals, lane, span as usize);
+        }
+        fitting.bring(prepared, &self.intervals);
+        self.intervals.clear();
+        self.stretches.clear();
+        self.spans.clear();
+    }
+}

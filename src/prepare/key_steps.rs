@@ -1,0 +1,79 @@
+//! Steps between the keys of a block's intervals, in vector lanes of f32: from the
+//! differences of neighbouring keys, which f32 knows as exactly as the keys.
+
+use super::intervals::{Intervals, ROOM};
+use super::turns::{LOG, Row, log, store};
+use crate::cpu::{InLanes, Lanes, Turn, chord_of, step_vector};
+use crate::method::Path;
+
+/// Up to which inner product of two keys f32 does not know which sign is the nearer one.
+const DOUBT: f32 = 1e-3;
+
+/// And from which on two keys may have no path between them.
+const OPPOSITE: f32 = -0.99;
+
+/// The squares of chords between keys that [`LOG`] takes.
+pub(super) const LONGEST_CHORD: f32 = 1.0;
+
+/// Steps between the keys of a block's intervals.
+pub(super) struct KeySteps {
+    may_flip: bool,
+    /// -1 where the sign of an interval's second key is turned.
+    pub(super) flips: Row,
+    /// The squares of the differences of keys.
+    pub(super) chords: Row,
+    /// The steps' logarithms.
+    pub(super) logs: [Row; 3],
+    /// Whether f32 may be wrong about a sign.
+    pub(super) are_in_doubt: bool,
+}
+
+impl KeySteps {
+    pub(super) fn new(path: Path) -> Self {
+        Self {
+            may_flip: path == Path::Shortest,
+            flips: [1.0; ROOM],
+            chords: [0.0; ROOM],
+            logs: [[0.0; ROOM]; 3],
+            are_in_doubt: false,
+        }
+    }
+}
+
+/// Finds the steps.
+pub(super) struct FindSteps<'a> {
+    pub(super) steps: &'a mut KeySteps,
+    pub(super) intervals: &'a Intervals,
+}
+
+impl InLanes for FindSteps<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Intervals { from, to, .. } = self.intervals;
+        let own = &mut *self.steps;
+        let mut are_in_doubt = false;
+        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+            let start = L::load_rotations(&from[lane..]);
+            let [x, y, z, w] = L::load_rotations(&to[lane..]);
+            let dot = start[0] * x + start[1] * y + start[2] * z + start[3] * w;
+            let flip = if own.may_flip {
+                are_in_doubt |= dot.any_within(DOUBT);
+                dot.sign()
+            } else {
+                are_in_doubt |= dot.any_at_most(OPPOSITE);
+                L::all(1.0)
+            };
+            let chord = chord_of(start, [x * flip, y * flip, z * flip, w * flip]);
+            let [x, y, z, w] = chord;
+            let chord_square = x * x + y * y + z * z + w * w;
+            let step = Turn {
+                vector: step_vector(start, chord),
+                fall: chord_square * L::all(-0.5),
+            };
+            flip.store(&mut own.flips[lane..lane + L::COUNT]);
+            chord_square.store(&mut own.chords[lane..lane + L::COUNT]);
+            store(&mut own.logs, lane, log(step, &LOG));
+        }
+        own.are_in_doubt = are_in_doubt;
+    }
+}

@@ -1,0 +1,219 @@
+//! Curves that are fitted whole, in vector lanes of f32 straight from their four keys.
+//!
+//! Steps come from the differences of neighbouring keys, which f32 knows as exactly as the
+//! keys, and rotations are what they are more than none: so that what f32 rounds is small
+//! where the curve turns little. One number is found in f64: the vector between the handles,
+//! in which all of the others' roundings would come together.
+
+use super::fit::LONGEST_WHOLE;
+use super::intervals::{Intervals, ROOM, energy, load};
+use super::key_joints::KeyJoints;
+use super::key_steps::{KeySteps, LONGEST_CHORD};
+use super::turns::{LONG_LOG, Row, load3, log, long_exp, store};
+use crate::branchless::{self, Real as _, dot, product, scaled, short_waves, square, sum};
+use crate::cpu::{InLanes, Lanes, both, minus};
+
+/// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
+/// [`LONGEST_FALL`]; from Chebyshev nodes, within 2e-9.
+const SHORT_LOG: [f64; 4] = [
+    0.333_333_321_232_455,
+    0.133_337_015_627_212,
+    0.056_968_944_955_910,
+    0.027_992_494_198_463,
+];
+
+/// More than 1 - cos(x) of any vector of a curve that is fitted whole.
+const LONGEST_FALL: f32 = 0.105;
+
+/// The squares of half-rotation vectors that a tangent is made of, and of their sum: no
+/// other branch of its logarithm is nearer.
+const LONGEST_PART: f32 = 1.5 * 1.5;
+
+/// Such curves of a block's intervals.
+pub(super) struct WholeLanes {
+    /// The lanes whose curves are asked for.
+    pub(super) wanted: [bool; ROOM],
+    /// Handles at the key that the interval starts with, towards the interval before it
+    /// and towards this one.
+    incoming: [Row; 3],
+    outgoing: [Row; 3],
+    /// How far what they are made of goes; up to 1 where that holds.
+    far: Row,
+    /// The first key in its sign, and the three half-rotation vectors.
+    pub(super) numbers: [[[f32; 4]; ROOM]; 4],
+    /// The sum of the vectors' squares; more where they do not hold, and of the lane behind
+    /// which none is.
+    pub(super) energies: Row,
+}
+
+impl WholeLanes {
+    pub(super) fn new() -> Self {
+        Self {
+            wanted: [false; ROOM],
+            incoming: [[0.0; ROOM]; 3],
+            outgoing: [[0.0; ROOM]; 3],
+            far: [0.0; ROOM],
+            numbers: [[[0.0; 4]; ROOM]; 4],
+            energies: [f32::INFINITY; ROOM],
+        }
+    }
+}
+
+/// Finds the handles of the keys between intervals.
+pub(super) struct FindHandles<'a> {
+    pub(super) lanes: &'a mut WholeLanes,
+    pub(super) steps: &'a KeySteps,
+    pub(super) joints: &'a KeyJoints,
+    pub(super) intervals: &'a Intervals,
+}
+
+impl InLanes for FindHandles<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (steps, joints) = (self.steps, self.joints);
+        let own = &mut *self.lanes;
+        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+            let key = lane + 1;
+            if !own.wanted[lane..key + L::COUNT].contains(&true) {
+                continue;
+            }
+            let before = L::load(&joints.before[key..]);
+            let after = L::load(&joints.after[key..]);
+            let to_end = L::load(&joints.outgoing[key..]);
+            let left = scaled(load3::<L>(&steps.logs, lane), before);
+            let right = scaled(load3::<L>(&steps.logs, key), after);
+            let turn = both(long_exp(left), long_exp(right));
+            let tangent = log(turn, &LONG_LOG);
+            let to_start = L::all(THIRD) - to_end;
+            store(&mut own.incoming, key, scaled(tangent, to_start));
+            store(&mut own.outgoing, key, scaled(tangent, to_end));
+            // 4/3 of 2, which is what is not known.
+            let kind = L::load(&joints.kinds[key..]) * L::all(2.0 / 3.0);
+            let parts = square(left).larger(square(right).larger(square(sum(left, right))));
+            let far = parts * L::all(1.0 / LONGEST_PART);
+            let far = far.larger(kind).larger(-turn.fall);
+            far.store(&mut own.far[key..key + L::COUNT]);
+        }
+    }
+}
+
+const THIRD: f32 = 1.0 / 3.0;
+const TWO_THIRDS: f32 = 2.0 / 3.0;
+
+/// Finds the curves between handles.
+pub(super) struct FindCurves<'a> {
+    pub(super) lanes: &'a mut WholeLanes,
+    pub(super) steps: &'a KeySteps,
+    pub(super) joints: &'a KeyJoints,
+    pub(super) intervals: &'a Intervals,
+}
+
+impl InLanes for FindCurves<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (steps, kinds, intervals) = (self.steps, &self.joints.kinds, self.intervals);
+        let whole = &mut *self.lanes;
+        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+            let (own, next) = (lane + 1, lane + 2);
+            if !whole.wanted[own..own + L::COUNT].contains(&true) {
+                continue;
+            }
+            let log = load3::<L>(&steps.logs, own);
+            let outgoing = load3::<L>(&whole.outgoing, own);
+            let incoming = load3::<L>(&whole.incoming, next);
+            // The handles of ends are 0 so far.
+            let parabola = scaled(log, L::all(TWO_THIRDS));
+            let at_first = at_end(L::load(&kinds[own..]));
+            let at_last = at_end(L::load(&kinds[next..]));
+            let w1 = sum(outgoing, scaled(minus(parabola, incoming), at_first));
+            let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
+            let start = L::load_rotations(&intervals.from[own..]);
+            let end = L::load_rotations(&intervals.to[own..]);
+            let flip = L::load(&steps.flips[own..]);
+            let (w2, fall) = between::<L>(w1, [start, end], flip, w3);
+            let chord = L::load(&steps.chords[own..]);
+            let before = L::load(&steps.chords[lane..]);
+            let after = L::load(&steps.chords[next..]);
+            let chords = before.larger(chord.larger(after)) * L::all(1.0 / LONGEST_CHORD);
+            let far = L::load(&whole.far[own..]).larger(L::load(&whole.far[next..]));
+            let far = far
+                .larger(chords)
+                .larger(fall * L::all(-1.0 / LONGEST_FALL));
+            let limit = L::all(LONGEST_WHOLE as f32);
+            // In this order NaN stays.
+            let energy = (far * limit).larger(energy([w1, w2, w3]));
+            let sign = L::rounded(load::<L>(&intervals.signs, own));
+            let numbers = [
+                [
+                    start[0] * sign,
+                    start[1] * sign,
+                    start[2] * sign,
+                    start[3] * sign,
+                ],
+                [w1[0], w1[1], w1[2], sign],
+                [w2[0], w2[1], w2[2], sign],
+                [w3[0], w3[1], w3[2], sign],
+            ];
+            energy.store(&mut whole.energies[own..own + L::COUNT]);
+            for (i, all) in whole.numbers.iter_mut().enumerate() {
+                L::store_rotations(numbers[i], &mut all[own..own + L::COUNT]);
+            }
+        }
+    }
+}
+
+/// `log(exp(-w₁) q₀⁻¹ q₁ exp(-w₃))`, and its cosine less 1.
+#[inline(always)]
+fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], flip: L, w3: [L; 3]) -> ([L; 3], L) {
+    let all = L::Doubles::all;
+    let (start, end) = (widened(start), widened(end));
+    let [x, y, z, w] = branchless::step(start, end);
+    // Keys are unit to f32: one step of Newton's.
+    let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
+    let scale = scale * flip.widened();
+    let step = [x * scale, y * scale, z * scale, w * scale];
+    let [x, y, z, w] = product(product(back(w1), step), back(w3));
+    let u = all(1.0) - w;
+    let [c0, c1, c2, c3] = SHORT_LOG;
+    let tail = ((all(c3) * u + all(c2)) * u + all(c1)) * u + all(c0);
+    let scale = tail * u + all(1.0);
+    let vector = [
+        L::rounded(x * scale),
+        L::rounded(y * scale),
+        L::rounded(z * scale),
+    ];
+    (vector, L::rounded(-u))
+}
+
+/// The exponential of the vector that leads back.
+#[inline(always)]
+fn back<L: Lanes>([x, y, z]: [L; 3]) -> [L::Doubles; 4] {
+    let vector = [-x.widened(), -y.widened(), -z.widened()];
+    let (sinc, cosine) = short_waves(square(vector));
+    let [x, y, z] = scaled(vector, sinc);
+    [x, y, z, cosine]
+}
+
+#[inline(always)]
+fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
+    [x.widened(), y.widened(), z.widened(), w.widened()]
+}
+
+/// 1 at the end of a track, 0 at an inner key and at what is not known.
+#[inline(always)]
+fn at_end<L: Lanes>(kind: L) -> L {
+    kind * (L::all(2.0) - kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepare::turns::tests::{assert_near, longer};
+
+    /// Catches a wrong digit in a coefficient, and a range that is too short.
+    #[test]
+    fn short_logarithms_hold_for_every_curve_that_is_fitted_whole() {
+        assert_near(&SHORT_LOG, f64::from(LONGEST_FALL), longer, 2e-9);
+        assert!(1.0 - LONGEST_WHOLE.sqrt().cos() < f64::from(LONGEST_FALL));
+    }
+}
