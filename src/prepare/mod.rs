@@ -1,5 +1,6 @@
 //! Keys to segments: the constants that the kernels read, computed once per clip; arcs in
-//! f32 as a kernel could, curves in f64 and rounded once. Independent of frame rate and
+//! f32 as a kernel could, curves in f64 and rounded once, those that turn moderately and know
+//! their four keys mostly in f32. Independent of frame rate and
 //! device, so the CPU and every Vulkan device evaluate the same segments.
 
 mod arc_lanes;
