@@ -87,7 +87,7 @@ impl InLanes for FindHandles<'_> {
             let to_start = L::all(THIRD) - to_end;
             store(&mut own.incoming, key, scaled(tangent, to_start));
             store(&mut own.outgoing, key, scaled(tangent, to_end));
-            // 4/3 of 2, which is what is not known.
+            // What is not known becomes 4/3: too far.
             let kind = L::load(&joints.kinds[key..]) * L::all(2.0 / 3.0);
             let parts = square(left).larger(square(right).larger(square(sum(left, right))));
             let far = parts * L::all(1.0 / LONGEST_PART);
