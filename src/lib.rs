@@ -75,6 +75,7 @@ mod scalar;
 mod schedule;
 mod segment;
 mod skeleton;
+mod span_block;
 pub mod spirv;
 mod stream;
 mod time_runs;

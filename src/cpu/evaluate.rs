@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::lanes::{Lanes, Number};
+use super::lanes::{Lanes, Number as _};
 use crate::segment::shader::TINY_BITS;
 
 /// So few samples are evaluated one by one: a vector would be mostly waste.
@@ -16,8 +16,12 @@ pub(crate) trait Evaluate {
         0.0
     }
 
-    /// The rotation at a parameter of the segment, `x y z w`.
-    fn evaluate<N: Number>(&self, constant: N, parameter: N) -> [N; 4];
+    /// The rotations at as many parameters of the segment: those of the first quarter side by
+    /// side, and so on.
+    fn evaluate<L: Lanes>(&self, constant: L, parameters: L) -> [L; 4];
+
+    /// The rotation at one parameter.
+    fn at(&self, parameter: f32) -> Vec4;
 
     /// Whether [`canonical`] would change no component of any sample. Each is a sum `m + r`
     /// with the segment's middle `m`. Where |m| >= 2^-40, either |r| < |m|/2, and the sum is
@@ -58,7 +62,7 @@ pub(super) fn are_exact(first: i32, count: usize) -> bool {
 pub(super) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
-    first: i32,
+    first: f32,
     count: usize,
     output: &mut [[f32; 4]],
 ) {
@@ -75,11 +79,10 @@ pub(super) fn frames<L: Lanes, S: Evaluate>(
 fn frames_alike<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
-    first: i32,
+    first: f32,
     count: usize,
     output: &mut [[f32; 4]],
 ) {
-    let first = first as f32;
     if count <= FEW {
         for (j, rotation) in output[..count].iter_mut().enumerate() {
             *rotation = one(segment, affine, first + j as f32);
@@ -118,13 +121,8 @@ pub(super) fn distances<L: Lanes, S: Evaluate>(
 /// Evaluates the sample at a distance from the middle.
 #[inline(always)]
 pub(super) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
-    let q = segment.evaluate(segment.constant(), distance * affine.scale + affine.offset);
-    [
-        canonical(q[0]),
-        canonical(q[1]),
-        canonical(q[2]),
-        canonical(q[3]),
-    ]
+    let rotation = segment.at(distance * affine.scale + affine.offset);
+    rotation.canonical().to_array()
 }
 
 /// The distances from the middle of a run's samples, a vector at a time.
@@ -208,17 +206,17 @@ fn vector<L: Lanes, S: Evaluate, const FILTER: bool>(
     parameter: L,
     rotations: &mut [[f32; 4]],
 ) {
-    let mut q = segment.evaluate(constant, parameter);
+    let mut quarters = segment.evaluate(constant, parameter);
     if FILTER {
         // Written out: `lanes::canonical` here costs SSE2 half as much again.
-        q = [
-            q[0].canonical(),
-            q[1].canonical(),
-            q[2].canonical(),
-            q[3].canonical(),
+        quarters = [
+            quarters[0].canonical(),
+            quarters[1].canonical(),
+            quarters[2].canonical(),
+            quarters[3].canonical(),
         ];
     }
-    L::store_rotations(q, rotations);
+    rotations.copy_from_slice(L::joined(quarters).as_ref());
 }
 
 /// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.
@@ -255,7 +253,7 @@ mod tests {
         let mut changed = 0;
         for _ in 0..32 {
             let parameter = (random.f32() - 0.5) * 2.0f32.powi(-random.i32(0..30));
-            let q = segment.evaluate(segment.constant(), parameter);
+            let q = segment.at(parameter).to_array();
             let differs = |c: &f32| canonical(*c).to_bits() != c.to_bits();
             changed += q.iter().filter(|c| differs(c)).count();
         }
@@ -299,10 +297,10 @@ mod tests {
         };
         let at_limit = nearly_zero(COARSE);
         assert!(at_limit.is_canonical());
-        assert_eq!(at_limit.evaluate(0.0, 0.5), [-(2.0f32.powi(-63)); 4]);
+        assert_eq!(at_limit.at(0.5), Vec4::splat(-(2.0f32.powi(-63))));
         let below = nearly_zero(COARSE * 0.125);
         assert!(!below.is_canonical());
-        assert_eq!(below.evaluate(0.0, 0.5), [-(2.0f32.powi(-66)); 4]);
+        assert_eq!(below.at(0.5), Vec4::splat(-(2.0f32.powi(-66))));
         assert_eq!(canonical(-(2.0f32.powi(-66))).to_bits(), 0);
     }
 

@@ -1,7 +1,9 @@
 //! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
 
+use glam::Vec4;
+
 use super::evaluate::{COARSE, Evaluate, is_coarse};
-use super::lanes::Number;
+use super::lanes::{Lanes, Number};
 use super::sine_cosine::short_sine_and_fall;
 use crate::segment::ArcSegment;
 
@@ -12,13 +14,26 @@ impl Evaluate for ArcSegment {
     }
 
     #[inline(always)]
-    fn evaluate<N: Number>(&self, square: N, parameter: N) -> [N; 4] {
-        let [mx, my, mz, mw] = self.middle;
-        let [tx, ty, tz, tw] = self.tangent;
+    fn evaluate<L: Lanes>(&self, square: L, parameter: L) -> [L; 4] {
+        let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
+        let z = parameter * parameter * square;
+        let (sine, fall) = short_sine_and_fall(parameter, z);
+        let (s, f) = (sine.fourfold(), fall.fourfold());
         // Written out: closures are not always inlined.
-        let middle = [N::all(mx), N::all(my), N::all(mz), N::all(mw)];
-        let tangent = [N::all(tx), N::all(ty), N::all(tz), N::all(tw)];
-        on_arc(middle, tangent, square, parameter)
+        [
+            turned(middle, tangent, s[0], f[0]),
+            turned(middle, tangent, s[1], f[1]),
+            turned(middle, tangent, s[2], f[2]),
+            turned(middle, tangent, s[3], f[3]),
+        ]
+    }
+
+    #[inline(always)]
+    fn at(&self, parameter: f32) -> Vec4 {
+        let z = parameter * parameter * self.constant();
+        let (sine, fall) = short_sine_and_fall(parameter, z);
+        let (sine, fall) = (Vec4::splat(sine), Vec4::splat(fall));
+        turned(self.middle.into(), self.tangent.into(), sine, fall)
     }
 
     #[inline(always)]
@@ -47,11 +62,16 @@ pub(super) fn on_arc<N: Number>(
     let z = parameter * parameter * square;
     let (sine, fall) = short_sine_and_fall(parameter, z);
     [
-        middle[0] + (middle[0] * fall + tangent[0] * sine),
-        middle[1] + (middle[1] * fall + tangent[1] * sine),
-        middle[2] + (middle[2] * fall + tangent[2] * sine),
-        middle[3] + (middle[3] * fall + tangent[3] * sine),
+        turned(middle[0], tangent[0], sine, fall),
+        turned(middle[1], tangent[1], sine, fall),
+        turned(middle[2], tangent[2], sine, fall),
+        turned(middle[3], tangent[3], sine, fall),
     ]
+}
+
+#[inline(always)]
+fn turned<N: Number>(middle: N, tangent: N, sine: N, fall: N) -> N {
+    middle + (middle * fall + tangent * sine)
 }
 
 #[inline(always)]

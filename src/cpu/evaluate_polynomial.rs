@@ -1,24 +1,33 @@
 //! Twin of `shaders/evaluate_polynomial.wgsl`: the same names, the same order.
 
+use glam::Vec4;
+
 use super::evaluate::{COARSE, Evaluate, is_coarse};
-use super::lanes::Number;
+use super::lanes::{Lanes, Number};
 use crate::segment::PolynomialSegment;
 
 impl Evaluate for PolynomialSegment {
     #[inline(always)]
-    fn evaluate<N: Number>(&self, _: N, s: N) -> [N; 4] {
+    fn evaluate<L: Lanes>(&self, _: L, s: L) -> [L; 4] {
         // Written out: closures are not always inlined.
         macro_rules! component {
             ($c:literal, $($power:literal)+) => {
-                component([$(N::all(self.coefficients[$power][$c])),+], s)
+                polynomial([$(L::all(self.coefficients[$power][$c])),+], s)
             };
         }
-        [
+        // A component at a time: with all four in a vector, coefficients need fewer
+        // registers, but more than there are.
+        L::transposed([
             component!(0, 0 1 2 3 4 5 6 7 8 9 10),
             component!(1, 0 1 2 3 4 5 6 7 8 9 10),
             component!(2, 0 1 2 3 4 5 6 7 8 9 10),
             component!(3, 0 1 2 3 4 5 6 7 8 9 10),
-        ]
+        ])
+    }
+
+    #[inline(always)]
+    fn at(&self, s: f32) -> Vec4 {
+        polynomial(self.coefficients.map(Vec4::from_array), Vec4::splat(s))
     }
 
     #[inline(always)]
@@ -40,9 +49,9 @@ impl PolynomialSegment {
     }
 }
 
-/// One component of a rotation, by the coefficients of 1, s, s², … s¹⁰.
+/// By the coefficients of 1, s, s², … s¹⁰.
 #[inline(always)]
-pub(super) fn component<N: Number>(c: [N; 11], s: N) -> N {
+pub(super) fn polynomial<N: Number>(c: [N; 11], s: N) -> N {
     let z = s * s;
     let zz = z * z;
     let even_low = c[4] * z + c[2];

@@ -2,7 +2,7 @@
 
 use std::ops::Neg;
 
-use glam::{Mat4, Vec4};
+use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
 use super::dispatch::Four;
 use crate::branchless::{Arithmetic, Real};
@@ -70,8 +70,25 @@ pub(crate) trait Lanes: Number {
     /// The inner products of [`Lanes::COUNT`] pairs of rotations.
     fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self;
 
+    /// A rotation again and again, `x y z w x y z w …`.
+    fn repeated(rotation: [f32; 4]) -> Self;
+
+    /// Each number four times over, for the components of its sample's rotation: those of
+    /// the first quarter of the samples, and so on.
+    fn fourfold(self) -> [Self; 4];
+
+    /// From `x y z w`, the rotations of the first quarter of the samples side by side, and so
+    /// on.
+    fn transposed(components: [Self; 4]) -> [Self; 4];
+
+    /// The rotations of all samples, from those of each quarter side by side.
+    fn joined(quarters: [Self; 4]) -> Self::Rotations;
+
     /// Puts `x y z w` together.
-    fn rotations(components: [Self; 4]) -> Self::Rotations;
+    #[inline(always)]
+    fn rotations(components: [Self; 4]) -> Self::Rotations {
+        Self::joined(Self::transposed(components))
+    }
 
     /// The same, to [`Lanes::COUNT`] places.
     #[inline(always)]
@@ -179,8 +196,23 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn rotations([x, y, z, w]: [Self; 4]) -> Self::Rotations {
-        Mat4::from_cols(x, y, z, w).transpose().to_cols_array_2d()
+    fn repeated(rotation: [f32; 4]) -> Self {
+        Self::from_array(rotation)
+    }
+
+    #[inline(always)]
+    fn fourfold(self) -> [Self; 4] {
+        [self.xxxx(), self.yyyy(), self.zzzz(), self.wwww()]
+    }
+
+    #[inline(always)]
+    fn transposed([x, y, z, w]: [Self; 4]) -> [Self; 4] {
+        rows(Mat4::from_cols(x, y, z, w))
+    }
+
+    #[inline(always)]
+    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
+        [a.to_array(), b.to_array(), c.to_array(), d.to_array()]
     }
 
     #[inline(always)]

@@ -2,14 +2,17 @@
 //! one function for each vector width, so that nothing is called for a run.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
 use super::lanes::Lanes;
-use crate::clock::{FramesError, Timeline};
+use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
+use crate::frame_clock::FrameClock;
 use crate::numeric::round_f32;
-use crate::prepare::PartRef;
-use crate::schedule::{Distance, Emit, Run, RunSource};
+use crate::prepare::{NONE, PartRef, Source};
+use crate::schedule::{Distance, Emit, Run, RunSource, runs_after, runs_before};
+use crate::span_block::{SpanBlock, SpanBlocks};
 
 /// Samples whose distances are found out together.
 const CHUNK: usize = 64;
@@ -18,41 +21,115 @@ const CHUNK: usize = 64;
 /// starts with the first of them.
 #[inline(always)]
 pub(super) fn row<L: Lanes, S: Evaluate>(
-    PartRef { prepared, part }: PartRef<'_>,
+    part: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
     cycle: &Cycle,
     output: &mut [[f32; 4]],
 ) -> Result<(), FramesError> {
     let first = cycle.samples.start;
-    if cycle.samples.len() <= FEW {
-        let mut row = ShortRow {
-            part: PartRef { prepared, part },
+    let is_short = cycle.samples.len() <= FEW;
+    if let Ticks::Frames { rate, start } = &timeline.ticks
+        && cycle.is_own()
+        && !is_short
+    {
+        let clock = FrameClock::new(*rate, *start, part.part.end);
+        let samples = cycle.samples.clone();
+        if spans::<L, S>(part, segments, timeline, clock, &samples, output) {
+            let mut outside = OneByOne {
+                part,
+                segments,
+                timeline,
+                first,
+                output,
+            };
+            let PartRef { prepared, part } = part;
+            runs_before(prepared, part, clock, &samples, &mut outside);
+            runs_after(part, clock, &samples, &mut outside);
+            return Ok(());
+        }
+    }
+    if is_short {
+        let mut row = OneByOne {
+            part,
             segments,
             timeline,
             first,
             output,
         };
-        return prepared.runs(part, timeline, cycle, &mut row);
+        return part.prepared.runs(part.part, timeline, cycle, &mut row);
     }
     let mut row = Row::<L, S> {
-        part: PartRef { prepared, part },
+        part,
         segments,
         timeline,
         first,
         output,
         lanes: PhantomData,
     };
-    if cycle.is_own() {
-        return prepared.own_runs(part, timeline, cycle.samples.clone(), &mut row);
-    }
-    // What finds a copy's runs is compiled once, not for each width.
+    // What finds them is compiled once, not for each width.
     let mut runs = Vec::new();
-    prepared.runs(part, timeline, cycle, &mut |run| runs.push(run))?;
+    (part.prepared).runs(part.part, timeline, cycle, &mut |run| runs.push(run))?;
     for run in runs {
         row.run(run);
     }
     Ok(())
+}
+
+/// The samples between a track's keys, where frames are its own: without a list of runs.
+/// Whether all are near enough for that.
+#[inline(always)]
+fn spans<L: Lanes, S: Evaluate>(
+    PartRef { prepared, part }: PartRef<'_>,
+    segments: &[S],
+    timeline: &Timeline,
+    clock: FrameClock,
+    samples: &Range<usize>,
+    output: &mut [[f32; 4]],
+) -> bool {
+    let mut spans = SpanBlocks::new(prepared, part, clock, samples.clone());
+    let mut block = SpanBlock::new();
+    while let Some(own) = spans.fill(&mut block) {
+        if !block.are_near {
+            return false;
+        }
+        let sources = &prepared.spans.sources[own.clone()];
+        let keys = &prepared.spans.keys[own];
+        for (j, (&source, &key)) in sources.iter().zip(keys).enumerate() {
+            let (first, last) = (block.first[j], block.first[j + 1]);
+            if first >= last {
+                continue;
+            }
+            let mut output = &mut output[first - samples.start..];
+            let (mut count, mut distance) = (last - first, block.distance[j]);
+            if key != NONE && block.is_held[j] == 1 {
+                output[0] = prepared.constants[key as usize];
+                output = &mut output[1..];
+                count -= 1;
+                distance += 1.0;
+            }
+            match source {
+                Source::Segment(index) => {
+                    let affine = Affine {
+                        scale: block.scale[j],
+                        offset: block.offset[j],
+                    };
+                    let segment = &segments[index as usize];
+                    frames::<L, S>(segment, affine, distance, count, output);
+                }
+                Source::Constant(index) => {
+                    output[..count].fill(prepared.constants[index as usize]);
+                }
+                Source::Exact(index) => {
+                    let (parameter, track) = (block.parameter(j), part.track as usize);
+                    for (sample, rotation) in (last - count..last).zip(output) {
+                        *rotation = prepared.exact(index, parameter, timeline, track, sample);
+                    }
+                }
+            }
+        }
+    }
+    true
 }
 
 struct Row<'a, L, S> {
@@ -65,7 +142,7 @@ struct Row<'a, L, S> {
     lanes: PhantomData<L>,
 }
 
-impl<L: Lanes, S: Evaluate> Emit for Row<'_, L, S> {
+impl<L: Lanes, S: Evaluate> Row<'_, L, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let prepared = self.part.prepared;
@@ -85,7 +162,7 @@ impl<L: Lanes, S: Evaluate> Emit for Row<'_, L, S> {
                 if let Distance::Frames { first } = distance
                     && are_exact(first, run.count)
                 {
-                    frames::<L, S>(segment, affine, first, run.count, output);
+                    frames::<L, S>(segment, affine, first as f32, run.count, output);
                     return;
                 }
                 let mut from_middle = [0.0; CHUNK];
@@ -124,8 +201,8 @@ impl PartRef<'_> {
     }
 }
 
-/// A few samples, one by one: nothing is prepared for many.
-struct ShortRow<'a, S> {
+/// Samples one by one, where they are few: nothing is prepared for many.
+struct OneByOne<'a, S> {
     part: PartRef<'a>,
     segments: &'a [S],
     timeline: &'a Timeline,
@@ -134,29 +211,31 @@ struct ShortRow<'a, S> {
     output: &'a mut [[f32; 4]],
 }
 
-impl<S: Evaluate> Emit for ShortRow<'_, S> {
+impl<S: Evaluate> Emit for OneByOne<'_, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let prepared = self.part.prepared;
         let output = &mut self.output[run.sample - self.first..][..run.count];
-        for (j, rotation) in output.iter_mut().enumerate() {
-            *rotation = match run.source {
-                RunSource::Constant(index) => prepared.constants[index as usize],
-                RunSource::Segment {
-                    index,
-                    distance,
-                    scale,
-                    offset,
-                } => {
+        match run.source {
+            RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
+            RunSource::Segment {
+                index,
+                distance,
+                scale,
+                offset,
+            } => {
+                let segment = &self.segments[index as usize];
+                for (j, rotation) in output.iter_mut().enumerate() {
                     let distance = self.part.distance(distance, self.timeline, &run, j);
-                    let segment = &self.segments[index as usize];
-                    one(segment, Affine { scale, offset }, distance)
+                    *rotation = one(segment, Affine { scale, offset }, distance);
                 }
-                RunSource::Exact { index, parameter } => {
-                    let track = self.part.part.track as usize;
-                    prepared.exact(index, parameter, self.timeline, track, run.sample + j)
+            }
+            RunSource::Exact { index, parameter } => {
+                let track = self.part.part.track as usize;
+                for (sample, rotation) in (run.sample..).zip(output) {
+                    *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
                 }
-            };
+            }
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::dispatch::InLanes;
 use super::evaluate::canonical;
 use super::evaluate_arc::{on_arc, square};
-use super::evaluate_polynomial::component;
+use super::evaluate_polynomial::polynomial;
 use super::lanes::{self, Lanes, Number};
 use crate::method::Form;
 use crate::prepare::{ARC_LANES, any_turns, arc_anyhow, arc_component, arc_in_lanes, arcs, whole};
@@ -89,7 +89,7 @@ impl SampleBlock {
             let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
             for j in 0..LANES {
                 let own = arc_component(middle[j], tangent[j], squares[j]);
-                lanes[j] = canonical(component(own, self.parameters[j]));
+                lanes[j] = canonical(polynomial(own, self.parameters[j]));
             }
         }
         self.keep(&found);

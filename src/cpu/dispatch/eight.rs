@@ -5,10 +5,10 @@ use std::arch::x86_64::{
     _mm256_and_ps, _mm256_blendv_pd, _mm256_blendv_ps, _mm256_castps_pd, _mm256_castps256_ps128,
     _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd,
     _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
-    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set_m128,
-    _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_sqrt_pd,
-    _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd,
-    _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
+    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
+    _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
+    _mm256_sqrt_pd, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
+    _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
 
 use super::doubles::doubles;
@@ -57,26 +57,6 @@ impl Eight {
             bytemuck::cast(second),
             bytemuck::cast(first)
         )))
-    }
-
-    /// Four by four within each half.
-    #[inline(always)]
-    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        // Written out: closures are not always inlined.
-        let rows = avx2! {
-            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
-            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
-            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
-            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
-            [
-                _mm256_unpacklo_pd(ab_low, cd_low),
-                _mm256_unpackhi_pd(ab_low, cd_low),
-                _mm256_unpacklo_pd(ab_high, cd_high),
-                _mm256_unpackhi_pd(ab_high, cd_high),
-            ]
-        };
-        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
-        [Self(e), Self(f), Self(g), Self(h)]
     }
 }
 
@@ -189,8 +169,44 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn rotations(components: [Self; 4]) -> Self::Rotations {
-        let [a, b, c, d] = Self::transposed(components);
+    fn repeated(rotation: [f32; 4]) -> Self {
+        Self::of_two(rotation, rotation)
+    }
+
+    #[inline(always)]
+    fn fourfold(self) -> [Self; 4] {
+        // Lanes are in the order for it.
+        avx2! {
+            [
+                Self(_mm256_permute_ps::<0b00_00_00_00>(self.0)),
+                Self(_mm256_permute_ps::<0b01_01_01_01>(self.0)),
+                Self(_mm256_permute_ps::<0b10_10_10_10>(self.0)),
+                Self(_mm256_permute_ps::<0b11_11_11_11>(self.0)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        // Written out: closures are not always inlined.
+        let rows = avx2! {
+            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
+            [
+                _mm256_unpacklo_pd(ab_low, cd_low),
+                _mm256_unpackhi_pd(ab_low, cd_low),
+                _mm256_unpacklo_pd(ab_high, cd_high),
+                _mm256_unpackhi_pd(ab_high, cd_high),
+            ]
+        };
+        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
+        [Self(e), Self(f), Self(g), Self(h)]
+    }
+
+    #[inline(always)]
+    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 

@@ -2,14 +2,14 @@
 
 use std::arch::x86_64::{
     __m256, __m512, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_set_m128, _mm512_abs_ps,
-    _mm512_add_pd, _mm512_add_ps, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps256_ps512,
-    _mm512_castps512_ps256, _mm512_cmp_pd_mask, _mm512_cmp_ps_mask, _mm512_cvtpd_ps,
-    _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
+    _mm512_add_pd, _mm512_add_ps, _mm512_broadcast_f32x4, _mm512_castpd_ps, _mm512_castps_pd,
+    _mm512_castps256_ps512, _mm512_castps512_ps256, _mm512_cmp_pd_mask, _mm512_cmp_ps_mask,
+    _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
     _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
-    _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_pd,
-    _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_sqrt_pd, _mm512_sub_pd,
-    _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
-    _mm512_xor_pd, _mm512_xor_ps,
+    _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
+    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_sqrt_pd,
+    _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
+    _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
 };
 
 use super::Eight;
@@ -74,24 +74,6 @@ impl Sixteen {
             let high = _mm256_set_m128(bytemuck::cast(d), bytemuck::cast(c));
             joined(low, high)
         })
-    }
-
-    /// Four by four within each quarter.
-    #[inline(always)]
-    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        // Written out: closures are not always inlined.
-        avx512! {
-            let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
-            let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
-            let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
-            let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
-            [
-                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low))),
-                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low))),
-                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high))),
-                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
-            ]
-        }
     }
 }
 
@@ -199,8 +181,42 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn rotations(components: [Self; 4]) -> Self::Rotations {
-        let [a, b, c, d] = Self::transposed(components);
+    fn repeated(rotation: [f32; 4]) -> Self {
+        Self(avx512!(_mm512_broadcast_f32x4(bytemuck::cast(rotation))))
+    }
+
+    #[inline(always)]
+    fn fourfold(self) -> [Self; 4] {
+        // Lanes are in the order for it.
+        avx512! {
+            [
+                Self(_mm512_permute_ps::<0b00_00_00_00>(self.0)),
+                Self(_mm512_permute_ps::<0b01_01_01_01>(self.0)),
+                Self(_mm512_permute_ps::<0b10_10_10_10>(self.0)),
+                Self(_mm512_permute_ps::<0b11_11_11_11>(self.0)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        // Written out: closures are not always inlined.
+        avx512! {
+            let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
+            [
+                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low))),
+                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low))),
+                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high))),
+                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 
