@@ -31,7 +31,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     curves: Curves::Smooth(
         Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
             .steady_alone()
-            .gentle(Joints::ByTime),
+            .direct::<Rule>(Joints::ByTime),
     ),
 };
 

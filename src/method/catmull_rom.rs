@@ -31,7 +31,7 @@ pub const CATMULL_ROM: Method = Method {
     curves: Curves::Smooth(
         Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
             .steady_alone()
-            .gentle(Joints::Alike),
+            .direct::<Rule>(Joints::Alike),
     ),
 };
 

@@ -60,7 +60,7 @@ impl Interpolation {
         let suits = self.path == Path::Shortest
             && self.quantity == Quantity::Rotation
             && self.speed == Speed::AsKeyed;
-        smooth.gentle.filter(|_| suits)
+        smooth.direct.filter(|_| suits).map(|direct| direct.joints)
     }
 
     /// Whether arcs too are curves with a formula: for what follows from derivatives.

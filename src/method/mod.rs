@@ -45,7 +45,7 @@ use std::str::FromStr;
 
 use crate::branchless::Vector;
 use crate::joints::Joints;
-use crate::prepare::{Intervals, Shape, Stretch};
+use crate::prepare::{HandleRule, Handles, Interval, Intervals, Shape, Stretch};
 use crate::reference;
 use crate::tracks::Track;
 
@@ -135,8 +135,17 @@ pub(crate) struct Smooth {
     pub(crate) given: Given,
     /// Two keys that are alone are joined at constant velocity, whatever the ends.
     pub(crate) steady_alone: bool,
-    /// How curves that turn little follow from keys alone, in f32.
-    pub(crate) gentle: Option<Joints>,
+    /// How curves follow from keys alone, in f32.
+    pub(crate) direct: Option<FromKeys>,
+}
+
+/// How curves follow from keys alone.
+#[derive(Clone, Copy)]
+pub(crate) struct FromKeys {
+    /// What tangents are made of, in f32.
+    pub(crate) joints: Joints,
+    /// The handles of a key between two intervals, in f64, whatever they are.
+    pub(crate) handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
 }
 
 /// What a method knows of an interval beside its two keys.
@@ -157,13 +166,16 @@ impl Smooth {
             curves,
             given: Given::Nothing,
             steady_alone: false,
-            gentle: None,
+            direct: None,
         }
     }
 
-    const fn gentle(self, joints: Joints) -> Self {
+    const fn direct<R: HandleRule>(self, joints: Joints) -> Self {
         Self {
-            gentle: Some(joints),
+            direct: Some(FromKeys {
+                joints,
+                handles: R::handles_anywhere,
+            }),
             ..self
         }
     }

@@ -9,6 +9,9 @@ use super::shape::Shape;
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
+/// See [`Part`].
+const NONE: usize = usize::MAX;
+
 /// Cuts curves; what it needs for that is kept.
 pub(super) struct Cutter {
     shape: &'static Shape,
@@ -26,7 +29,7 @@ pub(super) struct Cutter {
 pub(super) struct Part {
     /// The span that the curve is of.
     pub(super) span: usize,
-    /// Its place among the curves given.
+    /// Its place among the curves given; [`NONE`] where only its segments were.
     curve: usize,
     pub(super) piece: Piece,
     /// Its place among the segments, given when it is fitted; nothing where even the finest
@@ -71,6 +74,17 @@ impl Cutter {
         let whole = self.part(span, &curve, Some(segment));
         self.waiting.extend(whole.halves());
         self.curves.push(curve);
+    }
+
+    /// Adds the segments of a curve that is cut already.
+    pub(super) fn push_halves(&mut self, span: usize, segments: [usize; 2]) {
+        let halves = Piece::WHOLE.halves().into_iter().zip(segments);
+        self.parts.extend(halves.map(|(piece, segment)| Part {
+            span,
+            curve: NONE,
+            piece,
+            segment: Some(segment),
+        }));
     }
 
     /// Adds the curve of a span, to be cut where it does not fit whole.

@@ -1,5 +1,6 @@
 //! Smooth curves straight from keys, in f32: those that turn little as a series, others by
-//! a fit of the whole. What is left over waits for a block of its own, in f64.
+//! a fit of the whole or of its halves. What is left over waits for a block of its own, in
+//! f64.
 
 use std::ops::Range;
 
@@ -7,16 +8,15 @@ use super::Prepared;
 use super::fit::{GENTLE, LONGEST_WHOLE, TOLERANCE};
 use super::fitting::{Fitting, polynomials};
 use super::gentle_lanes::GentleLanes;
+use super::halves::Halves;
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
 use super::key_joints::KeyJoints;
 use super::key_steps::{FindSteps, KeySteps};
-use super::nodes::{FULL_NODES, GENTLE_NODES};
-use super::passes::Steps;
-use super::whole_fit::List;
-use super::whole_lanes::{FindCurves, FindHandles, WholeLanes};
+use super::passes::{Handles, Interval, Steps};
+use super::whole_fit::{GENTLE_WHOLE, List, WHOLE};
+use super::whole_lanes::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
 use crate::cpu::in_lanes;
-use crate::joints::Joints;
-use crate::method::{Ends, Path, Smooth};
+use crate::method::{Ends, FromKeys, Path, Smooth};
 
 /// Where more than one interval of so many is left over, all of a block is worked out in
 /// f64: alone each would bring two neighbours.
@@ -34,20 +34,26 @@ pub(super) struct Direct {
     /// Lanes to fit, with few powers and with all.
     few_powers: List,
     all_powers: List,
+    /// Lanes that are too long for that, or do not fit.
+    long: Vec<usize>,
+    /// Where they wait; made when there is one.
+    halves: Option<Box<Halves>>,
     /// Lanes that are left over.
     left_over: Vec<usize>,
     /// Where they wait; made when there is one.
     rest: Option<Box<Rest>>,
+    /// See [`FromKeys`].
+    handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
     smooth: Smooth,
     ends: Ends,
     path: Path,
 }
 
 impl Direct {
-    pub(super) fn new(rule: Joints, smooth: Smooth, ends: Ends, path: Path) -> Self {
+    pub(super) fn new(how: FromKeys, smooth: Smooth, ends: Ends, path: Path) -> Self {
         Self {
             steps: KeySteps::new(path),
-            joints: KeyJoints::new(rule, ends),
+            joints: KeyJoints::new(how.joints, ends),
             gentle: GentleLanes::new(),
             whole: WholeLanes::new(),
             spans: [0; ROOM],
@@ -55,8 +61,11 @@ impl Direct {
             // Always near enough.
             few_powers: List::new(f32::INFINITY),
             all_powers: List::new(TOLERANCE),
+            long: Vec::new(),
+            halves: None,
             left_over: Vec::new(),
             rest: None,
+            handles: how.handles,
             smooth,
             ends,
             path,
@@ -95,6 +104,7 @@ impl Direct {
             steps: &self.steps,
             joints: &self.joints,
             intervals,
+            handles: self.handles,
         });
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
@@ -125,7 +135,13 @@ impl Direct {
                 let place = self.places[lane] as usize;
                 self.gentle.write(lane, &mut polynomials(prepared)[place]);
             } else if !is_whole {
-                self.left_over.push(lane);
+                let holds = energy <= LONGEST_DIRECT as f32;
+                let longer = if holds {
+                    &mut self.long
+                } else {
+                    &mut self.left_over
+                };
+                longer.push(lane);
             }
         }
     }
@@ -141,6 +157,7 @@ impl Direct {
         fitting: &mut Fitting,
     ) {
         self.fit_whole(prepared);
+        self.cut(prepared, intervals, fitting);
         let are_many = MOST_ALONE * self.left_over.len() > intervals.count;
         if are_many && !is_exact {
             in_lanes(&mut Steps(intervals));
@@ -172,6 +189,9 @@ impl Direct {
 
     /// Has what was left over fitted.
     pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        if let Some(halves) = &mut self.halves {
+            halves.flush(prepared, fitting);
+        }
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }
@@ -179,11 +199,25 @@ impl Direct {
 
     fn fit_whole(&mut self, prepared: &mut Prepared) {
         let segments = polynomials(prepared);
-        let (whole, places) = (&self.whole, &self.places);
-        let unfit = &mut self.left_over;
-        (self.few_powers).fit(whole, &GENTLE_NODES, places, segments, unfit);
-        (self.all_powers).fit(whole, &FULL_NODES, places, segments, unfit);
-        self.left_over.sort_unstable();
+        let (whole, places) = (&self.whole.numbers, &self.places);
+        let unfit = &mut self.long;
+        (self.few_powers).fit(&GENTLE_WHOLE, whole, places, segments, unfit);
+        (self.all_powers).fit(&WHOLE, whole, places, segments, unfit);
+        self.few_powers.clear();
+        self.all_powers.clear();
+    }
+
+    /// Has the longer curves cut.
+    fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
+        for lane in self.long.drain(..) {
+            let shape = self.smooth.shape;
+            let halves = (self.halves).get_or_insert_with(|| Box::new(Halves::new(shape)));
+            let (span, place) = (self.spans[lane], self.places[lane]);
+            let duration = intervals.durations[lane];
+            if halves.push(&self.whole.numbers, lane, duration, span, place) {
+                halves.flush(prepared, fitting);
+            }
+        }
     }
 }
 

@@ -135,6 +135,16 @@ impl Fitting {
         source
     }
 
+    /// Takes the segments of a span's curve, which is cut in two.
+    pub(super) fn take_halves(&mut self, span: usize, segments: [usize; 2]) {
+        self.cutter.push_halves(span, segments);
+    }
+
+    /// Takes the curve of a span that has its segment, and cuts it.
+    pub(super) fn take_long(&mut self, span: usize, curve: Curve, segment: usize) {
+        self.cutter.push(span, curve, segment);
+    }
+
     /// Takes any curve.
     pub(super) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
         self.cutter.push_whole(prepared.spans.sources.len(), curve);

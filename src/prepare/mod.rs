@@ -12,6 +12,7 @@ mod direct;
 mod fit;
 mod fitting;
 mod gentle_lanes;
+mod halves;
 mod intervals;
 mod key_joints;
 mod key_steps;

@@ -53,9 +53,9 @@ impl SmoothPreparation {
         let path = interpolation.method.path.unwrap_or(interpolation.path);
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
-        let rule = smooth.gentle.filter(|_| suits);
+        let direct = smooth.direct.filter(|_| suits);
         Self {
-            direct: rule.map(|rule| Box::new(Direct::new(rule, smooth, interpolation.ends, path))),
+            direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends, path))),
             interpolation: Interpolation {
                 path,
                 ..*interpolation

@@ -1,7 +1,7 @@
 //! Exponentials and logarithms of f32, and rows of such numbers.
 
 use super::intervals::ROOM;
-use crate::branchless::{scaled, square, sum};
+use crate::branchless::{Real as _, scaled, short_waves, square, sum};
 use crate::cpu::{Lanes, Number, Turn, short_sine_and_fall, sine_and_fall};
 
 /// Numbers of the lanes, in f32.
@@ -50,6 +50,25 @@ pub(super) fn long_exp<N: Number>(v: [N; 3]) -> Turn<N> {
     }
 }
 
+/// The exponential of so many times a vector, in f64; of squares up to 1/2 within 3e-9.
+#[inline(always)]
+pub(super) fn exact_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
+    let times = L::Doubles::all(f64::from(times));
+    let vector = [
+        x.widened() * times,
+        y.widened() * times,
+        z.widened() * times,
+    ];
+    let (sinc, cosine) = short_waves(square(vector));
+    let [x, y, z] = scaled(vector, sinc);
+    [x, y, z, cosine]
+}
+
+#[inline(always)]
+pub(super) fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
+    [x.widened(), y.widened(), z.widened(), w.widened()]
+}
+
 /// The logarithm, by coefficients that hold so far.
 #[inline(always)]
 pub(super) fn log<N: Number, const COUNT: usize>(
@@ -85,6 +104,7 @@ pub(super) fn store<L: Lanes>([x, y, z]: &mut [Row; 3], lane: usize, own: [L; 3]
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::prepare::whole_lanes::LONGEST_DIRECT;
 
     /// `x / sin(x)` by 1 - cos(x).
     pub(in crate::prepare) fn longer(u: f64) -> f64 {
@@ -104,6 +124,18 @@ pub(super) mod tests {
             let tail = coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
             let error = (tail * x + 1.0 - exact(x)).abs();
             assert!(error <= bound, "{coefficients:?} at {x}: {error}");
+        }
+    }
+
+    /// Catches vectors longer than those that the series hold for.
+    #[test]
+    fn short_waves_hold_for_every_curve_straight_from_keys() {
+        for i in 0..=1000 {
+            let square = LONGEST_DIRECT * f64::from(i) / 1000.0;
+            let angle = libm::sqrt(square);
+            let (sinc, cosine) = short_waves(square);
+            assert!((sinc * angle - libm::sin(angle)).abs() < 3e-9, "{angle}");
+            assert!((cosine - libm::cos(angle)).abs() < 3e-9, "{angle}");
         }
     }
 

@@ -1,15 +1,15 @@
 //! Curves from their first key and three half-rotation vectors, in vector lanes of f32: fits
-//! of the whole.
+//! of the whole, or of its halves.
 
 use bytemuck::Zeroable as _;
 
 use super::fit::{MOST, Samples, interpolate};
-use super::intervals::{LANES, ROOM};
-use super::nodes::Nodes;
+use super::intervals::{LANES, ROOM, rounded};
+use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::{SineAndFall, Terms};
-use super::turns::exp;
-use super::whole_lanes::WholeLanes;
-use crate::branchless::{product, scaled, square};
+use super::turns::{exact_exp, exp, widened};
+use super::whole_lanes::CurveNumbers;
+use crate::branchless::{normalised, product, scaled, square};
 use crate::cpu::{InLanes, Lanes, both, brought_behind, in_lanes};
 use crate::segment::PolynomialSegment;
 
@@ -40,29 +40,35 @@ impl List {
         self.count += usize::from(is_wanted);
     }
 
-    /// Fits the curves to the segments at their lanes' places, and forgets them; those that
-    /// do not fit are `unfit`.
+    /// The lanes.
+    pub(super) fn lanes(&self) -> &[u32] {
+        &self.lanes[..self.count]
+    }
+
+    /// Forgets them.
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Fits a part of the curves to the segments at their lanes' places; those that do not
+    /// fit are `unfit`.
     pub(super) fn fit<const PAIRS: usize>(
-        &mut self,
-        curves: &WholeLanes,
-        nodes: &'static Nodes<PAIRS>,
+        &self,
+        part: &Part<PAIRS>,
+        curves: &CurveNumbers,
         places: &[u32; ROOM],
         segments: &mut Vec<PolynomialSegment>,
         unfit: &mut Vec<usize>,
     ) {
-        let count = std::mem::take(&mut self.count);
-        if count == 0 {
+        if self.count == 0 {
             return;
         }
         // For the last vector's lanes that have no curve.
         segments.push(PolynomialSegment::zeroed());
-        in_lanes(&mut FitWhole {
-            tolerance: self.tolerance,
-            count,
-            lanes: &self.lanes,
+        in_lanes(&mut Fit {
+            list: self,
+            part,
             curves,
-            nodes,
-            gains: gains(nodes),
             places,
             segments,
             unfit,
@@ -71,100 +77,179 @@ impl List {
     }
 }
 
-struct FitWhole<'a, const PAIRS: usize> {
-    tolerance: f32,
-    count: usize,
-    lanes: &'a [u32; ROOM_FOR],
-    curves: &'a WholeLanes,
+/// A part of curves' parameter, and the nodes at which they are sampled there.
+pub(super) struct Part<const PAIRS: usize> {
     nodes: &'static Nodes<PAIRS>,
-    gains: [[f32; 3]; PAIRS],
+    /// The basis functions at its middle.
+    weights: [f32; 3],
+    /// What they gain from there on, up to `-s` and to `s` at each node `s`.
+    gains: [[[f32; 3]; 2]; PAIRS],
+    /// Of all, or of a half: there the second gains as much after the middle as before.
+    is_whole: bool,
+}
+
+pub(super) const GENTLE_WHOLE: Part<3> = Part::new(&GENTLE_NODES, 0.5, 1.0);
+pub(super) const WHOLE: Part<5> = Part::new(&FULL_NODES, 0.5, 1.0);
+pub(super) const HALVES: [Part<5>; 2] = [
+    Part::new(&FULL_NODES, 0.25, 0.5),
+    Part::new(&FULL_NODES, 0.75, 0.5),
+];
+
+impl<const PAIRS: usize> Part<PAIRS> {
+    const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
+        let (m, n) = (middle, 1.0 - middle);
+        let mut part = Self {
+            nodes,
+            weights: [
+                (1.0 - n * n * n) as f32,
+                ((3.0 - 2.0 * m) * m * m) as f32,
+                (m * m * m) as f32,
+            ],
+            gains: [[[0.0; 3]; 2]; PAIRS],
+            is_whole: width == 1.0,
+        };
+        let mut k = 0;
+        while k < PAIRS {
+            let s = nodes.at[k] as f64 * width;
+            part.gains[k] = [gains(m, -s), gains(m, s)];
+            k += 1;
+        }
+        part
+    }
+}
+
+/// What the basis functions have at `m + d` more than at `m`.
+const fn gains(m: f64, d: f64) -> [f32; 3] {
+    let n = 1.0 - m;
+    [
+        (((d - 3.0 * n) * d + 3.0 * n * n) * d) as f32,
+        (((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d) as f32,
+        (((d + 3.0 * m) * d + 3.0 * m * m) * d) as f32,
+    ]
+}
+
+struct Fit<'a, const PAIRS: usize> {
+    list: &'a List,
+    part: &'a Part<PAIRS>,
+    curves: &'a CurveNumbers,
     places: &'a [u32; ROOM],
     segments: &'a mut [PolynomialSegment],
     unfit: &'a mut Vec<usize>,
 }
 
-impl<const PAIRS: usize> InLanes for FitWhole<'_, PAIRS> {
+impl<const PAIRS: usize> InLanes for Fit<'_, PAIRS> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        for i in (0..self.count).step_by(L::COUNT) {
-            let lanes = &self.lanes[i..i + L::COUNT];
-            let own = &lanes[..L::COUNT.min(self.count - i)];
-            let [starts, firsts, seconds, thirds] = &self.curves.numbers;
+        if self.part.is_whole {
+            self.fit::<L, true>();
+        } else {
+            self.fit::<L, false>();
+        }
+    }
+}
+
+impl<const PAIRS: usize> Fit<'_, PAIRS> {
+    #[inline(always)]
+    fn fit<L: Lanes, const IS_WHOLE: bool>(&mut self) {
+        let &List {
+            tolerance,
+            count,
+            ref lanes,
+        } = self.list;
+        for i in (0..count).step_by(L::COUNT) {
+            let lanes = &lanes[i..i + L::COUNT];
+            let own = &lanes[..L::COUNT.min(count - i)];
+            let [starts, firsts, seconds, thirds] = self.curves;
             let start = L::gather_rotations(starts, lanes);
             let [x1, y1, z1, _] = L::gather_rotations(firsts, lanes);
             let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
             let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
             let vectors = [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]];
-            let samples = samples(start, vectors, &self.gains);
+            let samples = samples::<L, PAIRS, IS_WHOLE>(start, vectors, self.part);
             let mut places = [self.segments.len() - 1; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
                 *place = self.places[lane as usize] as usize;
             }
-            let tail = interpolate(true, self.nodes, &samples, &places, self.segments);
-            if (-tail).any_at_most(-self.tolerance) {
+            let nodes = self.part.nodes;
+            let tail = interpolate(true, nodes, &samples, &places, self.segments);
+            if (-tail).any_at_most(-tolerance) {
                 let mut tails = [0.0; MOST];
                 tail.store(&mut tails[..L::COUNT]);
                 let tails = own.iter().zip(tails);
-                let unfit = tails.filter(|(_, tail)| *tail > self.tolerance);
+                let unfit = tails.filter(|(_, tail)| *tail > tolerance);
                 self.unfit.extend(unfit.map(|(&lane, _)| lane as usize));
             }
         }
     }
 }
 
-/// What the basis functions gain from the middle on, at each node `s`: the first and the
-/// third `gains[k][0]` and `gains[k][2]` up to `s`, and the other way round, both negative,
-/// up to `-s`; the second `gains[k][1]` and as much.
-fn gains<const PAIRS: usize>(nodes: &Nodes<PAIRS>) -> [[f32; 3]; PAIRS] {
-    nodes.at.map(|s| {
-        let s = f64::from(s);
-        [
-            (((s - 1.5) * s + 0.75) * s) as f32,
-            ((1.5 - 2.0 * s * s) * s) as f32,
-            (((s + 1.5) * s + 0.75) * s) as f32,
-        ]
-    })
-}
-
 /// Samples of curves from that key on, with those half-rotation vectors.
 #[inline(always)]
-fn samples<L: Lanes, const PAIRS: usize>(
+fn samples<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
     start: [L; 4],
     [w1, w2, w3]: [[L; 3]; 3],
-    gains: &[[f32; 3]; PAIRS],
+    part: &Part<PAIRS>,
 ) -> Samples<L, PAIRS> {
-    let third_turn = exp(scaled(w3, L::all(0.125)));
-    let second_turn = both(exp(scaled(w2, L::all(0.5))), third_turn);
-    let turn = both(exp(scaled(w1, L::all(0.875))), second_turn);
-    let [x, y, z] = turn.vector;
-    let [x, y, z, w] = product(start, [x, y, z, turn.fall]);
-    let middle = [x + start[0], y + start[1], z + start[2], w + start[3]];
+    let [b1, b2, b3] = part.weights;
+    let third_turn = exp(scaled(w3, L::all(b3)));
+    let second_turn = both(exp(scaled(w2, L::all(b2))), third_turn);
+    let middle = if IS_WHOLE {
+        let turn = both(exp(scaled(w1, L::all(b1))), second_turn);
+        let [x, y, z] = turn.vector;
+        let [x, y, z, w] = product(start, [x, y, z, turn.fall]);
+        [x + start[0], y + start[1], z + start[2], w + start[3]]
+    } else {
+        exact_middle(start, [w1, w2, w3], part.weights)
+    };
     let v1 = brought_behind(w1, second_turn);
     let v2 = brought_behind(w2, third_turn);
     let terms = Terms::about_middle(middle, [v1, v2, w3]);
-    let (first, second, third) = (square(v1), square(v2), square(w3));
+    let squares = [square(v1), square(v2), square(w3)];
     let mut samples = Samples::all(L::all(0.0));
     samples.middle = middle;
-    for (k, &[less, own, more]) in gains.iter().enumerate() {
-        let after = [
-            turned(less, first),
-            turned(own, second),
-            turned(more, third),
-        ];
-        let before = [
-            turned(-more, first),
-            (-after[1].0, after[1].1),
-            turned(-less, third),
-        ];
+    for (k, [before, after]) in part.gains.iter().enumerate() {
+        let after = turns(after, squares);
+        let before = if IS_WHOLE {
+            [
+                turned(before[0], squares[0]),
+                (-after[1].0, after[1].1),
+                turned(before[2], squares[2]),
+            ]
+        } else {
+            turns(before, squares)
+        };
         samples.set_differences(k, terms.differences([before, after]));
     }
     samples
 }
 
+/// Where the turns are longer, f32 would round more than that.
+#[inline(always)]
+fn exact_middle<L: Lanes>(
+    start: [L; 4],
+    [w1, w2, w3]: [[L; 3]; 3],
+    [b1, b2, b3]: [f32; 3],
+) -> [L; 4] {
+    let turn = product(exact_exp(w1, b1), exact_exp(w2, b2));
+    rounded::<L>(product(
+        normalised(widened(start)),
+        product(turn, exact_exp(w3, b3)),
+    ))
+}
+
+#[inline(always)]
+fn turns<L: Lanes>(gains: &[f32; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
+    [
+        turned(gains[0], squares[0]),
+        turned(gains[1], squares[1]),
+        turned(gains[2], squares[2]),
+    ]
+}
+
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
-/// up to 0.1536; from Chebyshev nodes, within 1e-9.
-const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_296_5, -0.000_197_778_78];
-const FALL: [f32; 3] = [-0.5, 0.041_666_34, -0.001_383_185_6];
+/// up to 0.201; from Chebyshev nodes, within 3e-9.
+const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
+const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
 /// Of a vector with that square, times `gain`.
 #[inline(always)]
@@ -180,23 +265,28 @@ fn turned<L: Lanes>(gain: f32, square: L) -> SineAndFall<L> {
 mod tests {
     use super::*;
     use crate::prepare::fit::LONGEST_WHOLE;
-    use crate::prepare::nodes::FULL_NODES;
     use crate::prepare::turns::tests::assert_near;
+    use crate::prepare::whole_lanes::LONGEST_DIRECT;
 
     /// Catches a wrong digit in a coefficient, and a range that is too short.
     #[test]
-    fn waves_hold_for_every_curve_that_is_fitted_whole() {
+    fn waves_hold_for_every_curve_that_is_fitted() {
         let sinc = |z: f64| libm::sin(libm::sqrt(z)) / libm::sqrt(z);
-        assert_near(&SINC.map(f64::from), LARGEST, sinc, 1e-9);
+        assert_near(&SINC.map(f64::from), LARGEST, sinc, 3e-9);
         let cosine = |z: f64| libm::cos(libm::sqrt(z));
-        assert_near(&FALL.map(f64::from), LARGEST, cosine, 1e-9);
-        let gains = gains(&FULL_NODES);
-        let most = gains
-            .as_flattened()
-            .iter()
-            .fold(0.0f32, |most, gain| most.max(*gain));
-        assert!(f64::from(most * most) * LONGEST_WHOLE < LARGEST);
+        assert_near(&FALL.map(f64::from), LARGEST, cosine, 3e-9);
+        let [first, second] = &HALVES;
+        for (parts, longest) in [
+            (&[&WHOLE][..], LONGEST_WHOLE),
+            (&[first, second], LONGEST_DIRECT),
+        ] {
+            let gains = parts.iter().flat_map(|part| part.gains.as_flattened());
+            let most = gains
+                .flatten()
+                .fold(0.0f32, |most, gain| most.max(gain.abs()));
+            assert!(f64::from(most * most) * longest < LARGEST);
+        }
     }
 
-    const LARGEST: f64 = 0.1536;
+    const LARGEST: f64 = 0.201;
 }

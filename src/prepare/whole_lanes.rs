@@ -5,29 +5,35 @@
 //! where the curve turns little. One number is found in f64: the vector between the handles,
 //! in which all of the others' roundings would come together.
 
-use super::fit::LONGEST_WHOLE;
 use super::intervals::{Intervals, ROOM, energy, load};
 use super::key_joints::KeyJoints;
 use super::key_steps::{KeySteps, LONGEST_CHORD};
-use super::turns::{LONG_LOG, Row, load3, log, long_exp, store};
-use crate::branchless::{self, Real as _, dot, product, scaled, short_waves, square, sum};
+use super::passes::{Handles, Interval};
+use super::turns::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
+use crate::branchless::{self, Real as _, dot, product, scaled, square, sum};
 use crate::cpu::{InLanes, Lanes, both, minus};
+use crate::segment::shader::INNER;
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
 /// [`LONGEST_FALL`]; from Chebyshev nodes, within 2e-9.
-const SHORT_LOG: [f64; 4] = [
-    0.333_333_321_232_455,
-    0.133_337_015_627_212,
-    0.056_968_944_955_910,
-    0.027_992_494_198_463,
+const SHORT_LOG: [f64; 6] = [
+    0.333_333_332_315_378,
+    0.133_333_589_115_425,
+    0.057_132_524_286_921,
+    0.025_547_899_904_161,
+    0.010_563_679_073_003,
+    0.008_133_985_785_528,
 ];
 
-/// More than 1 - cos(x) of any vector of a curve that is fitted whole.
-const LONGEST_FALL: f32 = 0.105;
+/// More than 1 - cos(x) of any vector of such a curve.
+const LONGEST_FALL: f32 = 0.286;
 
 /// The squares of half-rotation vectors that a tangent is made of, and of their sum: no
 /// other branch of its logarithm is nearer.
 const LONGEST_PART: f32 = 1.5 * 1.5;
+
+/// The first key of each curve in its sign, and its three half-rotation vectors.
+pub(super) type CurveNumbers = [[[f32; 4]; ROOM]; 4];
 
 /// Such curves of a block's intervals.
 pub(super) struct WholeLanes {
@@ -39,10 +45,9 @@ pub(super) struct WholeLanes {
     outgoing: [Row; 3],
     /// How far what they are made of goes; up to 1 where that holds.
     far: Row,
-    /// The first key in its sign, and the three half-rotation vectors.
-    pub(super) numbers: [[[f32; 4]; ROOM]; 4],
-    /// The sum of the vectors' squares; more where they do not hold, and of the lane behind
-    /// which none is.
+    pub(super) numbers: CurveNumbers,
+    /// The sum of the vectors' squares; far more where they do not hold, and of the lane
+    /// behind which none is.
     pub(super) energies: Row,
 }
 
@@ -65,14 +70,16 @@ pub(super) struct FindHandles<'a> {
     pub(super) steps: &'a KeySteps,
     pub(super) joints: &'a KeyJoints,
     pub(super) intervals: &'a Intervals,
+    /// Those of a key that f32 does not find.
+    pub(super) handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
 }
 
 impl InLanes for FindHandles<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let (steps, joints) = (self.steps, self.joints);
+        let (steps, joints, intervals) = (self.steps, self.joints, self.intervals);
         let own = &mut *self.lanes;
-        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let key = lane + 1;
             if !own.wanted[lane..key + L::COUNT].contains(&true) {
                 continue;
@@ -93,9 +100,36 @@ impl InLanes for FindHandles<'_> {
             let far = parts * L::all(1.0 / LONGEST_PART);
             let far = far.larger(kind).larger(-turn.fall);
             far.store(&mut own.far[key..key + L::COUNT]);
+            if (-far).any_at_most(-1.0) {
+                for key in key..key + L::COUNT {
+                    if own.far[key] >= 1.0 && joints.kinds[key] == INNER {
+                        let before = steps.interval(intervals, key - 1);
+                        let after = steps.interval(intervals, key);
+                        own.set_handles(key, (self.handles)(before, after));
+                    }
+                }
+            }
         }
     }
 }
+
+impl WholeLanes {
+    /// Sets the handles of a key.
+    #[inline(never)]
+    fn set_handles(&mut self, key: usize, handles: Handles<f64>) {
+        for c in 0..3 {
+            self.incoming[c][key] = handles.incoming[c] as f32;
+            self.outgoing[c][key] = handles.outgoing[c] as f32;
+        }
+        self.far[key] = 0.0;
+    }
+}
+
+/// The numbers of curves whose vectors' squares come to more than this do not hold.
+pub(super) const LONGEST_DIRECT: f64 = 0.5;
+
+/// More than that.
+const IN_DOUBT: f32 = 1.0;
 
 const THIRD: f32 = 1.0 / 3.0;
 const TWO_THIRDS: f32 = 2.0 / 3.0;
@@ -139,9 +173,9 @@ impl InLanes for FindCurves<'_> {
             let far = far
                 .larger(chords)
                 .larger(fall * L::all(-1.0 / LONGEST_FALL));
-            let limit = L::all(LONGEST_WHOLE as f32);
-            // In this order NaN stays.
-            let energy = (far * limit).larger(energy([w1, w2, w3]));
+            // Nothing where all holds. A sign of NaN is 1.
+            let doubt = ((far - L::all(1.0)).sign() + L::all(1.0)) * L::all(IN_DOUBT);
+            let energy = energy([w1, w2, w3]) + doubt;
             let sign = L::rounded(load::<L>(&intervals.signs, own));
             let numbers = [
                 [
@@ -172,10 +206,12 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], flip: L, w3: [L; 3])
     let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
     let scale = scale * flip.widened();
     let step = [x * scale, y * scale, z * scale, w * scale];
-    let [x, y, z, w] = product(product(back(w1), step), back(w3));
+    let [x, y, z, w] = product(product(exact_exp(w1, -1.0), step), exact_exp(w3, -1.0));
     let u = all(1.0) - w;
-    let [c0, c1, c2, c3] = SHORT_LOG;
-    let tail = ((all(c3) * u + all(c2)) * u + all(c1)) * u + all(c0);
+    let [c0, c1, c2, c3, c4, c5] = SHORT_LOG;
+    let uu = u * u;
+    let (low, middle) = (all(c1) * u + all(c0), all(c3) * u + all(c2));
+    let tail = ((all(c5) * u + all(c4)) * uu + middle) * uu + low;
     let scale = tail * u + all(1.0);
     let vector = [
         L::rounded(x * scale),
@@ -183,20 +219,6 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], flip: L, w3: [L; 3])
         L::rounded(z * scale),
     ];
     (vector, L::rounded(-u))
-}
-
-/// The exponential of the vector that leads back.
-#[inline(always)]
-fn back<L: Lanes>([x, y, z]: [L; 3]) -> [L::Doubles; 4] {
-    let vector = [-x.widened(), -y.widened(), -z.widened()];
-    let (sinc, cosine) = short_waves(square(vector));
-    let [x, y, z] = scaled(vector, sinc);
-    [x, y, z, cosine]
-}
-
-#[inline(always)]
-fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
-    [x.widened(), y.widened(), z.widened(), w.widened()]
 }
 
 /// 1 at the end of a track, 0 at an inner key and at what is not known.
@@ -212,8 +234,8 @@ mod tests {
 
     /// Catches a wrong digit in a coefficient, and a range that is too short.
     #[test]
-    fn short_logarithms_hold_for_every_curve_that_is_fitted_whole() {
+    fn short_logarithms_hold_for_every_curve_that_is_fitted() {
         assert_near(&SHORT_LOG, f64::from(LONGEST_FALL), longer, 2e-9);
-        assert!(1.0 - LONGEST_WHOLE.sqrt().cos() < f64::from(LONGEST_FALL));
+        assert!(1.0 - LONGEST_DIRECT.sqrt().cos() < f64::from(LONGEST_FALL));
     }
 }

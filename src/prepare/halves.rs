@@ -1,0 +1,149 @@
+//! Curves straight from keys that are fitted in halves: they wait until a block is full.
+
+use std::array;
+
+use bytemuck::Zeroable as _;
+
+use super::Prepared;
+use super::curve::{Curve, Piece};
+use super::fit::TOLERANCE;
+use super::fitting::{Fitting, polynomials};
+use super::intervals::{LANES, ROOM};
+use super::shape::Shape;
+use super::whole_fit::{HALVES, List};
+use super::whole_lanes::CurveNumbers;
+use crate::branchless::ratio;
+use crate::method::Quantity;
+use crate::segment::PolynomialSegment;
+
+/// Such curves.
+pub(super) struct Halves {
+    shape: &'static Shape,
+    numbers: CurveNumbers,
+    durations: [f64; LANES],
+    /// The spans that they become, and the segments of their halves.
+    spans: [usize; LANES],
+    places: [[u32; ROOM]; 2],
+    waiting: List,
+    /// Those that do not fit.
+    unfit: Vec<usize>,
+}
+
+impl Halves {
+    pub(super) fn new(shape: &'static Shape) -> Self {
+        Self {
+            shape,
+            numbers: [[[0.0; 4]; ROOM]; 4],
+            durations: [1.0; LANES],
+            spans: [0; LANES],
+            places: [[0; ROOM]; 2],
+            waiting: List::new(TOLERANCE),
+            unfit: Vec::new(),
+        }
+    }
+
+    /// Takes the curve in a lane, which is to become the span that has this segment; whether
+    /// the block is full.
+    pub(super) fn push(
+        &mut self,
+        numbers: &CurveNumbers,
+        lane: usize,
+        duration: f64,
+        span: u32,
+        place: u32,
+    ) -> bool {
+        let own = self.waiting.lanes().len();
+        for (waiting, numbers) in self.numbers.iter_mut().zip(numbers) {
+            waiting[own] = numbers[lane];
+        }
+        self.durations[own] = duration;
+        self.spans[own] = span as usize;
+        self.places[0][own] = place;
+        self.waiting.push_if(true, own);
+        own + 1 == LANES
+    }
+
+    /// Fits them; those that do not fit are cut further.
+    pub(super) fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        let count = self.waiting.lanes().len();
+        let segments = polynomials(prepared);
+        for place in &mut self.places[1][..count] {
+            *place = segments.len() as u32;
+            segments.push(PolynomialSegment::zeroed());
+        }
+        for (half, places) in HALVES.iter().zip(&self.places) {
+            (self.waiting).fit(half, &self.numbers, places, segments, &mut self.unfit);
+        }
+        self.waiting.clear();
+        for lane in 0..count {
+            let span = self.spans[lane];
+            let [first, second] = [0, 1].map(|half| self.places[half][lane] as usize);
+            if self.unfit.contains(&lane) {
+                fitting.take_long(span, self.curve(lane), first);
+            } else {
+                fitting.take_halves(span, [first, second]);
+            }
+        }
+        self.unfit.clear();
+    }
+
+    /// The curve in f64: from the first key on, with the half-rotation vectors that f32 has.
+    fn curve(&self, lane: usize) -> Curve {
+        let [start, vectors @ ..] = &self.numbers;
+        let [first, second, third] = vectors.each_ref().map(|vectors| vectors[lane]);
+        let own = array::from_fn(|i| match i {
+            0..4 => start[lane][i],
+            4..7 => first[i - 4],
+            7..10 => second[i - 7],
+            _ => third[i - 10],
+        });
+        let own: [f32; 13] = own;
+        Curve {
+            shape: self.shape,
+            numbers: self.shape.with(|i| f64::from(own[i])),
+            piece: Piece::WHOLE,
+            quantity: Quantity::Rotation,
+            rate: ratio(1.0, self.durations[lane]),
+            pace: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+
+    /// Catches numbers in another order, or of another lane: few curves come this way.
+    #[test]
+    fn what_does_not_fit_is_the_same_curve_in_f64() {
+        let random = &mut Rng::with_seed(1);
+        let mut number = || random.f32() - 0.5;
+        let mut halves = Halves::new(Shape::BERNSTEIN);
+        let [x, y, z, w] = [0.1, -0.7, 0.5, 0.5f32];
+        let key = DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
+        for lane in 0..3 {
+            let mut numbers: CurveNumbers = [[[0.0; 4]; ROOM]; 4];
+            numbers[0][7] = [x, y, z, w];
+            for vectors in &mut numbers[1..] {
+                vectors[7] = [number(), number(), number(), 1.0];
+            }
+            halves.push(&numbers, 7, 2.0, 0, 0);
+            let curve = halves.curve(lane);
+            for t in [0.0, 0.3, 1.0] {
+                let u: f64 = 1.0 - t;
+                let basis = [1.0 - u * u * u, (3.0 - 2.0 * t) * t * t, t * t * t];
+                let mut expected = key;
+                for (vectors, weight) in numbers[1..].iter().zip(basis) {
+                    let [x, y, z, _] = vectors[7].map(f64::from);
+                    expected *= DQuat::from_scaled_axis(DVec3::new(x, y, z) * 2.0 * weight);
+                }
+                let found = DQuat::from_array(curve.value(t));
+                assert!((found - expected).length() < 1e-12, "{found} {expected}");
+            }
+            assert_eq!(curve.rate, 0.5);
+        }
+    }
+}
