@@ -201,7 +201,7 @@ impl PartRef<'_> {
     }
 }
 
-/// Samples one by one, where they are few: nothing is prepared for many.
+/// Samples one by one, where they are few, or outside the keys: nothing is prepared for many.
 struct OneByOne<'a, S> {
     part: PartRef<'a>,
     segments: &'a [S],

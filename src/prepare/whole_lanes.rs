@@ -1,4 +1,5 @@
-//! Curves that are fitted whole, in vector lanes of f32 straight from their four keys.
+//! Curves that are fitted whole or by halves, in vector lanes of f32 straight from their four
+//! keys.
 //!
 //! Steps come from the differences of neighbouring keys, which f32 knows as exactly as the
 //! keys, and rotations are what they are more than none: so that what f32 rounds is small
