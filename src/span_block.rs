@@ -57,13 +57,13 @@ impl SpanBlock {
 pub(crate) struct SpanBlocks<'a, C> {
     clock: C,
     starts: &'a [f64],
-    /// Where the last one ends.
+    /// Where the last span ends.
     end: f64,
     /// The samples asked for.
     samples: Range<usize>,
-    /// The first of them.
+    /// The first span's place among all.
     first_span: usize,
-    /// How many are done.
+    /// How many spans are done.
     done: usize,
 }
 
