@@ -132,6 +132,32 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     }
 }
 
+/// Long results may be written to memory in another way than short ones. Catches what such
+/// stores leave out or put elsewhere.
+#[test]
+fn long_results_have_the_bits_of_short_ones() {
+    let set = hostile_set(7, 1800);
+    let frames = Frames::fps(60).between(-1.0, 20.0);
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+        for width in VectorWidth::available() {
+            let engine = engine(&Device::Cpu, |options| options.vector_width = Some(width));
+            let long = engine.evaluate(&set, method, &frames).unwrap();
+            let samples = long.samples();
+            assert!(16 * long.as_quats().len() > 33 << 20, "{samples} each");
+            let kept = engine.upload(&set, method).unwrap();
+            let kept = kept.evaluate(&frames).unwrap();
+            let what = format!("{method}, {width:?}, kept");
+            assert_same_bits(long.as_quats(), kept.as_quats(), &what);
+            for (i, found) in long.as_quats().chunks(10 * samples).enumerate() {
+                let few = set.select(10 * i..(10 * i + 10).min(set.track_count()));
+                let short = engine.evaluate(&few, method, &frames).unwrap();
+                let what = format!("{method}, {width:?}, from track {}", 10 * i);
+                assert_same_bits(short.as_quats(), found, &what);
+            }
+        }
+    }
+}
+
 #[test]
 fn layouts_are_transposes_of_each_other() {
     let set = hostile_set(9, 40);
@@ -348,20 +374,27 @@ fn engines_clips_and_results_are_send_and_sync() {
     check::<tumble::Error>();
 }
 
-/// The CPU at every width and every Vulkan device give these bits from keys.
-fn assert_everywhere(
-    expected: &Rotations,
-    set: &TrackSet,
-    interpolation: Interpolation,
-    frames: &Frames,
-) {
+/// The CPU at every width, and every Vulkan device. Opening them takes longer than most of what
+/// is asked of them.
+fn everywhere() -> Vec<Engine> {
     let widths = VectorWidth::available().into_iter().map(|width| {
         let mut options = EngineOptions::default();
         options.vector_width = Some(width);
         Engine::with_options(Device::Cpu, &options)
     });
-    for engine in widths.chain(vulkan_devices().into_iter().map(Engine::new)) {
-        let engine = engine.unwrap();
+    let all = widths.chain(vulkan_devices().into_iter().map(Engine::new));
+    all.collect::<Result<_, _>>().unwrap()
+}
+
+/// All of them give these bits from keys.
+fn assert_everywhere(
+    engines: &[Engine],
+    expected: &Rotations,
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+) {
+    for engine in engines {
         let found = engine.evaluate(set, interpolation, frames).unwrap();
         let what = format!("{interpolation:?}, {frames:?}, {}", engine.device_name());
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
@@ -411,6 +444,7 @@ fn few_samples_of_many_keys_have_the_same_bits() {
         Frames::at(set.track(8).times.iter().copied().step_by(9).collect()),
         Frames::at_each(of_each),
     ];
+    let engines = everywhere();
     let paths = [Path::Shortest, Path::AsAuthored];
     for (method, path) in METHODS
         .into_iter()
@@ -424,7 +458,7 @@ fn few_samples_of_many_keys_have_the_same_bits() {
             let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
-            assert_everywhere(&expected, &set, interpolation, frames);
+            assert_everywhere(&engines, &expected, &set, interpolation, frames);
         }
     }
 }
@@ -488,6 +522,7 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
         start: spin,
         end: -spin,
     };
+    let engines = everywhere();
     for method in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER] {
         for ends in [
             Ends::Parabolic,
@@ -505,7 +540,7 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
             for frames in &requests {
                 let expected = clip.evaluate(frames).unwrap();
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
-                assert_everywhere(&expected, &set, interpolation, frames);
+                assert_everywhere(&engines, &expected, &set, interpolation, frames);
             }
         }
     }
@@ -583,6 +618,8 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
 #[test]
 fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
     let mut random = Random(83);
+    let engines = everywhere();
+    let small = vulkan_engines(|options| options.memory = Some(1 << 20));
     for (count, step) in [(90_000, 0.06), (20_000, 0.14)] {
         let (_, keys) = near_keys(&mut random, count, 0.0, step);
         let uneven = |i: usize| 3.0 + 0.01 * (i as f64 + random.between(0.0, 0.9));
@@ -598,8 +635,8 @@ fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
             ] {
                 let expected = clip.evaluate(&frames).unwrap();
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
-                assert_everywhere(&expected, &set, method.into(), &frames);
-                for engine in vulkan_engines(|options| options.memory = Some(1 << 20)) {
+                assert_everywhere(&engines, &expected, &set, method.into(), &frames);
+                for engine in &small {
                     let found = engine.evaluate(&set, method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
                 }
@@ -623,6 +660,9 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     set.push("", &times, &keys).unwrap();
     let slerp = method::SLERP;
     let clip = cpu().upload(&set, slerp).unwrap();
+    let memory = [None, Some(1 << 20)].into_iter();
+    let of_memory = |memory| vulkan_engines(|options| options.memory = memory);
+    let engines: Vec<Engine> = memory.flat_map(of_memory).collect();
     for frames in [
         Frames::fps(7),
         Frames::fps(15).between(100.0, 900.0),
@@ -635,11 +675,9 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
         // A device with little memory gets the track in stretches, and those with many
         // samples in pieces.
-        for memory in [None, Some(1 << 20)] {
-            for engine in vulkan_engines(|options| options.memory = memory) {
-                let found = engine.evaluate(&set, slerp, &frames).unwrap();
-                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
-            }
+        for engine in &engines {
+            let found = engine.evaluate(&set, slerp, &frames).unwrap();
+            assert_same_bits(expected.as_quats(), found.as_quats(), &what);
         }
     }
 }
@@ -667,6 +705,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
         Frames::fps(2).between(start - 3.0, end + 3.0),
         Frames::fps(24).between(start + 50.0, start + 300.0),
     ];
+    let small = vulkan_engines(|options| options.memory = Some(2 << 20));
     for (method, ends) in METHODS.into_iter().zip(ENDS.into_iter().cycle()) {
         let interpolation = Interpolation {
             ends,
@@ -678,7 +717,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             // A device that has not the memory for the whole track.
-            for engine in vulkan_engines(|options| options.memory = Some(2 << 20)) {
+            for engine in &small {
                 let found = engine.evaluate(&set, interpolation, frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -742,6 +781,7 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
         set.push("", &[0.0, 1e6, 2e6, 3e6], &keys).unwrap();
     }
     let limit = (3e7 - 16_777_216.0) / 60.0; // of the first segment
+    let vulkan = vulkan_engines(|_| {});
     for start in [10.0, limit - 3.0, 1e6 - limit - 3.0, 5e5] {
         let frames = Frames::fps(60).between(start, start + 6.0);
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
@@ -751,7 +791,7 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
                 let found = narrow.evaluate(&set, method, &frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), "a width");
             }
-            for vulkan in vulkan_engines(|_| {}) {
+            for vulkan in &vulkan {
                 let found = vulkan.evaluate(&set, method, &frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -792,6 +832,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
         Frames::rate("1/1000".parse().unwrap()),
         Frames::fps(1).between(0.0, 0.0),
     ];
+    let engines = everywhere();
     for (method, path) in METHODS
         .into_iter()
         .flat_map(|method| [Path::Shortest, Path::AsAuthored].map(|path| (method, path)))
@@ -805,7 +846,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
             let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
-            assert_everywhere(&expected, &set, interpolation, frames);
+            assert_everywhere(&engines, &expected, &set, interpolation, frames);
             // At half a turn exactly either way round is as short.
             for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
                 let curve = Curve::of(&interpolation, set.track(track));

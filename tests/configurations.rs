@@ -84,7 +84,8 @@ fn swiftshader_gives_the_same_bits() {
     );
 }
 
-/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise.
+/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise: which canary
+/// finds that first depends on the processor.
 #[test]
 fn a_driver_that_is_not_exact_is_named_and_refused() {
     if !is_there(LAVAPIPE) {
@@ -92,11 +93,7 @@ fn a_driver_that_is_not_exact_is_named_and_refused() {
     }
     let run = verify(LAVAPIPE, &[("GALLIUM_NOSSE", "1")]);
     assert_eq!(run.code, 6, "{}", run.words);
-    for word in [
-        "llvmpipe",
-        "is not exact: canary `contraction`",
-        "--allow-inexact",
-    ] {
+    for word in ["llvmpipe", "is not exact: canary `", "--allow-inexact"] {
         assert!(run.words.contains(word), "{word}: {}", run.words);
     }
 }

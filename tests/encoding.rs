@@ -10,7 +10,7 @@ use tumble::{
 
 #[test]
 fn every_device_encodes_like_the_host() {
-    let set = hostile_set(12, 96);
+    let set = hostile_set(12, 48);
     let explicit = (0..500)
         .map(|i| 0.013 * f64::from((i * 29) % 500))
         .collect();

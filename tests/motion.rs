@@ -129,7 +129,7 @@ fn the_same_bits_on_every_device() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let engines = vulkan_engines(|_| {});
     for seed in 0..3 {
-        let set = hostile_set(seed, 128);
+        let set = hostile_set(seed, 64);
         let frames = Frames::fps(30).between(-1.0, 20.0);
         for method in METHODS {
             for quantity in QUANTITIES {

@@ -25,6 +25,7 @@ use sixteen::Sixteen;
 use super::evaluate::Evaluate;
 use super::lanes::Lanes;
 use super::row::row;
+use super::stage::{Output, Staged};
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::prepare::PartRef;
@@ -123,10 +124,14 @@ impl FromStr for VectorWidth {
 type RowFn<S> =
     unsafe fn(PartRef<'_>, &[S], &Timeline, &Cycle, &mut [[f32; 4]]) -> Result<(), FramesError>;
 
+type StagedFn<S> =
+    unsafe fn(PartRef<'_>, &[S], &Timeline, &Cycle, &mut Staged<'_, '_>) -> Result<(), FramesError>;
+
 /// The evaluation of one form, compiled for one width.
 #[derive(Clone, Copy)]
 pub(crate) struct Kernel<S> {
     row: RowFn<S>,
+    staged: StagedFn<S>,
 }
 
 impl<S> Kernel<S> {
@@ -137,11 +142,16 @@ impl<S> Kernel<S> {
         segments: &[S],
         timeline: &Timeline,
         cycle: &Cycle,
-        output: &mut [[f32; 4]],
+        output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         // SAFETY: a kernel exists only for a width that the processor has
         // (`Kernels::new`); otherwise this is a safe function.
-        unsafe { (self.row)(part, segments, timeline, cycle, output) }
+        unsafe {
+            match output {
+                Output::Here(samples) => (self.row)(part, segments, timeline, cycle, samples),
+                Output::Staged(staged) => (self.staged)(part, segments, timeline, cycle, staged),
+            }
+        }
     }
 }
 
@@ -178,6 +188,13 @@ impl Kernels {
         }
     }
 
+    /// Whether long results are better written past the caches. A core of Intel's waits for
+    /// each line that it overwrites; AMD's (Zen 3) write as fast either way.
+    pub(crate) fn gain_past_caches(&self) -> bool {
+        static IS_INTEL: OnceLock<bool> = OnceLock::new();
+        self.width > VectorWidth::Baseline && *IS_INTEL.get_or_init(is_intel)
+    }
+
     /// Does work over lanes with vectors of this width.
     pub(crate) fn in_lanes<W: InLanes>(&self, work: &mut W) {
         lanes_of(self.width, work);
@@ -211,9 +228,33 @@ fn lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     unsafe { run(work) }
 }
 
+#[cfg(target_arch = "x86_64")]
+fn is_intel() -> bool {
+    let vendor = std::arch::x86_64::__cpuid(0);
+    let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
+    name.as_flattened() == b"GenuineIntel"
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn is_intel() -> bool {
+    false
+}
+
+/// What this thread stored past the caches is seen before what it stores from here on.
+pub(crate) fn fence() {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: SSE is always there.
+    unsafe {
+        std::arch::x86_64::_mm_sfence();
+    }
+}
+
 fn baseline<S: Evaluate>() -> Kernel<S> {
     Kernel {
-        row: row::<Vec4, S>,
+        row: row::<Vec4, S, [[f32; 4]]>,
+        staged: |part, segments, timeline, cycle, output| {
+            row::<Vec4, S, _>(part, segments, timeline, cycle, output)
+        },
     }
 }
 
@@ -221,7 +262,7 @@ fn baseline<S: Evaluate>() -> Kernel<S> {
 macro_rules! compiled_for {
     ($width:ident, $features:literal, $lanes:ident) => {
         mod $width {
-            use super::{Cycle, Evaluate, FramesError, InLanes, Kernel, PartRef, Timeline};
+            use super::{Cycle, Evaluate, FramesError, InLanes, Kernel, PartRef, Staged, Timeline};
 
             #[target_feature(enable = $features)]
             fn row<S: Evaluate>(
@@ -231,7 +272,18 @@ macro_rules! compiled_for {
                 cycle: &Cycle,
                 output: &mut [[f32; 4]],
             ) -> Result<(), FramesError> {
-                super::row::<super::$lanes, S>(part, segments, timeline, cycle, output)
+                super::row::<super::$lanes, S, _>(part, segments, timeline, cycle, output)
+            }
+
+            #[target_feature(enable = $features)]
+            fn staged<S: Evaluate>(
+                part: PartRef<'_>,
+                segments: &[S],
+                timeline: &Timeline,
+                cycle: &Cycle,
+                output: &mut Staged<'_, '_>,
+            ) -> Result<(), FramesError> {
+                super::row::<super::$lanes, S, _>(part, segments, timeline, cycle, output)
             }
 
             #[target_feature(enable = $features)]
@@ -240,7 +292,10 @@ macro_rules! compiled_for {
             }
 
             pub(super) fn kernel<S: Evaluate>() -> Kernel<S> {
-                Kernel { row: row::<S> }
+                Kernel {
+                    row: row::<S>,
+                    staged: staged::<S>,
+                }
             }
         }
     };

@@ -11,6 +11,7 @@ use super::few::FewTimes;
 use super::memory::{Memories, Memory};
 use super::mend::Row;
 use super::sampled::{Sampled, Straight, straight};
+use super::stage::{Output, Stage};
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::encoding::Encoding;
@@ -81,7 +82,7 @@ impl CpuEngine {
         }
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
-            return self.window(clip, timeline, window, output);
+            return self.window(clip, timeline, window, 0, output);
         }
         if window.layout == Layout::FrameMajor {
             let tasks = frame_tasks(window, output);
@@ -91,10 +92,11 @@ impl CpuEngine {
                     .try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
             });
         }
+        let rotations = output.len();
         self.on_threads(|| {
             tasks(window, 1, output)
                 .into_par_iter()
-                .try_for_each(|(window, own)| self.window(clip, timeline, &window, own))
+                .try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
         })
     }
 
@@ -110,7 +112,7 @@ impl CpuEngine {
     ) -> Result<(), FramesError> {
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
             rotations.resize(window.len(), [0.0; 4]);
-            self.window(clip, timeline, window, rotations)?;
+            self.window(clip, timeline, window, 0, rotations)?;
             encoding.encode(rotations, output);
             Ok(())
         };
@@ -137,12 +139,13 @@ impl CpuEngine {
         }
     }
 
-    /// A window, on this thread.
+    /// A window of a result of so many `rotations`, on this thread.
     fn window(
         &self,
         clip: &ClipData,
         timeline: &Timeline,
         window: &Window,
+        rotations: usize,
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
@@ -164,16 +167,22 @@ impl CpuEngine {
             return few.others.into_iter().try_for_each(|place| {
                 let row = &mut output[place * samples..][..samples];
                 let track = window.tracks.start + place;
-                self.row(clip, track, timeline, window.samples.start, row)
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut Output::Here(row))
             });
         }
         match window.layout {
-            Layout::TrackMajor => output
-                .chunks_mut(samples)
-                .zip(window.tracks.clone())
-                .try_for_each(|(row, track)| {
-                    self.row(clip, track, timeline, window.samples.start, row)
-                }),
+            Layout::TrackMajor => {
+                let mut stage = Stage::new(&self.kernels, rotations, samples, output);
+                for track in window.tracks.clone() {
+                    stage.row(samples, |samples, output| {
+                        let first = window.samples.start + samples.start;
+                        self.row(clip, track, timeline, first, output)
+                    })?;
+                }
+                stage.finish();
+                Ok(())
+            }
             Layout::FrameMajor => {
                 let frames = output.chunks_mut(tracks).collect();
                 self.frames(clip, timeline, window, frames)
@@ -195,7 +204,8 @@ impl CpuEngine {
             let own = first..(first + TILE).min(tracks);
             for (row, place) in rows.chunks_mut(samples).zip(own.clone()) {
                 let track = window.tracks.start + place;
-                self.row(clip, track, timeline, window.samples.start, row)?;
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut Output::Here(row))?;
             }
             for (sample, frame) in frames.iter_mut().enumerate() {
                 let column = rows[sample..].iter().step_by(samples);
@@ -214,17 +224,18 @@ impl CpuEngine {
         track: usize,
         timeline: &Timeline,
         first: usize,
-        row: &mut [[f32; 4]],
+        output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
-        let samples = first..first + row.len();
+        let samples = first..first + output.samples().len();
         if !clip.interpolation.sides().repeats() {
             let cycle = Cycle::own(samples.clone());
             return clip
                 .parts_of(track, timeline, samples)
-                .try_for_each(|part| self.part(part, timeline, &cycle, row));
+                .try_for_each(|part| self.part(part, timeline, &cycle, output));
         }
         for cycle in clip.cycles(track, timeline, samples) {
-            let own = &mut row[cycle.samples.start - first..cycle.samples.end - first];
+            let own = cycle.samples.start - first..cycle.samples.end - first;
+            let own = &mut Output::Here(&mut output.samples()[own]);
             clip.parts_in(track, &cycle)
                 .try_for_each(|part| self.part(part, timeline, &cycle, own))?;
         }
@@ -237,16 +248,16 @@ impl CpuEngine {
         part: PartRef<'_>,
         timeline: &Timeline,
         cycle: &Cycle,
-        row: &mut [[f32; 4]],
+        output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         match &part.prepared.segments {
             Segments::Arc(all) => {
                 let kernel = &self.kernels.arc;
-                kernel.row(part, all, timeline, cycle, row)
+                kernel.row(part, all, timeline, cycle, output)
             }
             Segments::Polynomial(all) => {
                 let kernel = &self.kernels.polynomial;
-                kernel.row(part, all, timeline, cycle, row)
+                kernel.row(part, all, timeline, cycle, output)
             }
         }
     }
@@ -276,25 +287,28 @@ impl CpuEngine {
         }
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
         let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
-        let task = |first, rows: &mut [_]| -> Result<(), Error> {
+        let rotations = output.len();
+        let task = |first: usize, rows: &mut [_]| -> Result<(), Error> {
+            let tracks = first..first + rows.len() / samples;
+            let mut stage = Stage::new(&self.kernels, rotations, samples, rows);
             let mut memory = self.memories.take(interpolation, timeline, set);
             let Memory {
                 prepared,
                 preparation,
                 ..
             } = &mut memory;
-            for (rows, first) in rows
-                .chunks_mut(samples * tracks_each)
-                .zip((first..).step_by(tracks_each))
-            {
+            for first in tracks.clone().step_by(tracks_each) {
                 prepared.clear();
-                let tracks = first..first + rows.len() / samples;
-                preparation.push(prepared, set, tracks)?;
-                for (part, row) in prepared.parts.iter().zip(rows.chunks_mut(samples)) {
+                let own = first..(first + tracks_each).min(tracks.end);
+                preparation.push(prepared, set, own)?;
+                for part in &prepared.parts {
                     let part = PartRef { prepared, part };
-                    self.part(part, timeline, &Cycle::own(0..samples), row)?;
+                    stage.row(samples, |samples, output| {
+                        self.part(part, timeline, &Cycle::own(samples), output)
+                    })?;
                 }
             }
+            stage.finish();
             self.memories.give_back(memory);
             Ok(())
         };

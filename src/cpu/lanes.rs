@@ -5,6 +5,7 @@ use std::ops::Neg;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
 use super::dispatch::Four;
+use super::stage::Line;
 use crate::branchless::{Arithmetic, Real};
 use crate::segment::shader::TINY_BITS;
 
@@ -94,6 +95,13 @@ pub(crate) trait Lanes: Number {
     #[inline(always)]
     fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(Self::rotations(components).as_ref());
+    }
+
+    /// Stores a line past the caches, where that is faster; seen by other threads behind a
+    /// [`fence`](super::dispatch::fence).
+    #[inline(always)]
+    fn store_past_caches(line: &Line, to: &mut Line) {
+        *to = *line;
     }
 
     /// -1 where a number is less than 0, else 1.

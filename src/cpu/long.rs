@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::engine::CpuEngine;
 use super::mend::Row;
 use super::sampled::{Sampled, Straight};
+use super::stage::Output;
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::{Cycle, Sides};
 use crate::engine::Error;
@@ -172,7 +173,7 @@ impl CpuEngine {
                 part: &prepared.parts[0],
             };
             let cycle = Cycle::own(piece.samples.clone());
-            Ok(self.part(part, timeline, &cycle, piece.output)?)
+            Ok(self.part(part, timeline, &cycle, &mut Output::Here(piece.output))?)
         };
         self.on_threads(|| {
             let all = pieces.par_iter_mut();

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::engine::CpuEngine;
 use super::memory::Memory;
+use super::stage::Output;
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::engine::Error;
@@ -74,6 +75,7 @@ impl CpuEngine {
             }
             for (part, (piece, own)) in prepared.parts.iter().zip(batch) {
                 let part = PartRef { prepared, part };
+                let own = &mut Output::Here(own);
                 self.part(part, row.timeline, &Cycle::own(piece.samples), own)?;
             }
             self.memories.give_back(memory);

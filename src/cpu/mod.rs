@@ -27,6 +27,7 @@ mod row;
 mod sample_lanes;
 mod sampled;
 mod sine_cosine;
+mod stage;
 mod store_axis_angle;
 mod store_euler;
 mod store_f16;

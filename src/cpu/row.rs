@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
 use super::lanes::Lanes;
+use super::stage::Samples;
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cycle::Cycle;
 use crate::frame_clock::FrameClock;
@@ -20,12 +21,12 @@ const CHUNK: usize = 64;
 /// The samples of one part of a track in a cycle, into `output`, which
 /// starts with the first of them.
 #[inline(always)]
-pub(super) fn row<L: Lanes, S: Evaluate>(
+pub(super) fn row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
     part: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
     cycle: &Cycle,
-    output: &mut [[f32; 4]],
+    output: &mut O,
 ) -> Result<(), FramesError> {
     let first = cycle.samples.start;
     let is_short = cycle.samples.len() <= FEW;
@@ -35,13 +36,13 @@ pub(super) fn row<L: Lanes, S: Evaluate>(
     {
         let clock = FrameClock::new(*rate, *start, part.part.end);
         let samples = cycle.samples.clone();
-        if spans::<L, S>(part, segments, timeline, clock, &samples, output) {
+        if spans::<L, S, O>(part, segments, timeline, clock, &samples, output) {
             let mut outside = OneByOne {
                 part,
                 segments,
                 timeline,
                 first,
-                output,
+                output: output.samples(),
             };
             let PartRef { prepared, part } = part;
             runs_before(prepared, part, clock, &samples, &mut outside);
@@ -55,7 +56,7 @@ pub(super) fn row<L: Lanes, S: Evaluate>(
             segments,
             timeline,
             first,
-            output,
+            output: output.samples(),
         };
         return part.prepared.runs(part.part, timeline, cycle, &mut row);
     }
@@ -64,7 +65,7 @@ pub(super) fn row<L: Lanes, S: Evaluate>(
         segments,
         timeline,
         first,
-        output,
+        output: output.samples(),
         lanes: PhantomData,
     };
     // What finds them is compiled once, not for each width.
@@ -79,13 +80,13 @@ pub(super) fn row<L: Lanes, S: Evaluate>(
 /// The samples between a track's keys, where frames are its own: without a list of runs.
 /// Whether all are near enough for that.
 #[inline(always)]
-fn spans<L: Lanes, S: Evaluate>(
+fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
     PartRef { prepared, part }: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
     clock: FrameClock,
     samples: &Range<usize>,
-    output: &mut [[f32; 4]],
+    output: &mut O,
 ) -> bool {
     let mut spans = SpanBlocks::new(prepared, part, clock, samples.clone());
     let mut block = SpanBlock::new();
@@ -100,11 +101,12 @@ fn spans<L: Lanes, S: Evaluate>(
             if first >= last {
                 continue;
             }
-            let mut output = &mut output[first - samples.start..];
+            let made = first - samples.start..last - samples.start;
+            let mut to = &mut output.samples()[made.start..];
             let (mut count, mut distance) = (last - first, block.distance[j]);
             if key != NONE && block.is_held[j] == 1 {
-                output[0] = prepared.constants[key as usize];
-                output = &mut output[1..];
+                to[0] = prepared.constants[key as usize];
+                to = &mut to[1..];
                 count -= 1;
                 distance += 1.0;
             }
@@ -115,18 +117,19 @@ fn spans<L: Lanes, S: Evaluate>(
                         offset: block.offset[j],
                     };
                     let segment = &segments[index as usize];
-                    frames::<L, S>(segment, affine, distance, count, output);
+                    frames::<L, S>(segment, affine, distance, count, to);
                 }
                 Source::Constant(index) => {
-                    output[..count].fill(prepared.constants[index as usize]);
+                    to[..count].fill(prepared.constants[index as usize]);
                 }
                 Source::Exact(index) => {
                     let (parameter, track) = (block.parameter(j), part.track as usize);
-                    for (sample, rotation) in (last - count..last).zip(output) {
+                    for (sample, rotation) in (last - count..last).zip(to) {
                         *rotation = prepared.exact(index, parameter, timeline, track, sample);
                     }
                 }
             }
+            output.made::<L>(made);
         }
     }
     true

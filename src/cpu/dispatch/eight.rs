@@ -7,13 +7,14 @@ use std::arch::x86_64::{
     _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
     _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
     _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
-    _mm256_sqrt_pd, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
-    _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
+    _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
+    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
 
 use super::doubles::doubles;
 use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
+use crate::cpu::stage::Line;
 use crate::segment::shader::TINY_BITS;
 
 /// What only processors with AVX2 do.
@@ -208,6 +209,17 @@ impl Lanes for Eight {
     #[inline(always)]
     fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_past_caches(line: &Line, to: &mut Line) {
+        let [low, high]: [__m256; 2] = bytemuck::cast(*line);
+        let [to_low, to_high]: &mut [__m256; 2] = bytemuck::cast_mut(to);
+        // The place is aligned as a line is.
+        avx2! {
+            _mm256_stream_ps(std::ptr::from_mut(to_low).cast(), low);
+            _mm256_stream_ps(std::ptr::from_mut(to_high).cast(), high);
+        }
     }
 
     #[inline(always)]

@@ -8,14 +8,15 @@ use std::arch::x86_64::{
     _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
     _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
     _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_sqrt_pd,
-    _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
-    _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
+    _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps,
+    _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
 };
 
 use super::Eight;
 use super::doubles::doubles;
 use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
+use crate::cpu::stage::Line;
 use crate::segment::shader::TINY_BITS;
 
 /// What only processors with AVX-512 do.
@@ -218,6 +219,15 @@ impl Lanes for Sixteen {
     #[inline(always)]
     fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_past_caches(line: &Line, to: &mut Line) {
+        // The place is aligned as a line is.
+        avx512!(_mm512_stream_ps(
+            std::ptr::from_mut(to).cast(),
+            bytemuck::cast(*line)
+        ));
     }
 
     #[inline(always)]

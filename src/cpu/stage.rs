@@ -1,0 +1,363 @@
+//! Long results go to memory past the caches, where a processor gains by it: rows are made on
+//! a stage, memory that stays in the first cache, and each cache line is stored as soon as all
+//! of it is made. What computes goes on meanwhile.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::dispatch::{InLanes, Kernels, fence};
+use super::lanes::Lanes;
+
+/// Bytes of a result of which caches keep so little that its reader misses nothing.
+const LONG: usize = 32 << 20;
+
+/// Samples of a row with which what a stage costs is less than what it saves.
+const ROW: usize = 64;
+
+/// Four rotations, a cache line of most processors.
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(C, align(64))]
+pub(crate) struct Line([[f32; 4]; EACH]);
+
+/// Rotations of a line.
+const EACH: usize = 4;
+
+/// Lines of a stage.
+const LINES: usize = 512;
+
+/// Rows one behind the other: where they are made, and where they go.
+pub(super) struct Stage<'o> {
+    kernels: &'o Kernels,
+    place: Place<'o>,
+    /// `None` where rows are made in their places.
+    lines: Option<Box<[Line; LINES]>>,
+    /// Rotations on the stage, from the start of its first line on.
+    filled: usize,
+}
+
+/// What has not been stored to.
+struct Place<'o> {
+    /// Everything where there is no stage; else what lies before the first whole line, whose
+    /// rotations are the last ones of the stage's first line.
+    before: &'o mut [[f32; 4]],
+    lines: &'o mut [Line],
+    after: &'o mut [[f32; 4]],
+    /// Lines of the stage that are stored.
+    stored: usize,
+}
+
+impl<'o> Stage<'o> {
+    /// For `output`, rows of so many `samples`, a part of a result of so many `rotations`.
+    pub(super) fn new(
+        kernels: &'o Kernels,
+        rotations: usize,
+        samples: usize,
+        output: &'o mut [[f32; 4]],
+    ) -> Self {
+        let is_long = rotations >= LONG / size_of::<[f32; 4]>() && samples >= ROW;
+        #[cfg(test)]
+        if tests::IS_STAGED.get() {
+            return Self::with(kernels, true, output);
+        }
+        Self::with(kernels, is_long && kernels.gain_past_caches(), output)
+    }
+
+    fn with(kernels: &'o Kernels, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
+        // Where rotations may lie across lines they are made in their places.
+        let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
+        if !is_staged || !is_aligned {
+            let place = Place {
+                before: output,
+                lines: &mut [],
+                after: &mut [],
+                stored: 0,
+            };
+            return Self {
+                kernels,
+                place,
+                lines: None,
+                filled: 0,
+            };
+        }
+        let (before, lines, after) = bytemuck::pod_align_to_mut(output);
+        let filled = before.len().wrapping_neg() % EACH;
+        let place = Place {
+            before,
+            lines,
+            after,
+            stored: 0,
+        };
+        Self {
+            kernels,
+            place,
+            lines: Some(bytemuck::zeroed_box()),
+            filled,
+        }
+    }
+
+    /// Makes the next row, some samples at a time.
+    pub(super) fn row<E>(
+        &mut self,
+        count: usize,
+        mut make: impl FnMut(Range<usize>, &mut Output<'_, 'o>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut first = 0;
+        while first < count {
+            if self.filled + count - first > EACH * LINES {
+                self.clear();
+            }
+            let Some(lines) = &mut self.lines else {
+                let all = std::mem::take(&mut self.place.before);
+                let (row, others) = all.split_at_mut(count);
+                self.place.before = others;
+                return make(0..count, &mut Output::Here(row));
+            };
+            let piece = (count - first).min(EACH * LINES - self.filled);
+            let stage: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut lines[..]);
+            let mut output = Output::Staged(Staged {
+                stage: &mut stage[..self.filled + piece],
+                start: self.filled,
+                made: self.filled,
+                place: &mut self.place,
+            });
+            make(first..first + piece, &mut output)?;
+            self.filled += piece;
+            first += piece;
+        }
+        Ok(())
+    }
+
+    /// When all rows are made.
+    pub(super) fn finish(mut self) {
+        self.clear();
+        if let Some(lines) = &self.lines {
+            let rest = &lines[0].0[..self.filled];
+            self.place.after.copy_from_slice(rest);
+        }
+    }
+
+    /// Stores the whole lines of the stage; the rest moves to its start.
+    fn clear(&mut self) {
+        let Some(lines) = &mut self.lines else {
+            return;
+        };
+        let whole = self.filled / EACH;
+        self.kernels.in_lanes(&mut Store {
+            lines: &lines[..whole],
+            place: &mut self.place,
+        });
+        if whole < LINES {
+            lines[0] = lines[whole];
+        }
+        self.filled %= EACH;
+        self.place.stored = 0;
+    }
+}
+
+impl Drop for Stage<'_> {
+    fn drop(&mut self) {
+        if self.lines.is_some() {
+            fence();
+        }
+    }
+}
+
+impl Place<'_> {
+    /// Stores the first lines of the stage, but for those that are stored.
+    #[inline(always)]
+    fn store<L: Lanes>(&mut self, lines: &[Line]) {
+        if let [first, ..] = lines
+            && !self.before.is_empty()
+        {
+            let before = std::mem::take(&mut self.before);
+            before.copy_from_slice(&first.0[EACH - before.len()..]);
+            self.stored = 1;
+        }
+        if lines.len() > self.stored {
+            let lines = &lines[self.stored..];
+            let (places, others) = std::mem::take(&mut self.lines).split_at_mut(lines.len());
+            for (place, line) in places.iter_mut().zip(lines) {
+                L::store_past_caches(line, place);
+            }
+            self.lines = others;
+            self.stored += lines.len();
+        }
+    }
+}
+
+struct Store<'s, 'o> {
+    lines: &'s [Line],
+    place: &'s mut Place<'o>,
+}
+
+impl InLanes for Store<'_, '_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        self.place.store::<L>(self.lines);
+    }
+}
+
+/// Where some samples of a row are made.
+pub(super) enum Output<'s, 'o> {
+    /// Where they stay.
+    Here(&'s mut [[f32; 4]]),
+    Staged(Staged<'s, 'o>),
+}
+
+/// Samples on a stage.
+pub(super) struct Staged<'s, 'o> {
+    /// All that lies on it.
+    stage: &'s mut [[f32; 4]],
+    /// The first of the samples.
+    start: usize,
+    /// What of the stage is made, without a gap.
+    made: usize,
+    place: &'s mut Place<'o>,
+}
+
+impl Output<'_, '_> {
+    pub(super) fn samples(&mut self) -> &mut [[f32; 4]] {
+        match self {
+            Self::Here(samples) => samples,
+            Self::Staged(staged) => staged.samples(),
+        }
+    }
+}
+
+/// [`Output`] with nothing to tell apart for each run.
+pub(super) trait Samples {
+    fn samples(&mut self) -> &mut [[f32; 4]];
+
+    /// Some of them are made, and do not change any more.
+    fn made<L: Lanes>(&mut self, samples: Range<usize>);
+}
+
+impl Samples for [[f32; 4]] {
+    #[inline(always)]
+    fn samples(&mut self) -> &mut [[f32; 4]] {
+        self
+    }
+
+    #[inline(always)]
+    fn made<L: Lanes>(&mut self, _: Range<usize>) {}
+}
+
+impl Samples for Staged<'_, '_> {
+    #[inline(always)]
+    fn samples(&mut self) -> &mut [[f32; 4]] {
+        &mut self.stage[self.start..]
+    }
+
+    #[inline(always)]
+    fn made<L: Lanes>(&mut self, samples: Range<usize>) {
+        if self.start + samples.start <= self.made {
+            self.made = self.made.max(self.start + samples.end);
+            let whole = self.made / EACH * EACH;
+            (self.place).store::<L>(bytemuck::cast_slice(&self.stage[..whole]));
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::cell::Cell;
+    use std::convert::Infallible;
+
+    use glam::{Quat, Vec4};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::cpu::VectorWidth;
+    use crate::generate::{Generate, Steps};
+    use crate::{Device, Engine, Frames, Interpolation, Layout, Outside, method};
+
+    thread_local! {
+        /// Whether this thread makes all rows on a stage.
+        pub(in crate::cpu) static IS_STAGED: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Catches lines stored before they are whole, to another place or not at all, and what
+    /// is left between rows, wherever the output starts.
+    #[test]
+    fn rows_come_to_their_places() {
+        let run = |rows: Vec<(usize, usize)>, shift: usize, width| {
+            let kernels = Kernels::new(width);
+            let all: usize = rows.iter().map(|row| row.0).sum();
+            let mut memory = vec![Quat::from_array([-1.0; 4]); shift + all + 9];
+            let memory: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut memory);
+            let mut stage = Stage::with(&kernels, true, &mut memory[shift..shift + all]);
+            let mut next = 0.0;
+            for (count, each) in rows {
+                let row = stage.row(count, |samples, output| {
+                    assert_eq!(output.samples().len(), samples.len());
+                    for from in (0..samples.len()).step_by(each) {
+                        let to = (from + each).min(samples.len());
+                        for place in &mut output.samples()[from..to] {
+                            *place = [next; 4];
+                            next += 1.0;
+                        }
+                        // Some are not told of at once.
+                        if let Output::Staged(staged) = output
+                            && from % 3 != 1
+                        {
+                            staged.made::<Vec4>(from..to);
+                        }
+                    }
+                    Ok::<(), Infallible>(())
+                });
+                let Ok(()) = row;
+            }
+            stage.finish();
+            let expected = (0..all).map(|k| [k as f32; 4]);
+            assert!(memory[shift..shift + all].iter().copied().eq(expected));
+            let (before, after) = (&memory[..shift], &memory[shift + all..]);
+            assert!(before.iter().chain(after).all(|rest| *rest == [-1.0; 4]));
+        };
+        let row = (1usize..5000, 1usize..99);
+        let widths = proptest::sample::select(VectorWidth::available());
+        let strategy = (proptest::collection::vec(row, 1..9), 0usize..8, widths);
+        proptest!(|((rows, shift, width) in strategy)| run(rows, shift, width));
+    }
+
+    /// Frames, times in any order, and copies of a track, by arcs and by polynomials.
+    #[test]
+    fn rows_on_a_stage_have_the_bits_of_others() {
+        let set = Generate {
+            steps: Steps::Random,
+            ..Generate::default()
+        };
+        let set = set.track_set().unwrap();
+        let engine = Engine::new(Device::Cpu).unwrap();
+        let times = (0..2500).map(|k| f64::from(k * 617 % 2500) * 0.01 - 2.0);
+        let frames = [
+            Frames::fps(60),
+            Frames::fps(120).between(-3.0, 25.0),
+            Frames::at(times.collect()),
+        ];
+        for (method, after) in [
+            (method::SLERP, Outside::Hold),
+            (method::BESSEL_OVERHAUSER, Outside::Loop),
+        ] {
+            let interpolation = Interpolation {
+                after,
+                ..method.into()
+            };
+            let clip = engine.upload(&set, interpolation).unwrap();
+            for frames in &frames {
+                let expected = clip.evaluate(frames).unwrap();
+                let each = expected.as_quats().len() / 4;
+                // So few are evaluated on this thread.
+                assert!(4 * each <= 16 * 1024);
+                IS_STAGED.set(true);
+                let mut found = vec![Quat::IDENTITY; 4 * each + 1];
+                let layout = Layout::TrackMajor;
+                let done = clip.evaluate_into(frames, layout, &mut found[1..]);
+                IS_STAGED.set(false);
+                done.unwrap();
+                let bits = |rotations| bytemuck::cast_slice::<Quat, u32>(rotations);
+                assert_eq!(bits(expected.as_quats()), bits(&found[1..]));
+            }
+        }
+    }
+}
