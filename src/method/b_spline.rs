@@ -31,8 +31,11 @@ pub const B_SPLINE: Method = Method {
         rotation: 3.0,
     },
     reference: reference::Kind::BSpline,
-    curves: Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing))),
+    curves: &CURVES,
 };
+
+static CURVES: Curves =
+    Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing)));
 
 /// The lengths of the two intervals before one, and of the two behind it, in its own.
 fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {

@@ -28,12 +28,14 @@ pub const BESSEL_OVERHAUSER: Method = Method {
         rotation: 2.8,
     },
     reference: reference::Kind::BesselOverhauser,
-    curves: Curves::Smooth(
-        Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-            .steady_alone()
-            .direct::<Rule>(Joints::ByTime),
-    ),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(
+    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
+        .steady_alone()
+        .direct::<Rule>(Joints::ByTime),
+);
 
 struct Rule;
 

@@ -29,8 +29,11 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
         rotation: 3.2,
     },
     reference: reference::Kind::BesselOverhauserMean,
-    curves: Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone()),
+    curves: &CURVES,
 };
+
+static CURVES: Curves =
+    Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone());
 
 struct Rule;
 

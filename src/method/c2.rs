@@ -39,10 +39,11 @@ pub const C2: Method = Method {
         rotation: 3.2,
     },
     reference: reference::Kind::C2,
-    curves: Curves::Smooth(
-        Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities)),
-    ),
+    curves: &CURVES,
 };
+
+static CURVES: Curves =
+    Curves::Smooth(Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities)));
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {

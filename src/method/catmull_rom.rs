@@ -28,12 +28,14 @@ pub const CATMULL_ROM: Method = Method {
         rotation: 2.6,
     },
     reference: reference::Kind::CatmullRom,
-    curves: Curves::Smooth(
-        Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-            .steady_alone()
-            .direct::<Rule>(Joints::Alike),
-    ),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(
+    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
+        .steady_alone()
+        .direct::<Rule>(Joints::Alike),
+);
 
 struct Rule;
 

@@ -31,8 +31,11 @@ pub const GLTF_CUBIC: Method = Method {
         rotation: 3.8,
     },
     reference: reference::Kind::GltfCubic,
-    curves: Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers))),
+    curves: &CURVES,
 };
+
+static CURVES: Curves =
+    Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers)));
 
 /// The tangent with which an interval leaves its first key, and that with which it
 /// arrives at its last.

@@ -29,8 +29,11 @@ pub const HERMITE: Method = Method {
         rotation: 2.8,
     },
     reference: reference::Kind::Hermite,
-    curves: Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers))),
+    curves: &CURVES,
 };
+
+static CURVES: Curves =
+    Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers)));
 
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     [interval, interval + 1].map(|key| {

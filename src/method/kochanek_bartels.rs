@@ -32,10 +32,12 @@ pub const KOCHANEK_BARTELS: Method = Method {
         rotation: 3.2,
     },
     reference: reference::Kind::KochanekBartels,
-    curves: Curves::Smooth(
-        Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),
-    ),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(
+    Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),
+);
 
 /// Tension, continuity and bias of the key that an interval starts with.
 fn numbers(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {

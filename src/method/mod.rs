@@ -111,7 +111,9 @@ pub struct Method {
     /// Its textbook definition in f64.
     pub reference: reference::Kind,
     /// How its curves follow from the keys.
-    pub(crate) curves: Curves,
+    /// A static: of a constant's functions every crate that names it compiles its own, all that
+    /// they call, for each vector width.
+    pub(crate) curves: &'static Curves,
 }
 
 /// What lies between two keys.

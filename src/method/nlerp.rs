@@ -27,8 +27,10 @@ pub const NLERP: Method = Method {
         rotation: 2.8,
     },
     reference: reference::Kind::Nlerp,
-    curves: Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>)),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>));
 
 /// No handles.
 struct Rule;

@@ -27,11 +27,13 @@ pub const SHOEMAKE: Method = Method {
         rotation: 4.1,
     },
     reference: reference::Kind::Shoemake,
-    curves: Curves::Smooth(Smooth::new(
-        Shape::DE_CASTELJAU,
-        ends::controls::<Bisector<1>>,
-    )),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(Smooth::new(
+    Shape::DE_CASTELJAU,
+    ends::controls::<Bisector<1>>,
+));
 
 /// Handles that are a part, one `PART`th, of the way to the bisector.
 ///

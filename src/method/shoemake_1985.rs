@@ -26,8 +26,10 @@ pub const SHOEMAKE_1985: Method = Method {
         rotation: 2.8,
     },
     reference: reference::Kind::Shoemake1985,
-    curves: Curves::Smooth(Smooth::new(
-        Shape::DE_CASTELJAU,
-        ends::controls::<Bisector<3>>,
-    )),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(Smooth::new(
+    Shape::DE_CASTELJAU,
+    ends::controls::<Bisector<3>>,
+));

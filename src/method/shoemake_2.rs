@@ -26,8 +26,10 @@ pub const SHOEMAKE_2: Method = Method {
         rotation: 3.1,
     },
     reference: reference::Kind::Shoemake2,
-    curves: Curves::Smooth(Smooth::new(
-        Shape::DE_CASTELJAU,
-        ends::controls::<Bisector<2>>,
-    )),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(Smooth::new(
+    Shape::DE_CASTELJAU,
+    ends::controls::<Bisector<2>>,
+));

@@ -24,8 +24,10 @@ pub const SLERP: Method = Method {
         rotation: 1.7,
     },
     reference: reference::Kind::Slerp,
-    curves: Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves)),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves));
 
 /// For what follows from the derivatives: `q0 exp(t log(q0⁻¹ q1))`.
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {

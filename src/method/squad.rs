@@ -25,8 +25,10 @@ pub const SQUAD: Method = Method {
         rotation: 2.9,
     },
     reference: reference::Kind::Squad,
-    curves: Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>)),
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>));
 
 /// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
 struct Rule;

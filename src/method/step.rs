@@ -23,5 +23,7 @@ pub const STEP: Method = Method {
         rotation: 0.87,
     },
     reference: reference::Kind::Step,
-    curves: Curves::Steps,
+    curves: &CURVES,
 };
+
+static CURVES: Curves = Curves::Steps;

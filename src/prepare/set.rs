@@ -185,7 +185,7 @@ pub(crate) struct Preparation(Box<dyn Prepare>);
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        Self(match interpolation.method.curves {
+        Self(match *interpolation.method.curves {
             Curves::Arcs(moving) if interpolation.is_by_formula() => {
                 Box::new(SmoothPreparation::new(interpolation, moving))
             }
