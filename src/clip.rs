@@ -9,6 +9,7 @@ use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
 use crate::gpu::{ClipBuffers, Job, VulkanEngine, VulkanError};
 use crate::method::Quantity;
+use crate::output_buffer::OutputBuffer;
 use crate::prepare::{ClipData, Prepared};
 use crate::rotations::{Layout, Rotations, Storage};
 use crate::window::Window;
@@ -72,7 +73,7 @@ impl Clip {
                 })?
             }
             Backend::Cpu(_) => {
-                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+                let mut quats = OutputBuffer::new(tracks * samples);
                 self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
                 Box::new(quats)
             }

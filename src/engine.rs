@@ -12,6 +12,7 @@ use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
 use crate::encoding::Encoding;
 use crate::gpu::{CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, Opened, VulkanError};
 use crate::method::{Interpolation, InterpolationError};
+use crate::output_buffer::OutputBuffer;
 use crate::prepare::{ClipData, Wanted};
 use crate::rotations::{Layout, Rotations};
 use crate::tracks::TrackSet;
@@ -289,7 +290,7 @@ impl Engine {
             let clip = self.upload_wanted(set, interpolation, wanted, None)?;
             return clip.evaluate_as(frames, layout);
         }
-        let mut quats: Vec<Quat> = bytemuck::zeroed_vec(tracks * samples);
+        let mut quats = OutputBuffer::new(tracks * samples);
         self.evaluate_tracks_into(set, 0..tracks, interpolation, &timeline, layout, &mut quats)?;
         Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
     }

@@ -65,6 +65,7 @@ mod joints;
 mod key_pieces;
 pub mod method;
 mod numeric;
+mod output_buffer;
 mod pieces;
 mod plan;
 mod poses;
@@ -101,6 +102,7 @@ pub use method::{
     Axes, Continuity, Cost, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method,
     Path, Quantity, Speed,
 };
+pub use output_buffer::OutputBuffer;
 pub use poses::WorldPoses;
 pub use rotations::{Layout, Rotations};
 pub use skeleton::{Skeleton, SkeletonError};

@@ -6,6 +6,7 @@ use glam::{Quat, Vec3};
 use crate::cpu;
 use crate::engine::{Backend, Engine, Error};
 use crate::gpu::{PoseKernel, VulkanEngine};
+use crate::output_buffer::OutputBuffer;
 use crate::rotations::{Layout, Rotations};
 use crate::segment::Pass;
 use crate::skeleton::Skeleton;
@@ -275,11 +276,11 @@ fn part(weight: f32) -> Result<(), Error> {
     }
 }
 
-fn empty(layer: &Rotations) -> Vec<Quat> {
-    bytemuck::zeroed_vec(layer.as_quats().len())
+fn empty(layer: &Rotations) -> OutputBuffer {
+    OutputBuffer::new(layer.as_quats().len())
 }
 
-fn like(layer: &Rotations, quats: Vec<Quat>) -> Rotations {
+fn like(layer: &Rotations, quats: OutputBuffer) -> Rotations {
     let (tracks, samples) = (layer.tracks(), layer.samples());
     Rotations::new(Box::new(quats), tracks, samples, layer.layout())
 }

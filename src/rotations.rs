@@ -30,12 +30,6 @@ pub(crate) trait Storage: Send + Sync {
     fn quats(&self) -> &[Quat];
 }
 
-impl Storage for Vec<Quat> {
-    fn quats(&self) -> &[Quat] {
-        self
-    }
-}
-
 /// The result of an evaluation: unit quaternions, `x y z w` in memory, of shape
 /// `(tracks, samples)` or `(samples, tracks)`, as the [`Layout`] says.
 pub struct Rotations {

@@ -11,6 +11,7 @@ use crate::clip::Clip;
 use crate::clock::Frames;
 use crate::engine::{Engine, Error};
 use crate::method::Interpolation;
+use crate::output_buffer::OutputBuffer;
 use crate::prepare::Wanted;
 use crate::rotations::Layout;
 use crate::tracks::TrackSet;
@@ -35,7 +36,7 @@ pub struct Chunk<'a> {
 const BUFFERS: usize = 3;
 
 /// A filled buffer, and what is in it.
-type Filled = Result<(Window, Vec<Quat>), Error>;
+type Filled = Result<(Window, OutputBuffer), Error>;
 
 impl Clip {
     /// Evaluates in chunks of about `chunk` rotations (at least one row of the layout
@@ -122,7 +123,7 @@ fn run<E: From<Error>>(
 ) -> Result<(), E> {
     // One chunk has nothing to overlap with.
     if let [window] = &*windows {
-        let mut rotations: Vec<Quat> = bytemuck::zeroed_vec(window.len());
+        let mut rotations = OutputBuffer::new(window.len());
         fill(window, &mut rotations)?;
         return sink(Chunk::new(window.clone(), &rotations));
     }
@@ -130,12 +131,13 @@ fn run<E: From<Error>>(
         let (give_back, empty) = sync_channel(BUFFERS);
         let (hand_over, filled) = sync_channel(BUFFERS);
         for _ in 0..BUFFERS {
-            let _ = give_back.send(Vec::new()); // it has room
+            let _ = give_back.send(OutputBuffer::new(0)); // it has room
         }
         scope.spawn(move || fill_all(windows, fill, &empty, &hand_over));
         for result in filled {
             let (window, rotations) = result?;
-            sink(Chunk::new(window, &rotations))?;
+            let own = window.len();
+            sink(Chunk::new(window, &rotations[..own]))?;
             let _ = give_back.send(rotations); // nobody needs it after the last
         }
         Ok(())
@@ -146,15 +148,17 @@ fn run<E: From<Error>>(
 fn fill_all(
     windows: Vec<Window>,
     fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error>,
-    empty: &Receiver<Vec<Quat>>,
+    empty: &Receiver<OutputBuffer>,
     hand_over: &SyncSender<Filled>,
 ) {
     for window in windows {
         let Ok(mut rotations) = empty.recv() else {
             return;
         };
-        rotations.resize(window.len(), Quat::IDENTITY);
-        let result = fill(&window, &mut rotations);
+        if rotations.len() < window.len() {
+            rotations = OutputBuffer::new(window.len());
+        }
+        let result = fill(&window, &mut rotations[..window.len()]);
         let failed = result.is_err();
         let taken = hand_over.send(result.map(|()| (window, rotations)));
         if failed || taken.is_err() {

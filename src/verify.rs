@@ -213,6 +213,7 @@ impl TrackErrors {
 mod tests {
     use super::*;
     use crate::method::{METHODS, SLERP};
+    use crate::output_buffer::OutputBuffer;
 
     fn set() -> TrackSet {
         let mut set = TrackSet::new();
@@ -249,7 +250,8 @@ mod tests {
             Quat::NAN,
             Quat::from_rotation_x(0.5),
         ] {
-            let mut quats = good.as_quats().to_vec();
+            let mut quats = OutputBuffer::new(52);
+            quats.copy_from_slice(good.as_quats());
             quats[26 + 7] = wrong;
             let bad = Rotations::new(Box::new(quats), 2, 26, good.layout());
             assert_eq!(differences(&good, &bad), (1, Some(33)));

@@ -3,8 +3,6 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use glam::Quat;
-
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::error::VulkanError;
@@ -18,6 +16,7 @@ use super::submission::{Access, Submission};
 use crate::clock::{FramesError, Timeline};
 use crate::device::{EngineOptions, Timings, Transfer};
 use crate::encoding::Encoding;
+use crate::output_buffer::OutputBuffer;
 use crate::prepare::ClipData;
 use crate::rotations::{Layout, Storage};
 use crate::segment::Item;
@@ -303,14 +302,14 @@ impl VulkanEngine {
         let whole = job.whole(layout);
         let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
         if !self.in_place || bytes > self.device.physical.info.max_memory_allocation_size {
-            let mut quats: Vec<Quat> = bytemuck::zeroed_vec(whole.len());
+            let mut quats = OutputBuffer::new(whole.len());
             self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
         }
         let mut buffer = match self.output_buffer(bytes) {
             // Window by window it may fit.
             Err(error) if error.is_out_of_memory() => {
-                let mut quats: Vec<Quat> = bytemuck::zeroed_vec(whole.len());
+                let mut quats = OutputBuffer::new(whole.len());
                 self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
                 return Ok(Box::new(quats));
             }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
-use tumble::{Device, Engine, Frames, Layout, TrackSet, method};
+use tumble::{Device, Engine, Frames, Layout, OutputBuffer, TrackSet, method};
 
 const TRACKS: usize = 4096;
 const KEYS: usize = 26;
@@ -105,7 +105,8 @@ fn naive(track: tumble::Track<'_>, times: &[f32], row: &mut [Quat]) {
 
 /// Medians, every contestant in turn, after a round that does not count.
 fn race(mut contestants: Vec<Contestant<'_>>) -> Vec<(&'static str, Duration)> {
-    let mut output = vec![Quat::IDENTITY; TRACKS * FRAMES];
+    let mut output = OutputBuffer::new(TRACKS * FRAMES);
+    output.fill(Quat::IDENTITY);
     let mut times = vec![Vec::new(); contestants.len()];
     for round in 0..=ROUNDS {
         for ((_, fill), times) in contestants.iter_mut().zip(&mut times) {

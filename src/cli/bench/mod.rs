@@ -12,7 +12,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use glam::Quat;
 use rayon::prelude::*;
-use tumble::{Clip, Device, Engine, EngineOptions, Layout, Method, VectorWidth, method};
+use tumble::{
+    Clip, Device, Engine, EngineOptions, Layout, Method, OutputBuffer, VectorWidth, method,
+};
 
 use super::exit::Failure;
 use super::{probe, words};
@@ -119,7 +121,8 @@ fn measure(
     let engine = Engine::new(Device::Cpu)?;
     let clip = engine.upload(&workload.set, method)?;
     let count = clip.track_count() * clip.timeline(&workload.frames)?.len();
-    let mut output = vec![Quat::IDENTITY; count];
+    let mut output = OutputBuffer::new(count);
+    output.fill(Quat::IDENTITY);
 
     let mut contestants = vec![
         Contestant::new("memory write rate", |output: &mut [Quat]| {
