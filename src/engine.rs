@@ -296,7 +296,8 @@ impl Engine {
     }
 
     /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again: the first touch of fresh memory costs more than evaluating.
+    /// is used again ([`OutputBuffer`]): the first touch of fresh memory costs more than
+    /// evaluating.
     ///
     /// # Errors
     /// Also when `output` is not exactly as long as the result.

@@ -1,10 +1,8 @@
 //! How far the engine is from the textbook, in radians, with stated bounds: slerp
 //! 6e-7 (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
 
-mod support;
-
+use crate::support::{Random, give_key_data, hostile_set};
 use glam::{DQuat, Quat};
-use support::{Random, give_key_data, hostile_set};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Clip, Device, Ends, Engine, Form, FrameRate, Frames, Interpolation, METHODS, Path, Rotations,

@@ -1,12 +1,10 @@
 //! The claim itself: every device gives the CPU's bits, for every method, at any
 //! frames, however the work is cut.
 
-mod support;
-
-use glam::{DQuat, DVec3, Quat};
-use support::{
+use crate::support::{
     Random, first_difference, give_key_data, hostile_set, vulkan_devices, vulkan_engines,
 };
+use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside, Path,

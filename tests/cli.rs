@@ -1,15 +1,11 @@
 //! The program, run as people run it: its results against the library's, bit for
 //! bit, its messages and its exit codes.
 
-#[path = "support/program.rs"]
-mod program;
-mod support;
-
 use std::fs;
 
+use crate::program::{command, finish, pendulum, run, sample_folder, succeed};
+use crate::support::vulkan_devices;
 use glam::Quat;
-use program::{command, finish, pendulum, run, sample_folder, succeed};
-use support::vulkan_devices;
 use tumble::{Device, Encoding, Engine, Frames, Layout, TrackSet, method};
 
 fn set() -> TrackSet {

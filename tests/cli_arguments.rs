@@ -1,15 +1,11 @@
 //! The program's edges: every row of the table of arguments, missing devices, closed
 //! pipes, full disks, signals.
 
-#[path = "support/program.rs"]
-mod program;
-mod support;
-
 use std::fs;
 use std::process::{Command, Stdio};
 
-use program::{command, finish, no_vulkan, run, sample_folder};
-use support::vulkan_devices;
+use crate::program::{command, finish, no_vulkan, run, sample_folder};
+use crate::support::vulkan_devices;
 
 /// Exit code, command line, a part of the message.
 const ARGUMENTS: &str = "

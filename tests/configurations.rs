@@ -2,15 +2,11 @@
 //! caught by a canary, named and refused.
 #![cfg(target_os = "linux")]
 
-#[path = "support/program.rs"]
-mod program;
-mod support;
-
 use std::path::Path;
 
-use program::{Run, command, finish};
+use crate::program::{Run, command, finish};
+use crate::support::vulkan_devices;
 use rayon::prelude::*;
-use support::vulkan_devices;
 
 const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
 const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";

@@ -1,9 +1,6 @@
 //! Every kind of `.dat` file, good and bad, with what is said of it: the fixtures in
 //! `tests/fixtures/dat/`, each with its `.expected` beside it.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -248,7 +245,7 @@ fn the_program_says_of_every_fixture_what_is_expected() {
                 "--times",
                 "times.txt",
             ];
-            let run = program::run(&folder, &line);
+            let run = crate::program::run(&folder, &line);
             let code = if refused { 4 } else { 0 };
             let said = lines.all(|line| run.words.lines().any(|word| word == line));
             let data = run.out.starts_with(b"\x93NUMPY");

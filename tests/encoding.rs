@@ -1,9 +1,7 @@
 //! Results in other forms: the same bits from every device, namely those that the f32
 //! result gives.
 
-mod support;
-
-use support::{hostile_set, vulkan_engines};
+use crate::support::{hostile_set, vulkan_engines};
 use tumble::{
     Axes, Device, Encoding, Engine, Error, Frames, Interpolation, Layout, Quantity, method,
 };
@@ -16,29 +14,34 @@ fn every_device_encodes_like_the_host() {
         .collect();
     let requests = [Frames::fps(60).between(-1.0, 25.0), Frames::at(explicit)];
     let cpu = Engine::new(Device::Cpu).unwrap();
-    for memory in [None, Some(500_000)] {
-        let vulkan = vulkan_engines(|options| options.memory = memory);
-        for engine in vulkan.iter().chain([&cpu]) {
-            let device = engine.device_name();
-            // Both forms, and nothing but constants.
-            for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
-                let clip = engine.upload(&set, method).unwrap();
-                let of_cpu = cpu.upload(&set, method).unwrap();
-                for frames in &requests {
-                    for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                        let rotations = of_cpu.evaluate_as(frames, layout).unwrap();
-                        for encoding in Encoding::KINDS {
-                            let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
-                            let mut expected = vec![0; quats.len() * encoding.bytes()];
-                            encoding.encode(quats, &mut expected);
-                            let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
-                            let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
-                            assert!(found == expected, "{what}");
-                            let mut own = vec![0xff; expected.len()];
-                            clip.evaluate_encoded_into(frames, layout, encoding, &mut own)
-                                .unwrap();
-                            assert!(own == expected, "{what}");
-                        }
+    let engines: Vec<Engine> = [None, Some(500_000)]
+        .into_iter()
+        .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
+        .chain([cpu.clone()])
+        .collect();
+    // Both forms, and nothing but constants.
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
+        let of_cpu = cpu.upload(&set, method).unwrap();
+        let clips: Vec<_> = engines
+            .iter()
+            .map(|engine| engine.upload(&set, method).unwrap())
+            .collect();
+        for frames in &requests {
+            for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                let rotations = of_cpu.evaluate_as(frames, layout).unwrap();
+                let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
+                for encoding in Encoding::KINDS {
+                    let mut expected = vec![0; quats.len() * encoding.bytes()];
+                    encoding.encode(quats, &mut expected);
+                    for (engine, clip) in engines.iter().zip(&clips) {
+                        let device = engine.device_name();
+                        let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                        let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
+                        assert!(found == expected, "{what}");
+                        let mut own = vec![0xff; expected.len()];
+                        clip.evaluate_encoded_into(frames, layout, encoding, &mut own)
+                            .unwrap();
+                        assert!(own == expected, "{what}");
                     }
                 }
             }

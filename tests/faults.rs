@@ -2,20 +2,16 @@
 //! place of the system's (`tests/fault_loader`), which the program knows nothing of.
 #![cfg(target_os = "linux")]
 
-#[path = "support/program.rs"]
-mod program;
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
+use crate::program::{Run, command, finish, sample_folder, succeed};
+use crate::support::{dense_set, first_difference, hostile_set, lavapipe, vulkan_devices};
 use glam::Quat;
-use program::{Run, command, finish, sample_folder, succeed};
 use rayon::prelude::*;
-use support::{dense_set, first_difference, hostile_set, lavapipe, vulkan_devices};
 use tumble::{Device, Engine, EngineOptions, Error, Frames, Layout, Transfer, VulkanError, method};
 
 const OUT_OF_HOST_MEMORY: i32 = -1;
@@ -410,7 +406,12 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
     let Some(loader) = Loader::new() else { return };
     let child = || {
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", "library_work", "--ignored", "--nocapture"]);
+        command.args([
+            "--exact",
+            "faults::library_work",
+            "--ignored",
+            "--nocapture",
+        ]);
         command
     };
     let (undisturbed, log) = loader.run_command(child(), &[("WANTED", "done")]);

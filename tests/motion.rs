@@ -1,10 +1,8 @@
 //! Angular velocities and accelerations: the derivatives of the formulas, near the
 //! reference's and with the same bits on every device.
 
-mod support;
-
+use crate::support::{Random, first_difference, give_key_data, hostile_set, vulkan_engines};
 use glam::{DQuat, DVec3, Quat};
-use support::{Random, first_difference, give_key_data, hostile_set, vulkan_engines};
 use tumble::reference::Curve;
 use tumble::{
     Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Quantity, Track, TrackSet, method,

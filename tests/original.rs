@@ -172,7 +172,7 @@ fn uneven_pendulums_match_the_original_program() {
     assert_matches_the_original(&set, "uneven");
 }
 
-/// `ORIGINAL_DATA=file.dat cargo test --test original -- --nocapture` compares on a
+/// `ORIGINAL_DATA=file.dat cargo test --test all original:: -- --nocapture` compares on a
 /// file of one's own, such as the original program's.
 #[test]
 fn files_of_ones_own_match_the_original_program() {

@@ -1,9 +1,7 @@
 //! Before the first key and behind the last: held, again, back and forth, or on.
 
-mod support;
-
+use crate::support::{Random, first_difference, give_key_data, vulkan_engines};
 use glam::{DQuat, DVec3, Quat};
-use support::{Random, first_difference, give_key_data, vulkan_engines};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Axes, Device, Engine, Frames, Interpolation, Layout, METHODS, Outside, Quantity, Track,

@@ -1,12 +1,9 @@
 //! Pictures: what is in them, read back from SVG and PNG.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::Path;
 
-use program::{pendulum, run, sample_folder, succeed};
+use crate::program::{pendulum, run, sample_folder, succeed};
 use roxmltree::{Document, Node};
 
 const SLERP: &str = "#D55E00";

@@ -1,13 +1,10 @@
 //! Pictures and films of boxes, decoded again.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use program::{run, sample_folder, succeed};
+use crate::program::{run, sample_folder, succeed};
 
 /// Red, green and blue, row by row.
 #[derive(Clone, PartialEq)]

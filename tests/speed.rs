@@ -1,9 +1,7 @@
 //! Curves at constant angular speed: the way stays the same, and is measured out evenly.
 
-mod support;
-
+use crate::support::{Random, first_difference, hostile_set, vulkan_devices};
 use glam::{DQuat, Quat};
-use support::{Random, first_difference, hostile_set, vulkan_devices};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Outside, Quantity, Speed, TrackSet,

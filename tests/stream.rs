@@ -1,9 +1,7 @@
 //! Results in chunks: the same bits as in one piece, in order, and nothing left out.
 
-mod support;
-
+use crate::support::{first_difference, hostile_set, vulkan_devices};
 use glam::Quat;
-use support::{first_difference, hostile_set, vulkan_devices};
 use tumble::{Device, Engine, Error, Frames, Layout, METHODS, method};
 
 fn devices() -> Vec<Device> {

@@ -1,13 +1,11 @@
 //! The reference against the textbook: what must hold of these curves whatever the
 //! keys. The engine is measured against the reference in `accuracy.rs`.
 
-mod support;
-
 use std::f64::consts::TAU;
 
+use crate::support::Random;
 use glam::{DQuat, DVec3, Quat};
 use proptest::prelude::*;
-use support::Random;
 use tumble::reference::{
     Curve, Kind, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left,

@@ -1,14 +1,12 @@
 //! Translations and scales beside rotations: what the textbook says, with the same bits on
 //! every device.
 
-mod support;
-
+use crate::support::{Random, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
-use support::{Random, vulkan_devices};
 use tumble::reference::VectorCurve;
 use tumble::{
-    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, Outside, TrackError,
-    TrackSet, Transforms, VectorMethod, method,
+    Device, Ends, Engine, Frames, Interpolation, Layout, Outside, TrackError, TrackSet, Transforms,
+    VectorMethod, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -140,27 +138,26 @@ fn the_same_bits_on_every_device() {
         Outside::Mirror,
         Outside::Extrapolate,
     ];
-    for device in vulkan_devices() {
-        for memory in [None, Some(20_000)] {
-            let mut options = EngineOptions::default();
-            options.memory = memory;
-            let vulkan = Engine::with_options(device.clone(), &options).unwrap();
-            for vectors in VectorMethod::ALL {
-                for (before, after) in sides.into_iter().zip(sides.into_iter().rev()) {
-                    let interpolation = Interpolation {
-                        before,
-                        after,
-                        ..method::BESSEL_OVERHAUSER.into()
-                    };
-                    let frames = Frames::fps(30).between(-5.0, 20.0);
-                    for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                        let of = |engine: &Engine| {
-                            let found =
-                                engine.transforms(&set, interpolation, vectors, &frames, layout);
-                            bits(&found.unwrap())
-                        };
-                        assert!(of(&cpu) == of(&vulkan), "{vectors}, {before:?}, {after:?}");
-                    }
+    let engines: Vec<Engine> = [None, Some(20_000)]
+        .into_iter()
+        .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
+        .collect();
+    let frames = Frames::fps(10).between(-5.0, 20.0);
+    for vectors in VectorMethod::ALL {
+        for (before, after) in sides.into_iter().zip(sides.into_iter().rev()) {
+            let interpolation = Interpolation {
+                before,
+                after,
+                ..method::BESSEL_OVERHAUSER.into()
+            };
+            for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                let of = |engine: &Engine| {
+                    let found = engine.transforms(&set, interpolation, vectors, &frames, layout);
+                    bits(&found.unwrap())
+                };
+                let expected = of(&cpu);
+                for vulkan in &engines {
+                    assert!(of(vulkan) == expected, "{vectors}, {before:?}, {after:?}");
                 }
             }
         }

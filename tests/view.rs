@@ -1,17 +1,12 @@
 //! The page of `tumble view`, in a real browser: what is drawn, what every key and
 //! control does, and that the rotations shown are the engine's.
 
-#[path = "support/browser.rs"]
-mod browser;
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use browser::Page;
+use crate::browser::Page;
+use crate::program::{run, sample_folder, succeed};
 use glam::Quat;
-use program::{run, sample_folder, succeed};
 use sha1::{Digest, Sha1};
 use tumble::METHODS;
 
@@ -674,8 +669,8 @@ fn open_shows_the_page_to_the_browser() {
     fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).unwrap();
     let path = format!("{}:/usr/bin:/bin", place.path().display());
     let view = |line: &[&str]| {
-        let mut command = program::command(place.path(), line);
-        let run = program::finish(command.env("PATH", &path).output().unwrap());
+        let mut command = crate::program::command(place.path(), line);
+        let run = crate::program::finish(command.env("PATH", &path).output().unwrap());
         assert_eq!(run.code, 0, "{}", run.words);
         let opened = place.path().join("opened");
         for _ in 0..100 {

@@ -1,12 +1,8 @@
 //! Vulkan's side of the bargain: devices, canaries, validation, handles.
 
-#[path = "support/application.rs"]
-mod application;
-mod support;
-
+use crate::support::{dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines};
 use bytemuck::Pod;
 use glam::Quat;
-use support::{dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines};
 use tumble::{
     Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Reads, Skeleton, TrackSet,
     Transfer, VulkanBuffer, VulkanError, method,
@@ -93,7 +89,7 @@ fn an_applications_own_device_gives_the_same_bits() {
     if vulkan_devices().is_empty() {
         return;
     }
-    let application = application::Application::new();
+    let application = crate::application::Application::new();
     let engine = application.engine();
     let set = hostile_set(4, 32);
     let frames = Frames::fps(30).between(0.0, 20.0);
@@ -116,7 +112,7 @@ fn results_stay_in_an_applications_own_buffer() {
     if vulkan_devices().is_empty() {
         return;
     }
-    let application = application::Application::new();
+    let application = crate::application::Application::new();
     let engine = application.engine();
     // With intervals so wild that the host computes their samples.
     let mut set = hostile_set(4, 32);

@@ -1,5 +1,5 @@
 //! A device as an application makes it.
-#![allow(unsafe_code, dead_code)] // creating a device is the application's part
+#![allow(unsafe_code)] // creating a device is the application's part
 
 use ash::vk;
 use tumble::{Engine, EngineOptions, VulkanHandles};
