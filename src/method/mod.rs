@@ -111,8 +111,8 @@ pub struct Method {
     /// Its textbook definition in f64.
     pub reference: reference::Kind,
     /// How its curves follow from the keys.
-    /// A static: of a constant's functions every crate that names it compiles its own, all that
-    /// they call, for each vector width.
+    /// Behind a static: every crate that names a constant compiles the functions in it again,
+    /// with all that they call, for each vector width.
     pub(crate) curves: &'static Curves,
 }
 
