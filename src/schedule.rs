@@ -145,11 +145,9 @@ impl Prepared {
         let mut spans = SpanBlocks::new(self, part, clock, samples.clone());
         let mut block = SpanBlock::new();
         while let Some(own) = spans.fill(&mut block) {
-            for (j, span) in own.enumerate() {
+            for j in block.occupied() {
+                let span = own.start + j;
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
-                if first >= last {
-                    continue;
-                }
                 let key = self.spans.keys[span];
                 if key != NONE && block.is_held[j] == 1 {
                     emit.run(Run {

@@ -25,6 +25,8 @@ pub(crate) struct SpanBlock {
     pub(crate) offset: [f32; Self::LEN],
     /// Whether all distances of samples are whole numbers of f32.
     pub(crate) are_near: bool,
+    /// A bit for each span that holds samples.
+    occupied: u32,
 }
 
 impl SpanBlock {
@@ -41,7 +43,15 @@ impl SpanBlock {
             scale: [0.0; Self::LEN],
             offset: [0.0; Self::LEN],
             are_near: true,
+            occupied: 0,
         }
+    }
+
+    /// The spans that hold samples, by their places in the block. Where keys are denser than
+    /// samples no processor guesses which these are.
+    #[inline(always)]
+    pub(crate) fn occupied(&self) -> Occupied {
+        Occupied(self.occupied)
     }
 
     /// What a cubic of the `j`th span that is evaluated in f64 needs.
@@ -50,6 +60,20 @@ impl SpanBlock {
             start: self.frame[j],
             frames: self.frame[j + 1] - self.frame[j],
         }
+    }
+}
+
+/// The places of bits that are set, in order.
+pub(crate) struct Occupied(u32);
+
+impl Iterator for Occupied {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let place = self.0.trailing_zeros();
+        self.0 &= self.0.wrapping_sub(1);
+        (place < u32::BITS).then_some(place as usize)
     }
 }
 
@@ -81,7 +105,11 @@ impl<'a, C: Clock> SpanBlocks<'a, C> {
         if samples.start > 0
             && let Some(first_time) = clock.own_time(samples.start)
         {
-            let found = starts.partition_point(|&start| start <= first_time);
+            // Mostly none of a long track's part is asked for: no search through cold memory.
+            let found = match starts.last() {
+                Some(&last) if last <= first_time => starts.len(),
+                _ => starts.partition_point(|&start| start <= first_time),
+            };
             done = found.saturating_sub(2);
         }
         Self {
@@ -162,6 +190,12 @@ impl<C: Clock> InLanes for Fill<'_, C> {
             offset[j] = span.offset;
         }
         block.are_near = far == 0;
+        // No span is behind the last one's end: there `first` is 0.
+        let mut occupied = 0;
+        for j in 0..SpanBlock::LEN {
+            occupied |= u32::from(firsts[j] < firsts[j + 1]) << j;
+        }
+        block.occupied = occupied;
     }
 }
 

@@ -96,11 +96,9 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         }
         let sources = &prepared.spans.sources[own.clone()];
         let keys = &prepared.spans.keys[own];
-        for (j, (&source, &key)) in sources.iter().zip(keys).enumerate() {
+        for j in block.occupied() {
+            let (source, key) = (sources[j], keys[j]);
             let (first, last) = (block.first[j], block.first[j + 1]);
-            if first >= last {
-                continue;
-            }
             let made = first - samples.start..last - samples.start;
             let mut to = &mut output.samples()[made.start..];
             let (mut count, mut distance) = (last - first, block.distance[j]);
