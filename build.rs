@@ -21,9 +21,11 @@ const READS: [&str; 2] = ["storage", "texels"];
 
 /// What the kernel is joined with: one of each, and its name is that of all three.
 const FORMS: [&str; 2] = ["arc", "polynomial"];
-const CLOCKS: [(&str, &str); 2] = [
-    ("frames", "distance_in_frames"),
-    ("times", "distance_in_seconds"),
+/// How work is listed, with the files for that.
+const LISTINGS: [(&str, &[&str], &str); 3] = [
+    ("frames", &["kernel", "distance_in_frames"], "items"),
+    ("times", &["kernel", "distance_in_seconds"], "items"),
+    ("singles", &["kernel_singles"], "singles"),
 ];
 /// Each with the files that it needs beside its own.
 const ENCODINGS: [(&str, &[&str]); 8] = [
@@ -66,19 +68,18 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
     )];
     for reads in READS {
         for form in FORMS {
-            for (clock, distance) in CLOCKS {
+            for (listing, entry, listed) in LISTINGS {
                 for (encoding, needed) in ENCODINGS {
                     let own = [
                         "canonical",
-                        "kernel",
-                        distance,
+                        "launch",
                         "sine_cosine",
                         &format!("evaluate_{form}"),
                         &format!("store_{encoding}"),
                     ];
-                    let mut files: Vec<_> =
-                        own.iter().chain(needed).map(|&f| f.to_owned()).collect();
-                    files.push(format!("kernel_{reads}"));
+                    let own = own.iter().chain(entry).chain(needed);
+                    let mut files: Vec<_> = own.map(|&file| file.to_owned()).collect();
+                    files.extend(["kernel", listed].map(|read| format!("{read}_{reads}")));
                     if reads == "texels" {
                         files.push(format!("{form}_texels"));
                         if encoding == "f32" {
@@ -86,7 +87,7 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
                             files.extend(["wide", "store_f32_wide"].map(str::to_owned));
                         }
                     }
-                    pipelines.push((named(&format!("{form}_{clock}_{encoding}"), reads), files));
+                    pipelines.push((named(&format!("{form}_{listing}_{encoding}"), reads), files));
                 }
             }
         }

@@ -1,6 +1,6 @@
-// The one entry point of every form. Joined with a form (`Segment`, `evaluate`), with what
-// reads (`segment_at`, `constant_at`, `item_at`, `distance_at`), a `distance_from_middle`, a
-// `store` and `sine_cosine` by the build.
+// The entry point for runs of samples. Joined with `launch`, with a form (`Segment`,
+// `evaluate`), with what reads (`segment_at`, `constant_at`, `item_at`, `distance_at`), a
+// `distance_from_middle`, a `store` and `sine_cosine` by the build.
 
 // A run of samples of one track that lie in one segment, or hold one constant.
 struct Item {
@@ -18,28 +18,14 @@ struct Item {
     offset: f32,
 }
 
-struct Launch {
-    // The items of this dispatch: their place in `items`, and how many.
-    first_item: u32,
-    item_count: u32,
-    // Distance in the result between neighbouring samples of a track.
-    stride: u32,
-    // What the store has to know: the order of a matrix, the axes of angles.
-    detail: u32,
-}
-
-const WORKGROUP: u32 = 64;
 const ITEM_SAMPLES: u32 = 16;
-const HOLD: u32 = 0x80000000;
-
-var<immediate> launch: Launch;
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(global_invocation_id) invocation: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let index = invocation.y * (groups.x * WORKGROUP) + invocation.x;
+    let index = place_of(invocation, groups);
     if index >= launch.item_count {
         return;
     }

@@ -41,7 +41,15 @@ pub(crate) struct Item {
     pub(crate) offset: f32,
 }
 
-/// `Launch` of `kernel.wgsl`.
+/// `Single` of `kernel_singles.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Single {
+    pub(crate) source: u32,
+    pub(crate) parameter: f32,
+}
+
+/// `Launch` of `launch.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Launch {
@@ -49,6 +57,7 @@ pub(crate) struct Launch {
     pub(crate) item_count: u32,
     pub(crate) stride: u32,
     pub(crate) detail: u32,
+    pub(crate) first_output: u32,
 }
 
 /// `Pass` of `pass.wgsl`.
@@ -158,7 +167,14 @@ assert_layout!(
     first_item = LAUNCH_FIRST_ITEM,
     item_count = LAUNCH_ITEM_COUNT,
     stride = LAUNCH_STRIDE,
-    detail = LAUNCH_DETAIL
+    detail = LAUNCH_DETAIL,
+    first_output = LAUNCH_FIRST_OUTPUT
+);
+assert_layout!(
+    Single,
+    SINGLE_SIZE,
+    source = SINGLE_SOURCE,
+    parameter = SINGLE_PARAMETER
 );
 assert_layout!(Pass, PASS_SIZE, count = PASS_COUNT, detail = PASS_DETAIL);
 assert_layout!(

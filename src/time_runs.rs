@@ -76,6 +76,17 @@ impl Prepared {
     /// What gives the rotation of one part at a time; nothing outside its keys.
     #[inline(always)]
     pub(crate) fn source_at(&self, part: &Part, time: f64) -> Option<RunSource> {
+        let (span, end) = self.span_at(part, time)?;
+        let key = self.spans.keys[span];
+        if time == self.spans.starts[span] && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(self.time_source(span, end))
+    }
+
+    /// The span of one part that holds a time, and where it ends; nothing outside its keys.
+    #[inline(always)]
+    pub(crate) fn span_at(&self, part: &Part, time: f64) -> Option<(usize, f64)> {
         let starts = &self.spans.starts[part.spans.clone()];
         let i = match starts.len() {
             0 => return None,
@@ -85,16 +96,8 @@ impl Prepared {
                 .saturating_sub(1),
         };
         let end = starts.get(i + 1).copied().unwrap_or(part.end);
-        if !(starts[i] <= time && time < end) {
-            return None;
-        }
         // Written out: closures are not always inlined.
-        let span = part.spans.start + i;
-        let key = self.spans.keys[span];
-        if time == starts[i] && key != NONE {
-            return Some(RunSource::Constant(key));
-        }
-        Some(self.time_source(span, end))
+        (starts[i] <= time && time < end).then_some((part.spans.start + i, end))
     }
 
     #[inline(always)]

@@ -7,8 +7,8 @@ use crate::support::{
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside, Path,
-    Reads, Rotations, TrackSet, Transfer, VectorWidth, method,
+    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside,
+    Path, Reads, Rotations, TrackSet, Transfer, VectorWidth, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -918,6 +918,70 @@ fn few_times_of_each_track_have_the_bits_of_many() {
                         let found = found.get(track, sample).unwrap();
                         assert_same_bits(&[rotation], &[found], method.name);
                     }
+                }
+            }
+        }
+    }
+}
+
+/// Where a kept clip has no more samples than spans, a device is told each by itself: the
+/// CPU's bits, in many windows and groups, between keys, on them and outside, of curves that
+/// the host evaluates, beside gaps of more frames than f32 counts, as any encoding.
+#[test]
+fn few_samples_of_a_kept_clip_have_the_same_bits() {
+    let mut random = Random(91);
+    let mut set = TrackSet::new();
+    for (count, step) in [(1, 1.0), (400, 3.0), (9000, 0.05), (2, 1.0), (300, 1.0)] {
+        let (times, keys) = near_keys(&mut random, count, 0.5, step);
+        set.push("", &times, &keys).unwrap();
+    }
+    // On frames, and the last one far behind the others.
+    let mut times: Vec<f64> = (0..700).map(|key| f64::from(key) / 250.0).collect();
+    times.extend([3.001, 3e6]);
+    let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+    set.push("", &times, &keys).unwrap();
+    let times: Vec<f64> = (0..90).map(|_| random.between(-1.0, 9.0)).collect();
+    let requests = [
+        Frames::fps(25).between(-1.0, 6.0),
+        Frames::fps(125).between(1.0, 4.0),
+        Frames::at(times),
+    ];
+    let mut engines = Vec::new();
+    for change in [
+        |_: &mut EngineOptions| {},
+        |options: &mut EngineOptions| options.memory = Some(300_000),
+        |options: &mut EngineOptions| options.transfer = Transfer::Staged,
+        |options: &mut EngineOptions| options.reads = Reads::StorageBuffers,
+    ] {
+        engines.extend(vulkan_engines(change));
+    }
+    for (method, outside) in [
+        (method::SLERP, Outside::Hold),
+        (method::SLERP, Outside::Extrapolate),
+        (method::STEP, Outside::Hold),
+        (method::CATMULL_ROM, Outside::Hold),
+        (method::CATMULL_ROM, Outside::Extrapolate),
+    ] {
+        let interpolation = Interpolation {
+            before: outside,
+            after: outside,
+            ..method.into()
+        };
+        let expected = cpu().upload(&set, interpolation).unwrap();
+        for engine in &engines {
+            let clip = engine.upload(&set, interpolation).unwrap();
+            for frames in &requests {
+                let device = engine.device_name();
+                let what = format!("{method}, {outside:?}, {frames:?}, {device}");
+                let found = clip.evaluate(frames).unwrap();
+                let expected_rotations = expected.evaluate(frames).unwrap();
+                assert!(found.as_quats().len() < set.key_count(), "few samples");
+                assert_same_bits(expected_rotations.as_quats(), found.as_quats(), &what);
+                for encoding in Encoding::KINDS {
+                    let layout = Layout::TrackMajor;
+                    let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let expected = expected.evaluate_encoded(frames, layout, encoding).unwrap();
+                    assert!(expected == found, "{encoding:?}, {what}");
                 }
             }
         }

@@ -57,9 +57,15 @@ fn every_shader_function_has_its_twin() {
         let name = shader.file_stem().unwrap().to_str().unwrap();
         let Some(twin) = text.lines().find_map(|line| line.split("Twin: ").nth(1)) else {
             let glue = [
+                "launch",
                 "kernel",
+                "kernel_singles",
                 "kernel_storage",
                 "kernel_texels",
+                "items_storage",
+                "items_texels",
+                "singles_storage",
+                "singles_texels",
                 "arc_texels",
                 "polynomial_texels",
                 "sampled_storage",

@@ -9,6 +9,7 @@ use ash::vk;
 use super::device::LogicalDevice;
 use super::error::{Named, VulkanError};
 use super::physical::PhysicalDevice;
+use crate::segment::PolynomialSegment;
 
 /// Where a buffer lives and who touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,15 +81,19 @@ unsafe impl Send for Buffer {}
 // SAFETY: as above.
 unsafe impl Sync for Buffer {}
 
+/// No kernel reads more at once.
+const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
+
 impl Buffer {
-    /// At least `size` bytes; an empty buffer still has some, as Vulkan demands.
+    /// At least `size` bytes; an empty buffer still has room for one of what kernels read,
+    /// which may do so before they choose.
     pub(super) fn new(
         device: &Arc<LogicalDevice>,
         name: &str,
         size: u64,
         residence: Residence,
     ) -> Result<Self, VulkanError> {
-        let size = size.max(16).next_multiple_of(16);
+        let size = size.max(LEAST).next_multiple_of(16);
         let is_texels = device.reads_texels && residence != Residence::Readback;
         let mut buffer = Self::without_memory(device, size, is_texels, None)?;
         // SAFETY: the buffer was just created.

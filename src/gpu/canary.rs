@@ -143,6 +143,7 @@ fn expressions(
         item_count: probes.len() as u32,
         stride: 1,
         detail: 0,
+        first_output: 0,
     };
     submission.dispatch(
         &pipeline,

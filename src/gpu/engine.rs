@@ -127,7 +127,7 @@ impl VulkanEngine {
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         Ok(Self {
-            pipelines: Mutex::default(),
+            pipelines: Mutex::new([const { None }; KERNELS]),
             pose_pipelines: Mutex::default(),
             slots: Mutex::default(),
             key_pipelines: Mutex::default(),

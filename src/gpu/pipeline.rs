@@ -15,7 +15,7 @@ use crate::spirv;
 /// A shader that the build compiled: its name and its words.
 pub(super) type Shader = (&'static str, &'static [u8]);
 
-/// All of them: the canary, then the kernels by form, clock and encoding, those that read
+/// All of them: the canary, then the kernels by form, listing and encoding, those that read
 /// storage buffers before those that read texels, then those of poses, then those from keys,
 /// likewise.
 static SHADERS: &[Shader] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -30,11 +30,15 @@ pub(super) fn canary() -> Shader {
     SHADERS[0]
 }
 
-/// What a sample's distance is counted in: frames, or explicit times in seconds.
+/// How a window's work is listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Clock {
+pub(super) enum Listing {
+    /// Runs of samples, whose distances are frames.
     Frames,
+    /// Runs of samples at explicit times, whose distances are seconds.
     Times,
+    /// Samples one by one, with their parameters.
+    Singles,
 }
 
 /// What a kernel binds.
@@ -67,7 +71,7 @@ impl Bindings {
 }
 
 /// Kernels that there are, from storage buffers or from texels.
-pub(super) const KERNELS: usize = 32;
+pub(super) const KERNELS: usize = 48;
 const _: () = assert!(SHADERS.len() == 1 + 2 * KERNELS + POSES + 2 * SAMPLED);
 
 /// Kernels over poses that are already there.
@@ -116,16 +120,12 @@ impl SampledKernel {
 pub(super) fn kernel(
     as_texels: bool,
     form: Form,
-    clock: Clock,
+    listing: Listing,
     encoding: Encoding,
 ) -> (Shader, usize) {
     let form = match form {
         Form::Arc => 0,
         Form::Polynomial => 1,
-    };
-    let clock = match clock {
-        Clock::Frames => 0,
-        Clock::Times => 1,
     };
     let encoding = match encoding {
         Encoding::F32 => 0,
@@ -137,11 +137,12 @@ pub(super) fn kernel(
         Encoding::Euler(_) => 6,
         Encoding::Vector => 7,
     };
-    let place = (form * 2 + clock) * 8 + encoding;
+    let place = (form * 3 + listing as usize) * 8 + encoding;
     (SHADERS[1 + KERNELS * usize::from(as_texels) + place], place)
 }
 
 /// What `kernel.wgsl` binds: segments, constants, items, distances, and its output.
+/// `kernel_singles.wgsl` has no distances.
 pub(super) fn kernel_bindings(as_texels: bool) -> Bindings {
     Bindings::read(as_texels, MOST_BINDINGS, 0b1111)
 }

@@ -9,10 +9,9 @@ use std::time::Instant;
 use super::buffer::Residence;
 use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
 use super::error::VulkanError;
-use super::pipeline::{Clock, Exactness, Pipeline, kernel, kernel_bindings};
+use super::pipeline::{Exactness, Listing, Pipeline, kernel, kernel_bindings};
 use super::slot::{Finish, Slot, Stopwatch, Target};
 use super::submission::{Access, Binding};
-use crate::clock::{Ticks, Timeline};
 use crate::encoding::Encoding;
 use crate::method::Form;
 use crate::segment::Launch;
@@ -159,14 +158,15 @@ impl VulkanEngine {
             (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
-        let pipeline = self.pipeline(clip.interpolation.form(), timeline, encoding)?;
+        let pipeline = self.pipeline(clip.interpolation.form(), work.listing, encoding)?;
         slot.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
-        for (group, item_count) in work.groups {
+        for own in work.groups {
+            let item_count = own.items;
             if item_count == 0 {
                 continue;
             }
-            let group = &buffers.groups[group];
+            let group = &buffers.groups[own.group];
             let bindings = [
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
@@ -179,6 +179,7 @@ impl VulkanEngine {
                 item_count,
                 stride: window.stride() as u32,
                 detail: encoding.detail(),
+                first_output: own.first_output,
             };
             let groups = self.workgroups(item_count);
             slot.submission
@@ -215,18 +216,14 @@ impl VulkanEngine {
     fn pipeline(
         &self,
         form: Form,
-        timeline: &Timeline,
+        listing: Listing,
         encoding: Encoding,
     ) -> Result<Arc<Pipeline>, VulkanError> {
-        let clock = match timeline.ticks {
-            Ticks::Frames { .. } => Clock::Frames,
-            Ticks::Times { .. } => Clock::Times,
-        };
         let mut all = self
             .pipelines
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let (shader, place) = kernel(self.device.reads_texels, form, clock, encoding);
+        let (shader, place) = kernel(self.device.reads_texels, form, listing, encoding);
         let place = &mut all[place];
         if let Some(pipeline) = place {
             return Ok(Arc::clone(pipeline));

@@ -10,15 +10,16 @@ use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
 use super::engine::EvaluateError;
 use super::error::VulkanError;
-use super::few_items::FewItems;
 use super::lent::Lent;
+use super::pipeline::Listing;
+use super::singles::Singles;
 use super::submission::{Spent, Submission};
-use super::work_list::{GroupWork, Patch, Work, WorkChunk, work};
-use crate::clock::Timeline;
+use super::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};
+use crate::clock::{Ticks, Timeline};
 use crate::device::Timings;
 use crate::encoding::Encoding;
 use crate::prepare::ClipData;
-use crate::segment::Item;
+use crate::segment::{Item, Single};
 use crate::window::Window;
 
 /// What one window needs; the submission comes first, so that it is waited for
@@ -145,47 +146,48 @@ impl Slot {
         window: &Window,
         shift: u32,
     ) -> Result<Work, EvaluateError> {
-        if let Some(few) = FewItems::new(clip, timeline, window, shift) {
-            let (items, distances) = self.room(device, few.count(), few.count())?;
-            return Ok(few.write(items, distances));
+        if let Some(singles) = Singles::new(clip, timeline, window) {
+            let bytes = singles.count() * size_of::<Single>();
+            let list = room(device, &mut self.items, "tumble items", bytes)?;
+            return Ok(singles.write(bytemuck::cast_slice_mut(list), shift)?);
         }
         let lists = work(clip, timeline, window, shift, &mut self.spare)?;
-        let item_count = lists.iter().map(GroupWork::item_count).sum();
-        let distance_count = lists.iter().map(GroupWork::distance_count).sum();
-        let (items, distances) = self.room(device, item_count, distance_count)?;
-        write(&lists, items, distances);
-        let mut work = Work::default();
+        let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
+        let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
+        let item_bytes = item_count * size_of::<Item>();
+        let items = room(device, &mut self.items, "tumble items", item_bytes)?;
+        let distance_bytes = distance_count * size_of::<f32>();
+        let distances = room(
+            device,
+            &mut self.distances,
+            "tumble distances",
+            distance_bytes,
+        )?;
+        write(
+            &lists,
+            bytemuck::cast_slice_mut(items),
+            bytemuck::cast_slice_mut(distances),
+        );
+        let mut work = Work {
+            listing: match timeline.ticks {
+                Ticks::Frames { .. } => Listing::Frames,
+                Ticks::Times { .. } => Listing::Times,
+            },
+            groups: Vec::new(),
+            patches: Vec::new(),
+        };
         for list in lists {
-            work.groups.push((list.group, list.item_count() as u32));
+            work.groups.push(GroupItems {
+                group: list.group,
+                items: list.item_count() as u32,
+                first_output: 0,
+            });
             for mut chunk in list.chunks {
                 work.patches.append(&mut chunk.patches);
                 self.spare.push(chunk.cleared());
             }
         }
         Ok(work)
-    }
-
-    /// Room for so many items and distances, where the host writes them.
-    fn room(
-        &mut self,
-        device: &Arc<LogicalDevice>,
-        items: usize,
-        distances: usize,
-    ) -> Result<(&mut [Item], &mut [f32]), VulkanError> {
-        let room = |buffer: &mut Buffer, name, bytes: usize| {
-            if buffer.size() < bytes as u64 {
-                *buffer = Buffer::new(device, name, bytes as u64, Residence::Upload)?;
-            }
-            Ok::<_, VulkanError>(())
-        };
-        let (item_bytes, distance_bytes) =
-            (items * size_of::<Item>(), distances * size_of::<f32>());
-        room(&mut self.items, "tumble items", item_bytes)?;
-        room(&mut self.distances, "tumble distances", distance_bytes)?;
-        Ok((
-            bytemuck::cast_slice_mut(self.items.bytes_mut(0..item_bytes)),
-            bytemuck::cast_slice_mut(self.distances.bytes_mut(0..distance_bytes)),
-        ))
     }
 
     /// Waits for the window in flight, if any, and brings its results home.
@@ -226,6 +228,19 @@ impl Slot {
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
     }
+}
+
+/// Room for so many bytes, where the host writes them.
+fn room<'b>(
+    device: &Arc<LogicalDevice>,
+    buffer: &'b mut Buffer,
+    name: &'static str,
+    bytes: usize,
+) -> Result<&'b mut [u8], VulkanError> {
+    if buffer.size() < bytes as u64 {
+        *buffer = Buffer::new(device, name, bytes as u64, Residence::Upload)?;
+    }
+    Ok(buffer.bytes_mut(0..bytes))
 }
 
 /// Writes the work lists of all groups, one behind the other.

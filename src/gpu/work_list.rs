@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::pipeline::Listing;
 use crate::clock::{FramesError, Timeline};
 use crate::cpu::{InLanes, Lanes, in_lanes};
 use crate::numeric::round_f32;
@@ -12,12 +13,21 @@ use crate::segment::shader::{HOLD, ITEM_SAMPLES};
 use crate::window::Window;
 
 /// What the device and the host have to do in a window.
-#[derive(Default)]
 pub(super) struct Work {
-    /// Groups of the clip and how many items each has, which lie one behind the other.
-    pub(super) groups: Vec<(usize, u32)>,
+    pub(super) listing: Listing,
+    /// What is listed of each group lies one behind the other.
+    pub(super) groups: Vec<GroupItems>,
     /// Rotations that the host computed.
     pub(super) patches: Vec<Patch>,
+}
+
+/// How much the device has to do for one group of a clip.
+pub(super) struct GroupItems {
+    pub(super) group: usize,
+    /// Items, or single samples.
+    pub(super) items: u32,
+    /// Where the first of single samples is stored.
+    pub(super) first_output: u32,
 }
 
 /// A place in the window, and the rotation there.
@@ -91,7 +101,7 @@ pub(super) fn work(
         let parts = parts_in(prepared, window);
         let listings: Vec<_> = parts
             .chunks(parts_per_chunk(window))
-            .map(|parts| Listing {
+            .map(|parts| PartsList {
                 prepared,
                 parts,
                 timeline,
@@ -116,7 +126,7 @@ pub(super) fn work(
 }
 
 /// What some parts of a group have to do.
-struct Listing<'a> {
+struct PartsList<'a> {
     prepared: &'a Prepared,
     parts: &'a [Part],
     timeline: &'a Timeline,
@@ -126,7 +136,7 @@ struct Listing<'a> {
     listed: Result<(), FramesError>,
 }
 
-impl InLanes for Listing<'_> {
+impl InLanes for PartsList<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         for part in self.parts {
