@@ -247,9 +247,10 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
 
     /// A stretch of a track that is more than a piece, and what of it is left.
     fn part_of(&mut self, long: Long, most: usize) -> Part<'a> {
-        let (times, keys) = self.job.set.times_and_keys(long.track);
+        let whole = Stretch::whole(self.job.set, long.track);
+        let times = whole.times;
         let samples = self.job.timeline.len();
-        let last = keys.len() - 1;
+        let last = whole.all - 1;
         let last_key = (long.key + most - 1).min(last);
         let end = match self.job.clock(times) {
             Some(clock) if last_key < last => clock.first_frame(times[last_key]) as usize,
@@ -257,17 +258,10 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         };
         let end = end.clamp(long.sample, samples);
         let sample = end.min(long.sample + most);
-        let stretch = |first_key: usize, last_key: usize| Stretch {
-            times: &times[first_key..=last_key],
-            keys: &keys[first_key..=last_key],
-            index: long.track,
-            first_key,
-            all: last + 1,
-        };
         self.long = if sample < end {
             Some(Long { sample, ..long })
         } else if sample < samples {
-            let sign = turned(&stretch(long.key, last_key), long.sign, |_| {});
+            let sign = turned(&whole.between(long.key, last_key), long.sign, |_| {});
             Some(Long {
                 key: last_key,
                 sign,
@@ -280,9 +274,9 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         // Cubics look at the keys beside their own too.
         let beside = usize::from(self.job.joints().is_some());
         let first = long.key.saturating_sub(beside);
-        let before = stretch(first, long.key);
+        let before = whole.between(first, long.key);
         Part {
-            stretch: stretch(first, (last_key + beside).min(last)),
+            stretch: whole.between(first, (last_key + beside).min(last)),
             window: long.sample..sample,
             sign: long.sign * turned(&before, 1.0, |_| {}),
         }
@@ -303,15 +297,8 @@ impl<'a> KeyJob<'a> {
 
     /// All of a track.
     fn track(&self, index: usize) -> Part<'a> {
-        let (times, keys) = self.set.times_and_keys(index);
         Part {
-            stretch: Stretch {
-                times,
-                keys,
-                index,
-                first_key: 0,
-                all: keys.len(),
-            },
+            stretch: Stretch::whole(self.set, index),
             window: 0..self.timeline.len(),
             sign: 1.0,
         }

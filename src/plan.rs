@@ -8,12 +8,14 @@ use std::ops::Range;
 use glam::Quat;
 
 use crate::clock::FramesError;
-use crate::cpu::{InLanes, Lanes, in_lanes};
+use crate::cpu::{InLanes, Lanes, any_turns, in_lanes};
 use crate::frame_clock::{FrameClock, finite_scale, in_frames};
 use crate::numeric::{frame_number, round_f32};
 use crate::schedule::COUNTABLE;
 use crate::segment::Sample;
 use crate::segment::shader::HELD;
+use crate::span_block::Occupied;
+use crate::tracks::TrackSet;
 
 /// Boundaries, or samples, worked out together.
 const LANES: usize = 64;
@@ -29,6 +31,40 @@ pub(crate) struct Stretch<'a> {
     pub(crate) first_key: usize,
     /// Keys of the whole track.
     pub(crate) all: usize,
+    /// Whether those before them turn the sign of any key of the set.
+    turns: bool,
+}
+
+impl<'a> Stretch<'a> {
+    /// All intervals of a track.
+    #[inline(always)]
+    pub(crate) fn whole(set: &'a TrackSet, index: usize) -> Self {
+        let (times, keys) = set.times_and_keys(index);
+        Self {
+            times,
+            keys,
+            index,
+            first_key: 0,
+            all: keys.len(),
+            turns: set.turns(),
+        }
+    }
+
+    /// Those of a whole track between two of its keys.
+    pub(crate) fn between(self, first_key: usize, last_key: usize) -> Self {
+        Self {
+            times: &self.times[first_key..=last_key],
+            keys: &self.keys[first_key..=last_key],
+            first_key,
+            ..self
+        }
+    }
+
+    /// Whether the sign of any key after the first is turned by those before it, or may be.
+    #[inline(always)]
+    pub(crate) fn turns(&self) -> bool {
+        self.turns && any_turns(bytemuck::cast_slice(self.keys))
+    }
 }
 
 /// Where the frames of a window lie; what it needs to find out is kept.
@@ -51,12 +87,13 @@ impl<'a> FramePlan<'a> {
                 times: [0.0; LANES],
                 count: 0,
                 clock: None,
-                frames: [0.0; LANES],
+                frames: [0.0; LANES + 1],
                 firsts: [0; LANES],
                 on_frame: [0; LANES],
                 wholes: [0.0; LANES],
                 scales: [0.0; LANES],
                 offsets: [0.0; LANES],
+                occupied: Occupied::default(),
             },
         }
     }
@@ -81,18 +118,18 @@ impl<'a> FramePlan<'a> {
         self.boundaries.clock = Some(clock);
         // Each block starts with the boundary that the one before it ended with.
         let mut end = 0;
-        'blocks: for block in (0..last.max(1)).step_by(LANES - 1) {
+        for block in (0..last.max(1)).step_by(LANES - 1) {
             let own = &times[block..times.len().min(block + LANES)];
             self.boundaries.times[..own.len()].copy_from_slice(own);
             self.boundaries.count = own.len();
             in_lanes(&mut self.boundaries);
             let bounds = &self.boundaries;
             end = bounds.firsts[own.len() - 1];
-            for j in 0..own.len() - 1 {
+            if bounds.firsts[0] >= to {
+                break;
+            }
+            for j in bounds.occupied {
                 let first = bounds.firsts[j];
-                if first >= to {
-                    break 'blocks;
-                }
                 let own = first.max(from)..bounds.firsts[j + 1].min(to);
                 if own.is_empty() {
                     continue;
@@ -110,16 +147,21 @@ impl<'a> FramePlan<'a> {
                         frames,
                     });
                 }
-                let is_key = bounds.on_frame[j] == 1 && own.start == first;
-                let key = block + j;
-                let samples = &mut self.samples[(own.start - from) as usize..];
-                for (place, sample) in samples.iter_mut().zip(own) {
-                    *place = Sample {
-                        key: key as u32,
-                        parameter: distance(sample) as f32 * scale + bounds.offsets[j],
-                    };
+                let (key, offset) = (block + j, bounds.offsets[j]);
+                let at = |sample: i64| Sample {
+                    key: key as u32,
+                    parameter: distance(sample) as f32 * scale + offset,
+                };
+                let places = (own.start - from) as usize..(own.end - from) as usize;
+                let samples = &mut self.samples[places];
+                if let [only] = samples {
+                    *only = at(own.start);
+                } else {
+                    for (place, sample) in samples.iter_mut().zip(own.clone()) {
+                        *place = at(sample);
+                    }
                 }
-                if is_key {
+                if bounds.on_frame[j] == 1 && own.start == first {
                     samples[0] = held(key);
                 }
             }
@@ -137,7 +179,8 @@ struct Boundaries {
     times: [f64; LANES],
     count: usize,
     clock: Option<FrameClock>,
-    frames: [f64; LANES],
+    /// One more than there are.
+    frames: [f64; LANES + 1],
     /// The first whole frame not before each.
     firsts: [i64; LANES],
     /// Whether that is the boundary itself: 1 or 0.
@@ -146,33 +189,40 @@ struct Boundaries {
     wholes: [f64; LANES],
     scales: [f32; LANES],
     offsets: [f32; LANES],
+    /// The intervals that hold a frame.
+    occupied: Occupied,
 }
 
 impl InLanes for Boundaries {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let Some(clock) = self.clock else { return };
-        let mut frames = [0.0; LANES];
-        let (mut firsts, mut on_frame) = ([0; LANES], [0; LANES]);
         // Whole vectors, or those left over would be done one by one.
         let count = self.count.next_multiple_of(8).min(LANES);
+        let times = &self.times[..count];
+        let (frames, firsts) = (&mut self.frames[..count], &mut self.firsts[..count]);
+        let on_frame = &mut self.on_frame[..count];
         for j in 0..count {
-            let boundary = clock.boundary(self.times[j]);
+            let boundary = clock.boundary(times[j]);
             frames[j] = boundary.frame;
             firsts[j] = frame_number(boundary.first);
             on_frame[j] = i64::from(boundary.first == boundary.frame);
         }
-        let mut next = [0.0; LANES];
-        next[..LANES - 1].copy_from_slice(&frames[1..]);
-        let (mut wholes, mut scales, mut offsets) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (frames, next) = (&self.frames[..count], &self.frames[1..=count]);
+        let (wholes, scales) = (&mut self.wholes[..count], &mut self.scales[..count]);
+        let offsets = &mut self.offsets[..count];
         for j in 0..count {
             let span = in_frames(frames[j], next[j], 1.0);
             wholes[j] = span.whole;
             scales[j] = span.scale;
             offsets[j] = span.offset;
         }
-        (self.frames, self.firsts, self.on_frame) = (frames, firsts, on_frame);
-        (self.wholes, self.scales, self.offsets) = (wholes, scales, offsets);
+        let mut occupied = 0;
+        for j in 0..LANES - 1 {
+            occupied |= u64::from(self.firsts[j] < self.firsts[j + 1]) << j;
+        }
+        // Behind the last boundary there is no interval.
+        self.occupied = Occupied(occupied & ((1 << (self.count - 1)) - 1));
     }
 }
 
@@ -198,27 +248,17 @@ impl TimePlan {
     /// Where a time lies among keys; `near` is the key to look at first.
     #[inline(always)]
     pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> Sample {
-        let last = starts.len() - 1;
-        let holds = |key: usize| starts[key] <= time && time < starts[key + 1];
-        // Times mostly increase: there and next before searching.
-        let key = if near < last && holds(near) {
-            near
-        } else if time >= starts[last] {
-            return held(last);
-        } else if time < starts[0] {
-            return held(0);
-        } else if near + 1 < last && holds(near + 1) {
-            near + 1
-        } else {
-            starts.partition_point(|&start| start <= time) - 1
-        };
-        let start = starts[key];
-        if time == start {
-            return held(key);
+        let key = key_before(starts, time, near);
+        if key & HELD != 0 {
+            return Sample {
+                key,
+                parameter: 0.0,
+            };
         }
+        let (start, end) = (starts[key as usize], starts[key as usize + 1]);
         Sample {
-            key: key as u32,
-            parameter: self.parameter(start, starts[key + 1], time),
+            key,
+            parameter: self.parameter(start, end, time),
         }
     }
 
@@ -238,11 +278,80 @@ impl TimePlan {
     }
 }
 
+/// The key before a time, which is the rotation itself where it carries HELD; `near` is the
+/// one to look at first.
+#[inline(always)]
+pub(crate) fn key_before(starts: &[f64], time: f64, near: usize) -> u32 {
+    let last = starts.len() - 1;
+    let holds = |key: usize| starts[key] <= time && time < starts[key + 1];
+    // Times mostly increase: there and next before searching.
+    let key = if near < last && holds(near) {
+        near
+    } else if time >= starts[last] {
+        return HELD | last as u32;
+    } else if time < starts[0] {
+        return HELD;
+    } else if near + 1 < last && holds(near + 1) {
+        near + 1
+    } else {
+        starts.partition_point(|&start| start <= time) - 1
+    };
+    key as u32 | if time == starts[key] { HELD } else { 0 }
+}
+
 /// A sample that is a key itself.
 #[inline(always)]
 fn held(key: usize) -> Sample {
     Sample {
         key: HELD | key as u32,
         parameter: 0.0,
+    }
+}
+
+/// Times that have been looked up, of which the parameters are worked out together.
+pub(crate) struct TimeLanes {
+    /// What gives each: of no concern here.
+    pub(crate) sources: [u32; Self::LEN],
+    times: [f64; Self::LEN],
+    starts: [f64; Self::LEN],
+    ends: [f64; Self::LEN],
+    pub(crate) count: usize,
+}
+
+impl TimeLanes {
+    pub(crate) const LEN: usize = LANES;
+
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self {
+            sources: [0; Self::LEN],
+            times: [0.0; Self::LEN],
+            starts: [0.0; Self::LEN],
+            ends: [1.0; Self::LEN],
+            count: 0,
+        }
+    }
+
+    /// Adds a time between two others.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, source: u32, time: f64, start: f64, end: f64) {
+        let lane = self.count % Self::LEN;
+        self.sources[lane] = source;
+        self.times[lane] = time;
+        (self.starts[lane], self.ends[lane]) = (start, end);
+        self.count = lane + 1;
+    }
+
+    /// Where between its two others each lies, as `TimePlan::parameter`.
+    #[inline(always)]
+    pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
+        let mut parameters = [0.0; Self::LEN];
+        for lane in 0..Self::LEN {
+            let seconds = self.ends[lane] - self.starts[lane];
+            let middle = self.starts[lane] + seconds * 0.5;
+            let scale = finite_scale(1.0 / seconds);
+            parameters[lane] = round_f32(self.times[lane] - middle) * scale + 0.0;
+        }
+        parameters
     }
 }

@@ -145,7 +145,7 @@ impl Prepared {
         let mut spans = SpanBlocks::new(self, part, clock, samples.clone());
         let mut block = SpanBlock::new();
         while let Some(own) = spans.fill(&mut block) {
-            for j in block.occupied() {
+            for j in block.occupied {
                 let span = own.start + j;
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
                 let key = self.spans.keys[span];

@@ -25,8 +25,8 @@ pub(crate) struct SpanBlock {
     pub(crate) offset: [f32; Self::LEN],
     /// Whether all distances of samples are whole numbers of f32.
     pub(crate) are_near: bool,
-    /// A bit for each span that holds samples.
-    occupied: u32,
+    /// The spans that hold samples, by their places in the block.
+    pub(crate) occupied: Occupied,
 }
 
 impl SpanBlock {
@@ -43,15 +43,8 @@ impl SpanBlock {
             scale: [0.0; Self::LEN],
             offset: [0.0; Self::LEN],
             are_near: true,
-            occupied: 0,
+            occupied: Occupied::default(),
         }
-    }
-
-    /// The spans that hold samples, by their places in the block. Where keys are denser than
-    /// samples no processor guesses which these are.
-    #[inline(always)]
-    pub(crate) fn occupied(&self) -> Occupied {
-        Occupied(self.occupied)
     }
 
     /// What a cubic of the `j`th span that is evaluated in f64 needs.
@@ -63,8 +56,10 @@ impl SpanBlock {
     }
 }
 
-/// The places of bits that are set, in order.
-pub(crate) struct Occupied(u32);
+/// A bit for each of some spans that holds samples, and their places in order. Where keys are
+/// denser than samples no processor guesses which these are.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Occupied(pub(crate) u64);
 
 impl Iterator for Occupied {
     type Item = usize;
@@ -73,7 +68,7 @@ impl Iterator for Occupied {
     fn next(&mut self) -> Option<usize> {
         let place = self.0.trailing_zeros();
         self.0 &= self.0.wrapping_sub(1);
-        (place < u32::BITS).then_some(place as usize)
+        (place < u64::BITS).then_some(place as usize)
     }
 }
 
@@ -193,9 +188,9 @@ impl<C: Clock> InLanes for Fill<'_, C> {
         // No span is behind the last one's end: there `first` is 0.
         let mut occupied = 0;
         for j in 0..SpanBlock::LEN {
-            occupied |= u32::from(firsts[j] < firsts[j + 1]) << j;
+            occupied |= u64::from(firsts[j] < firsts[j + 1]) << j;
         }
-        block.occupied = occupied;
+        block.occupied = Occupied(occupied);
     }
 }
 

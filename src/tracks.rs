@@ -14,7 +14,7 @@ use std::ops::Range;
 
 pub use check::NORM_TOLERANCE;
 pub(crate) use check::{LATEST, ROUNDING};
-use check::{check_times, unit_key};
+use check::{any_turns, check_times, unit_key};
 pub use error::TrackError;
 use glam::{DVec3, Quat};
 use key_data::KeyData;
@@ -51,6 +51,8 @@ pub struct TrackSet {
     span: Option<(f64, f64)>,
     /// Keys of the longest track.
     longest: usize,
+    /// Whether the sign of a key may be turned by the one before it.
+    turns: bool,
 }
 
 /// Where a track's keys and times lie in the pools of its set; tracks whose
@@ -112,6 +114,7 @@ impl TrackSet {
                 }
             }
         }
+        self.turns = self.turns || any_turns(&self.keys[first_key..]);
         let first_time = self.share_or_append(times);
         self.tracks.push(TrackRange {
             first_key,
@@ -153,6 +156,7 @@ impl TrackSet {
         for (place, key) in keys.iter_mut().enumerate() {
             *key = unit_key(place / len, place % len, *key)?;
         }
+        let turns = keys.chunks(len).any(any_turns);
         let range = |track| TrackRange {
             first_key: track * len,
             first_time: 0,
@@ -164,6 +168,7 @@ impl TrackSet {
             span: (!keys.is_empty()).then(|| (times[0], times[len - 1])),
             keys,
             times,
+            turns,
             ..Self::default()
         })
     }
@@ -196,6 +201,13 @@ impl TrackSet {
     /// Keys of the track that has most.
     pub(crate) fn longest(&self) -> usize {
         self.longest
+    }
+
+    /// Whether the sign of any key may be turned by the one before it in its track: where
+    /// none is, which is usual, nobody need look at them all again.
+    #[inline]
+    pub(crate) fn turns(&self) -> bool {
+        self.turns
     }
 
     /// Whether the set has no tracks.

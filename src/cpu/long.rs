@@ -70,19 +70,12 @@ impl CpuEngine {
         interpolation.ends.check(track.keys, index)?;
         let last = track.keys.len() - 1;
         let clock = FrameClock::new(*rate, *start, track.times[last]);
-        let all = track.keys.len();
-        let stretch = |first_key: usize, last_key: usize| Stretch {
-            times: &track.times[first_key..=last_key],
-            keys: &track.keys[first_key..=last_key],
-            index,
-            first_key,
-            all,
-        };
+        let whole = Stretch::whole(set, index);
         let firsts: Vec<usize> = (0..last).step_by(STRETCH).collect();
         let last_of = |first: usize| (first + STRETCH).min(last);
         let new = || Sampled::new(interpolation, straight);
         let align = |sampled: &mut Sampled<'_>, &first: &usize| {
-            sampled.align(stretch(first, last_of(first)), 1.0)
+            sampled.align(whole.between(first, last_of(first)), 1.0)
         };
         let flips: Vec<f32> = self.on_threads(|| {
             let flips = firsts.par_iter().map_init(new, align);
@@ -110,7 +103,7 @@ impl CpuEngine {
                     true => sign * flip(keys[start], keys[first]),
                     false => sign,
                 };
-                let stretch = stretch(start, (last_of(first) + beside).min(last));
+                let stretch = whole.between(start, (last_of(first) + beside).min(last));
                 if sampled.stretch(stretch, before, clock, &window, own)? {
                     let row = Row {
                         first: window.start,

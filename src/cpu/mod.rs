@@ -48,7 +48,7 @@ pub(crate) use long::{first_sample, is_in_stretches};
 pub(crate) use matrix::rows;
 pub(crate) use mend::{LEFT_OUT, Row};
 pub(crate) use poses::{add, blend, mix, world};
-pub(crate) use sample_lanes::Turns;
+pub(crate) use sample_lanes::any_turns;
 pub(crate) use sampled::{Straight, straight};
 pub(crate) use sine_cosine::{short_sine_and_fall, sine_and_fall};
 pub(crate) use store_axis_angle::axis_angle;

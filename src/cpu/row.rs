@@ -96,7 +96,7 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         }
         let sources = &prepared.spans.sources[own.clone()];
         let keys = &prepared.spans.keys[own];
-        for j in block.occupied() {
+        for j in block.occupied {
             let (source, key) = (sources[j], keys[j]);
             let (first, last) = (block.first[j], block.first[j + 1]);
             let made = first - samples.start..last - samples.start;

@@ -3,13 +3,15 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use super::dispatch::InLanes;
+use super::dispatch::{InLanes, in_lanes};
 use super::evaluate::canonical;
 use super::evaluate_arc::{on_arc, square};
 use super::evaluate_polynomial::polynomial;
 use super::lanes::{self, Lanes, Number};
 use crate::method::Form;
-use crate::prepare::{ARC_LANES, any_turns, arc_anyhow, arc_component, arc_in_lanes, arcs, whole};
+use crate::prepare::{
+    self, ARC_LANES, arc_anyhow, arc_component, arc_in_lanes, arcs, may_turn, whole,
+};
 use crate::segment::Sample;
 use crate::segment::shader::HELD;
 
@@ -211,15 +213,28 @@ impl InLanes for ArcRun<'_> {
     }
 }
 
-/// [`any_turns`].
-pub(crate) struct Turns<'a> {
-    pub(crate) keys: &'a [[f32; 4]],
-    pub(crate) any: bool,
+/// To look at so many keys one by one takes no longer than to call what looks at lanes.
+const FEW: usize = 4;
+
+/// Whether the sign of any key after the first of some is turned, or in doubt.
+#[inline]
+pub(crate) fn any_turns(keys: &[[f32; 4]]) -> bool {
+    if keys.len() <= FEW {
+        return (keys.windows(2)).any(|pair| may_turn(pair[0], pair[1]));
+    }
+    let mut turns = Turns { keys, any: false };
+    in_lanes(&mut turns);
+    turns.any
+}
+
+struct Turns<'a> {
+    keys: &'a [[f32; 4]],
+    any: bool,
 }
 
 impl InLanes for Turns<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        self.any = any_turns::<L>(self.keys);
+        self.any = prepare::any_turns::<L>(self.keys);
     }
 }

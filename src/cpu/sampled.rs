@@ -10,7 +10,7 @@ use glam::Quat;
 use super::cubic_lanes::CubicBlock;
 use super::dispatch::in_lanes;
 use super::mend::LEFT_OUT;
-use super::sample_lanes::{ArcRun, LANES, SampleBlock, Turns};
+use super::sample_lanes::{ArcRun, LANES, SampleBlock};
 use crate::branchless::{dot, unit};
 use crate::clock::{Ticks, Timeline};
 use crate::cycle::Sides;
@@ -128,15 +128,8 @@ impl<'a> Sampled<'a> {
         let samples = timeline.len();
         let mut output = output.iter_mut();
         for index in tracks {
-            let (times, keys) = set.times_and_keys(index);
-            self.interpolation.ends.check(keys, index)?;
-            let stretch = Stretch {
-                times,
-                keys,
-                index,
-                first_key: 0,
-                all: keys.len(),
-            };
+            let stretch = Stretch::whole(set, index);
+            self.interpolation.ends.check(stretch.keys, index)?;
             self.align(stretch, 1.0)?;
             if self.is_left_out {
                 self.leave_out(samples, &mut output);
@@ -144,7 +137,7 @@ impl<'a> Sampled<'a> {
             }
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
-                    let latest = times[times.len() - 1];
+                    let latest = stretch.times[stretch.times.len() - 1];
                     let clock = FrameClock::new(*rate, *start, latest);
                     self.frames(stretch, clock, &(0..samples), &mut output)?;
                 }
@@ -197,9 +190,8 @@ impl<'a> Sampled<'a> {
                 return Ok(sign);
             }
         }
-        let mut turns = Turns { keys, any: false };
-        in_lanes(&mut turns);
-        if turns.any && self.interpolation.path == Path::AsAuthored {
+        let turns = stretch.turns();
+        if turns && self.interpolation.path == Path::AsAuthored {
             for (i, pair) in keys.windows(2).enumerate() {
                 if self
                     .interpolation
@@ -213,7 +205,7 @@ impl<'a> Sampled<'a> {
                 }
             }
             self.is_left_out = true;
-        } else if turns.any {
+        } else if turns {
             self.signs.reserve(keys.len());
             for pair in keys.windows(2) {
                 self.signs.push(sign);

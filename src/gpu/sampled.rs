@@ -181,11 +181,7 @@ impl KeySlot {
         lent: &Borrowed<'_>,
         output: Range<usize>,
     ) -> Result<(), Error> {
-        let [mut key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
-        let lent_keys = lent.keys.as_ref().filter(|_| !piece.turns());
-        if lent_keys.is_some() {
-            key_bytes = 0;
-        }
+        let [key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
         let place = match &lent.target {
             Target::Lent(memory) if !output.is_empty() => {
                 rotation_bytes = 0;
@@ -198,28 +194,35 @@ impl KeySlot {
         let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
             Slot::grow(device, buffer, bytes as u64, residence)
         };
-        room(&mut self.keys, key_bytes, Residence::Upload)?;
         room(&mut self.samples, sample_bytes, Residence::Upload)?;
         room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
         room(&mut self.joints, joint_bytes.max(1), Residence::Upload)?;
-        let (Some(keys), Some(samples), Some(rotations), Some(joints)) = (
-            &mut self.keys,
-            &mut self.samples,
-            &self.rotations,
-            &mut self.joints,
-        ) else {
+        let (Some(samples), Some(rotations), Some(joints)) =
+            (&mut self.samples, &self.rotations, &mut self.joints)
+        else {
             unreachable!("grown above");
         };
-        piece.write(
-            match lent_keys {
-                Some(keys) => Keys::Lent(keys.start() / size_of::<Quat>()),
-                None => Keys::Copied(bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes))),
-            },
-            bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
-            bytemuck::cast_slice_mut(joints.bytes_mut(0..joint_bytes)),
-        )?;
+        let mut write = |keys: Keys<'_>| {
+            piece.write(
+                keys,
+                bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
+                bytemuck::cast_slice_mut(joints.bytes_mut(0..joint_bytes)),
+            )
+        };
+        let keys = match &lent.keys {
+            Some(keys) if write(Keys::Lent(keys.start() / size_of::<Quat>()))? => keys.binding(),
+            _ => {
+                room(&mut self.keys, key_bytes, Residence::Upload)?;
+                let Some(keys) = &mut self.keys else {
+                    unreachable!("grown above");
+                };
+                let copied = bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes));
+                write(Keys::Copied(copied))?;
+                Binding::whole(keys)
+            }
+        };
         let bindings = [
-            lent_keys.map_or_else(|| Binding::whole(keys), Lent::binding),
+            keys,
             Binding::whole(samples),
             place.unwrap_or_else(|| Binding::whole(rotations)),
             Binding::whole(joints),

@@ -9,8 +9,9 @@ use super::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
 use crate::clock::{FramesError, Ticks, Timeline};
 use crate::cpu::{FEW, InLanes, Lanes, in_lanes};
 use crate::cycle::Cycle;
-use crate::frame_clock::{FrameClock, finite_scale};
+use crate::frame_clock::FrameClock;
 use crate::numeric::round_f32;
+use crate::plan::TimeLanes;
 use crate::prepare::{ClipData, NONE, Part, Prepared, Source};
 use crate::rotations::Layout;
 use crate::schedule::{Distance, Run, RunSource, runs_after, runs_before};
@@ -230,7 +231,7 @@ impl Piece<'_> {
         let (prepared, window) = (self.prepared, self.all.window);
         let (track, samples) = (part.track as usize, &window.samples);
         runs_before(prepared, part, clock, samples, &mut |run| {
-            self.tell(track, run)
+            self.tell(track, run);
         });
         let row = window.place(track, samples.start);
         let mut spans = SpanBlocks::new(prepared, part, clock, samples.clone());
@@ -241,7 +242,7 @@ impl Piece<'_> {
             }
             let sources = &prepared.spans.sources[own.clone()];
             let keys = &prepared.spans.keys[own];
-            for j in block.occupied() {
+            for j in block.occupied {
                 let (first, last) = (block.first[j], block.first[j + 1]);
                 let is_held = keys[j] != NONE && block.is_held[j] == 1;
                 let place = row + first - samples.start;
@@ -332,62 +333,55 @@ impl Piece<'_> {
     /// some of them together.
     #[inline(always)]
     fn tell_few(&mut self, times: &[f64], stride: usize) {
-        let (prepared, samples) = (self.prepared, self.all.window.samples.clone());
-        let mut found = Found {
-            sources: [0; LANES],
-            times: [0.0; LANES],
-            starts: [0.0; LANES],
-            ends: [0.0; LANES],
-            parameters: [0.0; LANES],
-        };
-        for parts in self.parts.chunks(LANES / samples.len().max(1)) {
-            let mut count = 0;
+        let samples = self.all.window.samples.clone();
+        let mut found = TimeLanes::new();
+        for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
+            found.count = 0;
             for part in parts {
                 let own = &times[part.track as usize * stride..];
                 for sample in samples.clone() {
-                    let time = own[sample];
-                    let span = prepared.span_at(part, time);
-                    let (source, start, end) = match span {
-                        Some((span, end)) => {
-                            let start = prepared.spans.starts[span];
-                            let key = prepared.spans.keys[span];
-                            match prepared.spans.sources[span] {
-                                _ if time == start && key != NONE => (key | HOLD, 0.0, 1.0),
-                                Source::Segment(index) => (index, start, end),
-                                Source::Constant(constant) => (constant | HOLD, 0.0, 1.0),
-                                Source::Exact(_) => self.tell_outside(part, own, sample),
-                            }
-                        }
-                        None => self.tell_outside(part, own, sample),
-                    };
-                    found.sources[count] = source;
-                    found.times[count] = time;
-                    (found.starts[count], found.ends[count]) = (start, end);
-                    count += 1;
+                    let (source, start, end) = self.look_up(part, own, sample);
+                    found.push(source, own[sample], start, end);
                 }
             }
-            found.work_out();
-            let own = &mut self.singles[self.told..][..count];
-            for (j, single) in own.iter_mut().enumerate() {
+            let parameters = found.parameters();
+            let own = &mut self.singles[self.told..][..found.count];
+            for (lane, single) in own.iter_mut().enumerate() {
                 *single = Single {
-                    source: found.sources[j],
-                    parameter: found.parameters[j],
+                    source: found.sources[lane],
+                    parameter: parameters[lane],
                 };
             }
-            self.told += count;
+            self.told += found.count;
         }
     }
 
-    /// What `tell_few` tells where that takes more than to look. Apart, so that what is usual
-    /// stays small.
+    /// What gives a sample of a part, and from when till when.
+    #[inline(always)]
+    fn look_up(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
+        let (prepared, time) = (self.prepared, times[sample]);
+        if let Some((span, end)) = prepared.span_at(part, time) {
+            let (start, key) = (prepared.spans.starts[span], prepared.spans.keys[span]);
+            match prepared.spans.sources[span] {
+                _ if time == start && key != NONE => return (key | HOLD, 0.0, 1.0),
+                Source::Segment(index) => return (index, start, end),
+                Source::Constant(constant) => return (constant | HOLD, 0.0, 1.0),
+                Source::Exact(_) => {}
+            }
+        }
+        (self.tell_outside(part, times, sample) | HOLD, 0.0, 1.0)
+    }
+
+    /// The constant that gives a sample where that takes more than to look, or the host does.
+    /// Apart, so that what is usual stays small.
     #[inline(never)]
-    fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
+    fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
         let (all, track) = (self.all, part.track as usize);
         // Replaced: every time lies somewhere in a whole track, or outside.
         let mut source = RunSource::Constant(0);
         let mut found = |run: Run| source = run.source;
         (self.prepared).time_runs(part, times, sample..sample + 1, &mut found);
-        let held = match source {
+        match source {
             RunSource::Constant(constant) => constant,
             RunSource::Segment { .. } => unreachable!("outside a track no segment goes on"),
             RunSource::Exact { index, parameter } => {
@@ -395,34 +389,6 @@ impl Piece<'_> {
                 self.patches.push((all.window.place(track, sample), exact));
                 0
             }
-        };
-        (held | HOLD, 0.0, 1.0)
-    }
-}
-
-/// Samples worked out together, of whole parts.
-const LANES: usize = 64;
-
-/// The spans that hold some times.
-struct Found {
-    sources: [u32; LANES],
-    times: [f64; LANES],
-    starts: [f64; LANES],
-    ends: [f64; LANES],
-    parameters: [f32; LANES],
-}
-
-impl Found {
-    /// As `Prepared::time_source`.
-    #[inline(always)]
-    fn work_out(&mut self) {
-        let mut parameters = [0.0; LANES];
-        for j in 0..LANES {
-            let seconds = self.ends[j] - self.starts[j];
-            let middle = self.starts[j] + seconds * 0.5;
-            let scale = finite_scale(1.0 / seconds);
-            parameters[j] = round_f32(self.times[j] - middle) * scale + 0.0;
         }
-        self.parameters = parameters;
     }
 }

@@ -7,13 +7,14 @@ use rayon::prelude::*;
 
 use super::{KeyJob, KeyPiece, Part, What};
 use crate::clock::{FramesError, Ticks};
-use crate::cpu::{Turns, in_lanes};
+use crate::cpu::{InLanes, Lanes, any_turns, in_lanes};
 use crate::frame_clock::FrameClock;
 use crate::joints::TrackJoints;
-use crate::plan::{FramePlan, Stretch, TimePlan};
-use crate::prepare::{flip, may_turn};
+use crate::plan::{FramePlan, Stretch, TimeLanes, key_before};
+use crate::prepare::flip;
 use crate::segment::shader::{HELD, TURNED};
 use crate::segment::{Joint, Rows, Sample};
+use crate::tracks::TrackSet;
 
 impl KeyPiece<'_, '_> {
     pub(crate) fn rows(&self) -> Rows {
@@ -43,25 +44,14 @@ impl KeyPiece<'_, '_> {
         ]
     }
 
-    /// Whether any of its keys is turned by those before it, or may be.
-    pub(crate) fn turns(&self) -> bool {
-        let set = self.job.set;
-        self.tasks.par_iter().any(|task| match &task.what {
-            What::Part(part) => part.sign < 0.0 || any_turns(part.stretch.keys),
-            What::Tracks(tracks) => {
-                let mut tracks = tracks.clone();
-                tracks.any(|index| any_turns(set.times_and_keys(index).1))
-            }
-        })
-    }
-
-    /// Writes what the kernel reads.
+    /// Writes what the kernel reads; false, and nothing that counts, where keys are lent of
+    /// which one is turned by those before it, or may be.
     pub(crate) fn write(
         &self,
         keys: Keys<'_>,
         mut samples: &mut [Sample],
         mut joints: &mut [Joint],
-    ) -> Result<(), FramesError> {
+    ) -> Result<bool, FramesError> {
         let (mut keys, lent) = match keys {
             Keys::Copied(keys) => (keys, None),
             Keys::Lent(first) => (&mut [][..], Some(first)),
@@ -92,26 +82,46 @@ impl KeyPiece<'_, '_> {
         let rule = self.job.joints();
         let new = || Known {
             frames: FramePlan::new(),
-            times: TimePlan::new(),
             joints: rule.map(|rule| TrackJoints::new(rule, ends)),
         };
-        let ticks = &self.job.timeline.ticks;
-        places
-            .into_par_iter()
-            .try_for_each_init(new, |known, (task, mut written)| {
-                let tracks = match &task.what {
-                    What::Part(part) => return self.write_part(part, known, &mut written),
-                    What::Tracks(tracks) => tracks.clone(),
-                };
-                if let (Ticks::Times { times, stride }, Some(first)) = (ticks, written.lent) {
-                    let samples = written.samples;
-                    self.write_times(tracks, (times, *stride), first, known, samples);
-                    return Ok(());
-                }
-                tracks.into_iter().try_for_each(|index| {
-                    self.write_part(&self.job.track(index), known, &mut written)
-                })
-            })
+        let written =
+            places
+                .into_par_iter()
+                .try_for_each_init(new, |known, (task, mut written)| {
+                    let tracks = match &task.what {
+                        What::Part(part) => return self.write_part(part, known, &mut written),
+                        What::Tracks(tracks) => tracks.clone(),
+                    };
+                    if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
+                        let mut of_tracks = TimesOfTracks {
+                            set: self.job.set,
+                            tracks: tracks.clone(),
+                            times,
+                            stride: *stride,
+                            each: self.job.timeline.len(),
+                            first_key: written.place_of(self.job.set, tracks.start, 0),
+                            samples: std::mem::take(&mut written.samples),
+                            looks: written.lent.is_some() && self.job.set.turns(),
+                            turns: false,
+                        };
+                        in_lanes(&mut of_tracks);
+                        if written.lent.is_some() {
+                            return if of_tracks.turns {
+                                Err(Stop::Turned)
+                            } else {
+                                Ok(())
+                            };
+                        }
+                    }
+                    tracks.into_iter().try_for_each(|index| {
+                        self.write_part(&self.job.track(index), known, &mut written)
+                    })
+                });
+        match written {
+            Ok(()) => Ok(true),
+            Err(Stop::Turned) => Ok(false),
+            Err(Stop::Frames(error)) => Err(error),
+        }
     }
 
     fn write_part<'p>(
@@ -119,27 +129,21 @@ impl KeyPiece<'_, '_> {
         part: &Part<'p>,
         known: &mut Known<'p>,
         written: &mut Written<'_>,
-    ) -> Result<(), FramesError> {
+    ) -> Result<(), Stop> {
         let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
-        let first_key = match written.lent {
-            Some(first) => {
-                let Stretch {
-                    index, first_key, ..
-                } = part.stretch;
-                first + self.job.set.keys_of(0..index) + first_key
-            }
-            None => {
-                let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
-                own.copy_from_slice(keys);
-                turned(&part.stretch, part.sign, |key| own[key][0] |= TURNED);
-                written.keys = others;
-                written.next_key
-            }
-        };
+        let first_key = written.place_of(self.job.set, part.stretch.index, part.stretch.first_key);
+        if written.lent.is_none() {
+            let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
+            own.copy_from_slice(keys);
+            turned(&part.stretch, part.sign, |key| own[key][0] |= TURNED);
+            written.keys = others;
+        } else if part.sign < 0.0 || part.stretch.turns() {
+            return Err(Stop::Turned);
+        }
         if !written.samples.is_empty() {
             let all = std::mem::take(&mut written.samples);
             let (own, others) = all.split_at_mut(part.window.len());
-            self.write_samples(part, first_key as u32, own, known)?;
+            self.write_frames(part, first_key as u32, own, known)?;
             written.samples = others;
         }
         if let (Some(joints), false) = (&mut known.joints, written.joints.is_empty()) {
@@ -158,7 +162,8 @@ impl KeyPiece<'_, '_> {
         Ok(())
     }
 
-    fn write_samples<'p>(
+    /// Where the samples of a part lie, but those at explicit times.
+    fn write_frames<'p>(
         &self,
         part: &Part<'p>,
         first_key: u32,
@@ -166,63 +171,83 @@ impl KeyPiece<'_, '_> {
         known: &mut Known<'p>,
     ) -> Result<(), FramesError> {
         let KeyJob { set, timeline, .. } = self.job;
-        let index = part.stretch.index;
-        match &timeline.ticks {
-            Ticks::Frames { rate, start } => {
-                let all = set.times_and_keys(index).0;
-                let clock = FrameClock::new(*rate, *start, all[all.len() - 1]);
-                let found = known.frames.samples(part.stretch, clock, &part.window)?;
-                for (sample, found) in samples.iter_mut().zip(found) {
-                    *sample = Sample {
-                        key: found.key + first_key,
-                        ..*found
-                    };
-                }
-            }
-            Ticks::Times { times, stride } => {
-                let times = &times[index * stride..][..samples.len()];
-                known
-                    .times
-                    .write(part.stretch.times, times, first_key, samples);
-            }
+        let Ticks::Frames { rate, start } = timeline.ticks else {
+            return Ok(());
+        };
+        let all = set.times_and_keys(part.stretch.index).0;
+        let clock = FrameClock::new(rate, start, all[all.len() - 1]);
+        let found = known.frames.samples(part.stretch, clock, &part.window)?;
+        for (sample, found) in samples.iter_mut().zip(found) {
+            *sample = Sample {
+                key: found.key + first_key,
+                ..*found
+            };
         }
         Ok(())
     }
+}
 
-    /// The samples of whole tracks, which may be many with a sample each, where keys are
-    /// read as they are stored; `first` is the place of the set's first one.
-    fn write_times(
-        &self,
-        tracks: Range<usize>,
-        (times, stride): (&[f64], usize),
-        first: usize,
-        known: &mut Known<'_>,
-        samples: &mut [Sample],
-    ) {
-        let KeyJob { set, timeline, .. } = self.job;
-        let mut first_key = (first + set.keys_of(0..tracks.start)) as u32;
-        for (index, samples) in tracks.zip(samples.chunks_mut(timeline.len().max(1))) {
-            let (starts, keys) = set.times_and_keys(index);
-            let times = &times[index * stride..][..samples.len()];
-            known.times.write(starts, times, first_key, samples);
+/// Explicit times of some tracks, which may be many with a sample each.
+struct TimesOfTracks<'a> {
+    set: &'a TrackSet,
+    tracks: Range<usize>,
+    /// As in [`Ticks::Times`].
+    times: &'a [f64],
+    stride: usize,
+    /// Samples of each track.
+    each: usize,
+    /// The place of the tracks' first key.
+    first_key: usize,
+    samples: &'a mut [Sample],
+    /// Whether to look for keys that those before them turn.
+    looks: bool,
+    /// Whether there are any, or may be.
+    turns: bool,
+}
+
+impl InLanes for TimesOfTracks<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (mut first_key, mut done) = (self.first_key as u32, 0);
+        let mut found = TimeLanes::new();
+        for index in self.tracks.clone() {
+            let (starts, keys) = self.set.times_and_keys(index);
+            if self.looks && any_turns(bytemuck::cast_slice(keys)) {
+                self.turns = true;
+                return;
+            }
+            let mut near = 0;
+            for &time in &self.times[index * self.stride..][..self.each] {
+                let key = key_before(starts, time, near);
+                near = (key & !HELD) as usize;
+                let (start, end) = match key & HELD {
+                    0 => (starts[near], starts[near + 1]),
+                    _ => (0.0, 1.0),
+                };
+                found.push(key + first_key, time, start, end);
+                if found.count == TimeLanes::LEN {
+                    done += found.write(&mut self.samples[done..]);
+                }
+            }
             first_key += keys.len() as u32;
         }
+        found.write(&mut self.samples[done..]);
     }
 }
 
-impl TimePlan {
-    /// Where times lie among keys, the first of which has the place `first_key`.
+impl TimeLanes {
+    /// Writes the samples that wait; how many.
     #[inline(always)]
-    fn write(&mut self, starts: &[f64], times: &[f64], first_key: u32, samples: &mut [Sample]) {
-        let mut near = 0;
-        for (sample, &time) in samples.iter_mut().zip(times) {
-            let found = self.sample(starts, time, near);
-            near = (found.key & !HELD) as usize;
+    fn write(&mut self, samples: &mut [Sample]) -> usize {
+        let count = std::mem::take(&mut self.count);
+        let parameters = self.parameters();
+        for (lane, sample) in samples[..count].iter_mut().enumerate() {
             *sample = Sample {
-                key: found.key + first_key,
-                ..found
+                key: self.sources[lane],
+                parameter: parameters[lane],
             };
         }
+        count
     }
 }
 
@@ -237,7 +262,6 @@ pub(crate) enum Keys<'w> {
 /// What a thread finds out, and keeps for the next track.
 struct Known<'p> {
     frames: FramePlan<'p>,
-    times: TimePlan,
     /// Those of cubics.
     joints: Option<TrackJoints<'p>>,
 }
@@ -253,25 +277,31 @@ struct Written<'w> {
     lent: Option<usize>,
 }
 
-/// To look at so many keys one by one takes no longer than to call what looks at lanes.
-const FEW: usize = 4;
-
-/// Whether the sign of any key after the first is turned, or may be.
-#[inline]
-fn any_turns(keys: &[Quat]) -> bool {
-    let keys: &[[f32; 4]] = bytemuck::cast_slice(keys);
-    if keys.len() > FEW {
-        let mut turns = Turns { keys, any: false };
-        in_lanes(&mut turns);
-        return turns.any;
+impl Written<'_> {
+    /// The place of a track's key, which is the next one where keys are copied.
+    fn place_of(&self, set: &TrackSet, track: usize, key: usize) -> usize {
+        self.lent
+            .map_or(self.next_key, |first| first + set.keys_of(0..track) + key)
     }
-    (keys.windows(2)).any(|pair| may_turn(pair[0], pair[1]))
+}
+
+/// Why a thread writes no more.
+enum Stop {
+    /// A key that is lent is turned.
+    Turned,
+    Frames(FramesError),
+}
+
+impl From<FramesError> for Stop {
+    fn from(error: FramesError) -> Self {
+        Self::Frames(error)
+    }
 }
 
 /// Calls `turn` for each key whose sign those before it turn, where the first one's is
 /// given; the sign of the last.
 pub(super) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
-    if first > 0.0 && !any_turns(stretch.keys) {
+    if first > 0.0 && !stretch.turns() {
         return first;
     }
     let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
