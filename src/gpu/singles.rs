@@ -51,10 +51,11 @@ impl<'a> Singles<'a> {
         let (mut spans, mut parts, mut groups) = (0, 0, Vec::new());
         for (group, prepared) in clip.groups.iter().enumerate() {
             let own = parts_in(prepared, window);
-            let (Some(first), Some(last)) = (own.first(), own.last()) else {
+            if own.is_empty() {
                 continue;
-            };
-            spans += last.spans.end - first.spans.start;
+            }
+            // Parts have about as many spans each, which need not lie in their order.
+            spans += prepared.spans.starts.len() * own.len() / prepared.parts.len();
             parts += own.len();
             groups.push((group, prepared, own));
         }
