@@ -3,8 +3,8 @@
 use glam::{DQuat, Quat};
 
 use super::TrackError;
+use crate::cpu;
 use crate::numeric::{canonical, to_f64, unit_f32};
-use crate::prepare::may_turn;
 
 /// Norms further from 1 than this are refused by [`TrackSet::push`](super::TrackSet::push): such a key
 /// is more likely a mistake than a rotation.
@@ -68,8 +68,7 @@ pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, Tra
 
 /// Whether the sign of any of a track's keys is turned by the one before it, or may be.
 pub(super) fn any_turns(keys: &[Quat]) -> bool {
-    let turns = |pair: &[Quat]| may_turn(pair[0].to_array(), pair[1].to_array());
-    keys.windows(2).any(turns)
+    cpu::any_turns(bytemuck::cast_slice(keys))
 }
 
 #[cfg(test)]
