@@ -31,7 +31,7 @@ pub(crate) struct Stretch<'a> {
     pub(crate) first_key: usize,
     /// Keys of the whole track.
     pub(crate) all: usize,
-    /// Whether those before them turn the sign of any key of the set.
+    /// Whether the sign of any key of the set is turned by those before it, or may be.
     turns: bool,
 }
 
