@@ -3,8 +3,7 @@
 //! A curve is sampled at Chebyshev nodes, and each component of the rotation becomes
 //! the polynomial through the samples. One node is the middle, which the polynomial
 //! meets exactly; the others enter as differences from it, so that f32 serves for
-//! them. Powers come last: a Chebyshev coefficient's rounding error stays small in
-//! their sum, that of a power found directly would not.
+//! them. Powers come last: divided differences keep what f32 rounds small.
 
 use std::array;
 use std::sync::Arc;
@@ -14,7 +13,7 @@ use bytemuck::Zeroable;
 use super::curve::{Curve, Piece};
 use super::intervals::{Intervals, LANES, Lane};
 use super::motion;
-use super::nodes::{EVEN_POWERS, Nodes, ODD_POWERS};
+use super::nodes::Nodes;
 use super::pace::Pace;
 use super::shape::Shape;
 use crate::cpu::{Lanes, canonical};
@@ -339,28 +338,71 @@ pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
     places: &[usize; MOST],
     segments: &mut [PolynomialSegment],
 ) -> L {
-    let means = coefficients(&nodes.even, &samples.even);
-    let halves = coefficients(&nodes.odd, &samples.odd);
+    let mut all = [[[L::all(0.0); PAIRS]; 2]; 4];
     let mut tails = L::all(0.0);
-    for c in 0..4 {
-        let last_even = means[PAIRS - 1][c].magnitude();
-        let last_odd = halves[PAIRS - 1][c].magnitude();
-        let before_last = means[PAIRS - 2][c].magnitude() + halves[PAIRS - 2][c].magnitude();
-        let tail = if are_entire {
-            last_even + L::all(0.125) * last_odd
-        } else {
-            last_even + last_odd + L::all(0.25) * before_last
-        };
-        tails = tail.larger(tails);
+    for (c, own) in all.iter_mut().enumerate() {
+        *own = powers(nodes, samples, c);
+        tails = tail(are_entire, own).larger(tails);
     }
     store(samples.middle, segments, places, 0);
-    for power in 0..PAIRS {
-        let odd = of_power(&ODD_POWERS, &halves, power);
-        store(odd, segments, places, 2 * power + 1);
-        let even = of_power(&EVEN_POWERS, &means, power);
-        store(even, segments, places, 2 * power + 2);
+    let [x, y, z, w] = &all;
+    for i in 0..PAIRS {
+        let odd = [x[0][i], y[0][i], z[0][i], w[0][i]];
+        let even = [x[1][i], y[1][i], z[1][i], w[1][i]];
+        store(odd, segments, places, 2 * i + 1);
+        store(even, segments, places, 2 * i + 2);
     }
     tails
+}
+
+/// The coefficients of s, s³, … and of s², s⁴, … of a component: of Newton's polynomials in
+/// s² through the samples, then of powers.
+#[inline(always)]
+fn powers<L: Lanes, const PAIRS: usize>(
+    nodes: &Nodes<PAIRS>,
+    samples: &Samples<L, PAIRS>,
+    c: usize,
+) -> [[L; PAIRS]; 2] {
+    let mut odd = [L::all(0.0); PAIRS];
+    let mut even = odd;
+    for k in 0..PAIRS {
+        odd[k] = samples.odd[k][c] * L::all(nodes.odd[k]);
+        even[k] = samples.even[k][c] * L::all(nodes.even[k]);
+    }
+    for l in 1..PAIRS {
+        for k in (l..PAIRS).rev() {
+            let quotient = L::all(nodes.quotients[l][k]);
+            odd[k] = (odd[k] - odd[k - 1]) * quotient;
+            even[k] = (even[k] - even[k - 1]) * quotient;
+        }
+    }
+    for k in (0..PAIRS - 1).rev() {
+        let square = L::all(nodes.squares[k]);
+        for i in k..PAIRS - 1 {
+            odd[i] = odd[i] - odd[i + 1] * square;
+            even[i] = even[i] - even[i + 1] * square;
+        }
+    }
+    [odd, even]
+}
+
+/// What the fit of a component leaves out, twice, about: from the last Chebyshev
+/// coefficients, by those of powers.
+#[inline(always)]
+fn tail<L: Lanes, const PAIRS: usize>(are_entire: bool, [odd, even]: &[[L; PAIRS]; 2]) -> L {
+    // That of sⁿ in Tₙ(2s) is 2²ⁿ⁻¹, that of sⁿ⁻² is -n 2²ⁿ⁻⁵.
+    let last = L::all(1.0 / (1u64 << (4 * PAIRS - 1)) as f32);
+    let (four, sixteen) = (L::all(4.0), L::all(16.0));
+    let last_odd = odd[PAIRS - 1] * last * four;
+    let last_even = even[PAIRS - 1] * last;
+    if are_entire {
+        return last_even.magnitude() + L::all(0.125) * last_odd.magnitude();
+    }
+    let degree = 2.0 * PAIRS as f32;
+    let odd_before = odd[PAIRS - 2] * last * four * sixteen + last_odd * L::all(degree - 1.0);
+    let even_before = even[PAIRS - 2] * last * sixteen + last_even * L::all(degree);
+    let before_last = odd_before.magnitude() + even_before.magnitude();
+    last_even.magnitude() + last_odd.magnitude() + L::all(0.25) * before_last
 }
 
 /// Stores the coefficients of a power to each lane's segment.
@@ -385,40 +427,4 @@ fn copy<const N: usize>(to: &mut [Lane64; N], start: usize, from: &[Lane; N], la
             to[c][place % LANES] = from[c][usize::from(lane) % LANES];
         }
     }
-}
-
-/// Chebyshev coefficients, from samples. What is the same for all components is brought
-/// once.
-#[inline(always)]
-fn coefficients<L: Lanes, const PAIRS: usize>(
-    nodes: &[[f32; PAIRS]; PAIRS],
-    samples: &[[L; 4]; PAIRS],
-) -> [[L; 4]; PAIRS] {
-    let mut sums = [[L::all(0.0); 4]; PAIRS];
-    for i in 0..PAIRS {
-        for k in 0..PAIRS {
-            let node = L::all(nodes[i][k]);
-            for c in 0..4 {
-                sums[i][c] = sums[i][c] + node * samples[k][c];
-            }
-        }
-    }
-    sums
-}
-
-/// The coefficients of a power, from those of Chebyshev polynomials.
-#[inline(always)]
-fn of_power<L: Lanes, const PAIRS: usize>(
-    powers: &[[f32; 5]; 5],
-    coefficients: &[[L; 4]; PAIRS],
-    power: usize,
-) -> [L; 4] {
-    let mut sums = [L::all(0.0); 4];
-    for i in power..PAIRS {
-        let factor = L::all(powers[i][power]);
-        for c in 0..4 {
-            sums[c] = sums[c] + factor * coefficients[i][c];
-        }
-    }
-    sums
 }

@@ -1,63 +1,48 @@
-//! Chebyshev nodes, and from values at them to the coefficients of powers.
+//! Chebyshev nodes, and what leads from values at them to coefficients of powers.
 
-/// Chebyshev nodes on one side of the middle; one more is the middle.
+/// Chebyshev nodes on one side of the middle, which is one more.
 pub(super) struct Nodes<const PAIRS: usize> {
+    /// In the order in which Newton's polynomials take them: chosen for what f32 rounds.
     pub(super) at: [f32; PAIRS],
-    /// From the sum of the differences at `-s` and `s`, for each node, to the
-    /// coefficients of T₂(2s), T₄(2s), ….
-    pub(super) even: [[f32; PAIRS]; PAIRS],
-    /// From what they differ by to those of T₁(2s), T₃(2s), ….
-    pub(super) odd: [[f32; PAIRS]; PAIRS],
+    pub(super) squares: [f32; PAIRS],
+    /// `1/(2s²)` and `1/(2s)`: from the sum of the differences at `-s` and `s`, and from what
+    /// they differ by, to polynomials in s².
+    pub(super) even: [f32; PAIRS],
+    pub(super) odd: [f32; PAIRS],
+    /// `quotients[l][k]` is 1 / (sₖ² - sₖ₋ₗ²).
+    pub(super) quotients: [[f32; PAIRS]; PAIRS],
 }
 
 /// Nodes of degree 7.
-pub(super) const GENTLE_NODES: Nodes<3> = Nodes {
-    at: [0.48746395, 0.39091575, 0.21694186],
-    even: [
-        [0.25741968, 0.063577406, -0.17813994],
-        [0.17813994, -0.25741968, -0.063577406],
-        [0.063577406, -0.17813994, 0.25741968],
-    ],
-    odd: [
-        [0.27855083, 0.22338042, 0.12396678],
-        [0.22338042, -0.12396678, -0.27855083],
-        [0.12396678, -0.27855083, 0.22338042],
-    ],
-};
+pub(super) const GENTLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.21694186, 0.48746395]);
 
 /// Nodes of degree 11.
-pub(super) const FULL_NODES: Nodes<5> = Nodes {
-    at: [0.49491072, 0.45481598, 0.3778748, 0.27032042, 0.14086628],
-    even: [
-        [0.17445327, 0.11906559, 0.025875425, -0.07553, -0.15295519],
-        [0.15295519, -0.025875425, -0.17445327, -0.11906559, 0.07553],
-        [0.11906559, -0.15295519, -0.07553, 0.17445327, 0.025875425],
-        [0.07553, -0.17445327, 0.15295519, -0.025875425, -0.11906559],
-        [0.025875425, -0.07553, 0.11906559, -0.15295519, 0.17445327],
-    ],
-    odd: [
-        [0.17996754, 0.16538763, 0.13740902, 0.09829833, 0.0512241],
-        [0.16538763, 0.0512241, -0.09829833, -0.17996754, -0.13740902],
-        [0.13740902, -0.09829833, -0.16538763, 0.0512241, 0.17996754],
-        [0.09829833, -0.17996754, 0.0512241, 0.13740902, -0.16538763],
-        [0.0512241, -0.13740902, 0.17996754, -0.16538763, 0.09829833],
-    ],
-};
+pub(super) const FULL_NODES: Nodes<5> =
+    Nodes::new([0.45481598, 0.49491072, 0.14086628, 0.27032042, 0.3778748]);
 
-/// Coefficients of s², s⁴, … in the Chebyshev polynomials T₂(2s), T₄(2s), ….
-pub(super) const EVEN_POWERS: [[f32; 5]; 5] = [
-    [8.0, 0.0, 0.0, 0.0, 0.0],
-    [-32.0, 128.0, 0.0, 0.0, 0.0],
-    [72.0, -768.0, 2048.0, 0.0, 0.0],
-    [-128.0, 2560.0, -16384.0, 32768.0, 0.0],
-    [200.0, -6400.0, 71680.0, -327680.0, 524288.0],
-];
-
-/// Coefficients of s, s³, … in the Chebyshev polynomials T₁(2s), T₃(2s), ….
-pub(super) const ODD_POWERS: [[f32; 5]; 5] = [
-    [2.0, 0.0, 0.0, 0.0, 0.0],
-    [-6.0, 32.0, 0.0, 0.0, 0.0],
-    [10.0, -160.0, 512.0, 0.0, 0.0],
-    [-14.0, 448.0, -3584.0, 8192.0, 0.0],
-    [18.0, -960.0, 13824.0, -73728.0, 131072.0],
-];
+impl<const PAIRS: usize> Nodes<PAIRS> {
+    const fn new(at: [f32; PAIRS]) -> Self {
+        let mut nodes = Self {
+            at,
+            squares: [0.0; PAIRS],
+            even: [0.0; PAIRS],
+            odd: [0.0; PAIRS],
+            quotients: [[0.0; PAIRS]; PAIRS],
+        };
+        let mut k = 0;
+        while k < PAIRS {
+            let s = at[k] as f64;
+            nodes.squares[k] = (s * s) as f32;
+            nodes.even[k] = (0.5 / (s * s)) as f32;
+            nodes.odd[k] = (0.5 / s) as f32;
+            let mut l = 1;
+            while l <= k {
+                let other = at[k - l] as f64;
+                nodes.quotients[l][k] = (1.0 / (s * s - other * other)) as f32;
+                l += 1;
+            }
+            k += 1;
+        }
+        nodes
+    }
+}
