@@ -33,23 +33,28 @@ pub(crate) struct Anywhere;
 impl Algebra for Anywhere {
     type Number = f64;
 
+    #[inline(always)]
     fn exp(&mut self, a: Vector) -> Quaternion {
         exp(a)
     }
 
+    #[inline(always)]
     fn log(&mut self, q: Quaternion) -> Vector {
         log(q)
     }
 
+    #[inline(always)]
     fn log_toward(&mut self, q: Quaternion, axis: Vector) -> Vector {
         log_toward(q, axis)
     }
 
+    #[inline(always)]
     fn log_near(&mut self, q: Quaternion, near: Vector) -> Vector {
         log_near(q, near)
     }
 
     // A wild tangent multiplies the error of a step's logarithm.
+    #[inline(always)]
     fn log_of_step(&mut self, step: Quaternion, _: Vector) -> Vector {
         log(step)
     }

@@ -45,7 +45,7 @@ use std::str::FromStr;
 
 use crate::branchless::Vector;
 use crate::joints::Joints;
-use crate::prepare::{HandleRule, Handles, Interval, Intervals, Shape, Stretch};
+use crate::prepare::{FarKeys, HandleRule, Intervals, Shape, Stretch};
 use crate::reference;
 use crate::tracks::Track;
 
@@ -146,8 +146,8 @@ pub(crate) struct Smooth {
 pub(crate) struct FromKeys {
     /// What tangents are made of, in f32.
     pub(crate) joints: Joints,
-    /// The handles of a key between two intervals, in f64, whatever they are.
-    pub(crate) handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
+    /// Finds the handles of keys that f32 finds none for.
+    pub(crate) find_far: fn(&mut FarKeys),
 }
 
 /// What a method knows of an interval beside its two keys.
@@ -176,7 +176,7 @@ impl Smooth {
         Self {
             direct: Some(FromKeys {
                 joints,
-                handles: R::handles_anywhere,
+                find_far: FarKeys::find::<R>,
             }),
             ..self
         }

@@ -5,15 +5,16 @@
 use std::ops::Range;
 
 use super::Prepared;
-use super::fit::{GENTLE, LONGEST_WHOLE, TOLERANCE};
+use super::far_keys::FarKeys;
+use super::fit::{GENTLE, LONGEST_WHOLE};
 use super::fitting::{Fitting, polynomials};
 use super::gentle_lanes::GentleLanes;
 use super::halves::Halves;
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
 use super::key_joints::KeyJoints;
 use super::key_steps::{FindSteps, KeySteps};
-use super::passes::{Handles, Interval, Steps};
-use super::whole_fit::{GENTLE_WHOLE, List, WHOLE};
+use super::passes::Steps;
+use super::whole_fit::{GENTLE_WHOLE, List, Queue, WHOLE};
 use super::whole_lanes::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
 use crate::cpu::in_lanes;
 use crate::method::{Ends, FromKeys, Path, Smooth};
@@ -31,19 +32,22 @@ pub(super) struct Direct {
     /// The spans and the segments that lanes become.
     spans: [u32; ROOM],
     places: [u32; ROOM],
-    /// Lanes to fit, with few powers and with all.
-    few_powers: List,
+    /// Lanes to fit.
     all_powers: List,
+    /// Lanes to fit with few powers, and where they wait: a block has few of them.
+    few_powers: List,
+    waiting: Queue,
+    waiting_places: [u32; ROOM],
     /// Lanes that are too long for that, or do not fit.
-    long: Vec<usize>,
+    long: List,
     /// Where they wait; made when there is one.
     halves: Option<Box<Halves>>,
     /// Lanes that are left over.
-    left_over: Vec<usize>,
+    left_over: List,
     /// Where they wait; made when there is one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
-    handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
+    find_far: fn(&mut FarKeys),
     smooth: Smooth,
     ends: Ends,
     path: Path,
@@ -58,14 +62,15 @@ impl Direct {
             whole: WholeLanes::new(),
             spans: [0; ROOM],
             places: [0; ROOM],
-            // Always near enough.
-            few_powers: List::new(f32::INFINITY),
-            all_powers: List::new(TOLERANCE),
-            long: Vec::new(),
+            all_powers: List::new(),
+            few_powers: List::new(),
+            waiting: Queue::new(),
+            waiting_places: [0; ROOM],
+            long: List::new(),
             halves: None,
-            left_over: Vec::new(),
+            left_over: List::new(),
             rest: None,
-            handles: how.handles,
+            find_far: how.find_far,
             smooth,
             ends,
             path,
@@ -104,7 +109,7 @@ impl Direct {
             steps: &self.steps,
             joints: &self.joints,
             intervals,
-            handles: self.handles,
+            find_far: self.find_far,
         });
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
@@ -116,32 +121,28 @@ impl Direct {
 
     /// Takes the curves in some lanes: each becomes the source of the next span.
     pub(super) fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>) {
-        let (spans, places) = prepared.new_segments(lanes.len());
-        for (own, span) in self.spans[lanes.clone()].iter_mut().zip(spans) {
-            *own = span as u32;
+        let (first_span, first_place) = prepared.new_segments(lanes.len());
+        for (i, own) in self.spans[lanes.clone()].iter_mut().enumerate() {
+            *own = (first_span + i) as u32;
         }
-        for (own, place) in self.places[lanes.clone()].iter_mut().zip(places) {
-            *own = place as u32;
+        for (i, own) in self.places[lanes.clone()].iter_mut().enumerate() {
+            *own = (first_place + i) as u32;
         }
         let energies = self.whole.energies[lanes.clone()].iter();
         let are_gentle = self.gentle.holds[lanes.clone()].iter();
         for (lane, (&energy, &is_gentle)) in lanes.zip(energies.zip(are_gentle)) {
-            let is_whole = energy <= LONGEST_WHOLE as f32;
             let is_short = energy <= GENTLE as f32;
+            let is_whole = energy <= LONGEST_WHOLE as f32;
             // Which lanes are which cannot be foreseen.
             self.few_powers.push_if(is_short & !is_gentle, lane);
             (self.all_powers).push_if(is_whole & !is_short & !is_gentle, lane);
             if is_gentle {
                 let place = self.places[lane] as usize;
                 self.gentle.write(lane, &mut polynomials(prepared)[place]);
-            } else if !is_whole {
-                let holds = energy <= LONGEST_DIRECT as f32;
-                let longer = if holds {
-                    &mut self.long
-                } else {
-                    &mut self.left_over
-                };
-                longer.push(lane);
+            } else if energy <= LONGEST_DIRECT as f32 {
+                self.long.push_if(!is_whole, lane);
+            } else {
+                self.left_over.push(lane);
             }
         }
     }
@@ -156,39 +157,53 @@ impl Direct {
         is_exact: bool,
         fitting: &mut Fitting,
     ) {
-        self.fit_whole(prepared);
+        self.fit_all_powers(prepared);
+        self.wait(prepared);
         self.cut(prepared, intervals, fitting);
-        let are_many = MOST_ALONE * self.left_over.len() > intervals.count;
+        let are_many = MOST_ALONE * self.left_over.count() > intervals.count;
         if are_many && !is_exact {
             in_lanes(&mut Steps(intervals));
             (self.smooth.curves)(intervals, stretches, self.ends);
         }
         if are_many || is_exact {
-            for lane in self.left_over.drain(..) {
+            for lane in self.left_over.iter() {
                 fitting.queue(prepared, intervals, lane, self.spans[lane] as usize);
             }
-            return;
-        }
-        let mut left_over = &self.left_over[..];
-        for stretch in stretches {
-            let end = stretch.lanes().end;
-            let (own, others) = left_over.split_at(left_over.partition_point(|&lane| lane < end));
-            left_over = others;
-            for run in own.chunk_by(|a, b| a + 1 == *b) {
-                let new = || Box::new(Rest::new(self.path, self.smooth, self.ends));
-                let rest = self.rest.get_or_insert_with(new);
-                if !rest.has_room(run.len()) {
-                    rest.flush(prepared, fitting);
-                }
-                let lanes = run[0]..run[0] + run.len();
-                rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
-            }
+        } else {
+            self.leave(prepared, intervals, stretches, fitting);
         }
         self.left_over.clear();
     }
 
+    /// Lets what is left over wait with its neighbours.
+    fn leave(
+        &mut self,
+        prepared: &mut Prepared,
+        intervals: &Intervals,
+        stretches: &[Stretch],
+        fitting: &mut Fitting,
+    ) {
+        let mut left_over = self.left_over.iter().peekable();
+        for stretch in stretches {
+            let end = stretch.lanes().end;
+            while let Some(first) = left_over.next_if(|&lane| lane < end) {
+                let mut lanes = first..first + 1;
+                while lanes.end < end && left_over.next_if_eq(&lanes.end).is_some() {
+                    lanes.end += 1;
+                }
+                let new = || Box::new(Rest::new(self.path, self.smooth, self.ends));
+                let rest = self.rest.get_or_insert_with(new);
+                if !rest.has_room(lanes.len()) {
+                    rest.flush(prepared, fitting);
+                }
+                rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
+            }
+        }
+    }
+
     /// Has what was left over fitted.
     pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        self.fit_few_powers(prepared);
         if let Some(halves) = &mut self.halves {
             halves.flush(prepared, fitting);
         }
@@ -197,19 +212,33 @@ impl Direct {
         }
     }
 
-    fn fit_whole(&mut self, prepared: &mut Prepared) {
+    fn fit_all_powers(&mut self, prepared: &mut Prepared) {
         let segments = polynomials(prepared);
         let (whole, places) = (&self.whole.numbers, &self.places);
-        let unfit = &mut self.long;
-        (self.few_powers).fit(&GENTLE_WHOLE, whole, places, segments, unfit);
-        (self.all_powers).fit(&WHOLE, whole, places, segments, unfit);
-        self.few_powers.clear();
+        (self.all_powers).fit(&WHOLE, whole, places, segments, &mut self.long);
         self.all_powers.clear();
+    }
+
+    /// Lets curves that few powers serve wait.
+    fn wait(&mut self, prepared: &mut Prepared) {
+        while let Some(lane) = self.few_powers.pop() {
+            let own = self.waiting.push(&self.whole.numbers, lane);
+            self.waiting_places[own] = self.places[lane];
+            if self.waiting.is_full() {
+                self.fit_few_powers(prepared);
+            }
+        }
+    }
+
+    fn fit_few_powers(&mut self, prepared: &mut Prepared) {
+        let (segments, places) = (polynomials(prepared), &self.waiting_places);
+        (self.waiting).fit(&GENTLE_WHOLE, places, segments, &mut self.long);
+        self.waiting.clear();
     }
 
     /// Has the longer curves cut.
     fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
-        for lane in self.long.drain(..) {
+        for lane in self.long.iter() {
             let shape = self.smooth.shape;
             let halves = (self.halves).get_or_insert_with(|| Box::new(Halves::new(shape)));
             let (span, place) = (self.spans[lane], self.places[lane]);
@@ -218,6 +247,7 @@ impl Direct {
                 halves.flush(prepared, fitting);
             }
         }
+        self.long.clear();
     }
 }
 

@@ -74,8 +74,8 @@ impl Fitting {
         curves: &Intervals,
         lanes: Range<usize>,
     ) {
-        let (spans, _) = prepared.new_segments(lanes.len());
-        for (span, lane) in spans.zip(lanes) {
+        let (first_span, _) = prepared.new_segments(lanes.len());
+        for (span, lane) in (first_span..).zip(lanes) {
             self.queue(prepared, curves, lane, span);
         }
     }
@@ -209,17 +209,18 @@ pub(super) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
 }
 
 impl Prepared {
-    /// As many segments, which are zero, each the source of the next span: which spans and
-    /// which segments these are.
+    /// As many segments, which are zero, each the source of the next span: the first of
+    /// these spans and of the segments.
     #[inline]
-    pub(super) fn new_segments(&mut self, count: usize) -> (Range<usize>, Range<usize>) {
+    pub(super) fn new_segments(&mut self, count: usize) -> (usize, usize) {
         let segments = polynomials(self);
         let places = segments.len()..segments.len() + count;
+        let first_place = places.start;
         segments.extend_from_slice(&ZERO[..count]);
         let sources = &mut self.spans.sources;
         let first_span = sources.len();
-        sources.extend(places.clone().map(|place| Source::Segment(place as u32)));
-        (first_span..first_span + count, places)
+        sources.extend(places.map(|place| Source::Segment(place as u32)));
+        (first_span, first_place)
     }
 
     /// Puts the parts of curves that were cut where these are among the spans.
@@ -228,9 +229,9 @@ impl Prepared {
         let Some(first) = cut.first().map(|part| part.span) else {
             return;
         };
-        uncut.clear();
-        uncut.extend(&self.spans, first..self.spans.len());
-        self.spans.truncate(first);
+        std::mem::swap(&mut self.spans, uncut);
+        self.spans.clear();
+        self.spans.extend(uncut, 0..first);
         for part in 0..self.parts.len() {
             let Part { spans, end, .. } = &self.parts[part];
             let (spans, end) = (spans.clone(), *end);
@@ -247,17 +248,13 @@ impl Prepared {
                 let to = cut
                     .first()
                     .map_or(spans.end, |part| part.span.min(spans.end));
-                self.spans.extend(uncut, next - first..to - first);
+                self.spans.extend(uncut, next..to);
                 next = to;
                 if next < spans.end {
                     next += 1;
                     let is_last = next == spans.end;
-                    let end = if is_last {
-                        end
-                    } else {
-                        uncut.starts[next - first]
-                    };
-                    cut = self.put_first(cutter, cut, uncut, to - first, end);
+                    let end = if is_last { end } else { uncut.starts[next] };
+                    cut = self.put_first(cutter, cut, uncut, to, end);
                 }
             }
             self.parts[part].spans = start..self.spans.len();

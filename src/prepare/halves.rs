@@ -6,11 +6,10 @@ use bytemuck::Zeroable as _;
 
 use super::Prepared;
 use super::curve::{Curve, Piece};
-use super::fit::TOLERANCE;
 use super::fitting::{Fitting, polynomials};
 use super::intervals::{LANES, ROOM};
 use super::shape::Shape;
-use super::whole_fit::{HALVES, List};
+use super::whole_fit::{HALVES, List, Queue};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::ratio;
 use crate::method::Quantity;
@@ -19,26 +18,24 @@ use crate::segment::PolynomialSegment;
 /// Such curves.
 pub(super) struct Halves {
     shape: &'static Shape,
-    numbers: CurveNumbers,
+    waiting: Queue,
     durations: [f64; LANES],
     /// The spans that they become, and the segments of their halves.
     spans: [usize; LANES],
     places: [[u32; ROOM]; 2],
-    waiting: List,
     /// Those that do not fit.
-    unfit: Vec<usize>,
+    unfit: List,
 }
 
 impl Halves {
     pub(super) fn new(shape: &'static Shape) -> Self {
         Self {
             shape,
-            numbers: [[[0.0; 4]; ROOM]; 4],
+            waiting: Queue::new(),
             durations: [1.0; LANES],
             spans: [0; LANES],
             places: [[0; ROOM]; 2],
-            waiting: List::new(TOLERANCE),
-            unfit: Vec::new(),
+            unfit: List::new(),
         }
     }
 
@@ -52,47 +49,42 @@ impl Halves {
         span: u32,
         place: u32,
     ) -> bool {
-        let own = self.waiting.lanes().len();
-        for (waiting, numbers) in self.numbers.iter_mut().zip(numbers) {
-            waiting[own] = numbers[lane];
-        }
+        let own = self.waiting.push(numbers, lane);
         self.durations[own] = duration;
         self.spans[own] = span as usize;
         self.places[0][own] = place;
-        self.waiting.push_if(true, own);
-        own + 1 == LANES
+        self.waiting.is_full()
     }
 
     /// Fits them; those that do not fit are cut further.
     pub(super) fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        let count = self.waiting.lanes().len();
+        let count = self.waiting.count();
         let segments = polynomials(prepared);
         for place in &mut self.places[1][..count] {
             *place = segments.len() as u32;
             segments.push(PolynomialSegment::zeroed());
         }
         for (half, places) in HALVES.iter().zip(&self.places) {
-            (self.waiting).fit(half, &self.numbers, places, segments, &mut self.unfit);
+            (self.waiting).fit(half, places, segments, &mut self.unfit);
         }
-        self.waiting.clear();
         for lane in 0..count {
             let span = self.spans[lane];
             let [first, second] = [0, 1].map(|half| self.places[half][lane] as usize);
-            if self.unfit.contains(&lane) {
+            if self.unfit.iter().any(|unfit| unfit == lane) {
                 fitting.take_long(span, self.curve(lane), first);
             } else {
                 fitting.take_halves(span, [first, second]);
             }
         }
+        self.waiting.clear();
         self.unfit.clear();
     }
 
     /// The curve in f64: from the first key on, with the half-rotation vectors that f32 has.
     fn curve(&self, lane: usize) -> Curve {
-        let [start, vectors @ ..] = &self.numbers;
-        let [first, second, third] = vectors.each_ref().map(|vectors| vectors[lane]);
+        let [start, first, second, third] = self.waiting.numbers(lane);
         let own = array::from_fn(|i| match i {
-            0..4 => start[lane][i],
+            0..4 => start[i],
             4..7 => first[i - 4],
             7..10 => second[i - 7],
             _ => third[i - 10],

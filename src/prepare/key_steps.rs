@@ -2,9 +2,7 @@
 //! differences of neighbouring keys, which f32 knows as exactly as the keys.
 
 use super::intervals::{Intervals, ROOM};
-use super::passes::Interval;
 use super::turns::{LOG, Row, log, store};
-use crate::branchless;
 use crate::cpu::{InLanes, Lanes, Turn, chord_of, step_vector};
 use crate::method::Path;
 
@@ -38,22 +36,6 @@ impl KeySteps {
             chords: [0.0; ROOM],
             logs: [[0.0; ROOM]; 3],
             are_in_doubt: false,
-        }
-    }
-}
-
-impl KeySteps {
-    /// An interval in f64.
-    #[inline(never)]
-    pub(super) fn interval(&self, intervals: &Intervals, lane: usize) -> Interval<f64> {
-        let [from, to] = intervals.keys(lane).map(branchless::unit);
-        let flip = f64::from(self.flips[lane]);
-        let step = branchless::step(from, to).map(|component| component * flip);
-        Interval {
-            duration: intervals.durations[lane],
-            step,
-            log: branchless::log(step),
-            key: [0.0; 4],
         }
     }
 }

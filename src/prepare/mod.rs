@@ -9,6 +9,7 @@ mod clip_data;
 mod curve;
 mod cut;
 mod direct;
+mod far_keys;
 mod fit;
 mod fitting;
 mod gentle_lanes;
@@ -37,6 +38,7 @@ pub(crate) use arc_lanes::{
 };
 pub(crate) use clip_data::{ClipData, PartRef, Wanted};
 pub(crate) use curve::Curve;
+pub(crate) use far_keys::FarKeys;
 pub(crate) use intervals::{Intervals, Stretch};
 pub(crate) use passes::{
     BetweenHandles, BetweenNeighbours, ControlRotations, EndHandle, EndInterval, HandleRule,
@@ -153,12 +155,6 @@ impl Spans {
         self.sources
             .extend_from_slice(&other.sources[range.clone()]);
         self.keys.extend_from_slice(&other.keys[range]);
-    }
-
-    fn truncate(&mut self, count: usize) {
-        self.starts.truncate(count);
-        self.sources.truncate(count);
-        self.keys.truncate(count);
     }
 
     fn reserve(&mut self, count: usize) {

@@ -128,11 +128,6 @@ pub(crate) trait HandleRule {
         after: Interval<A::Number>,
     ) -> Handles<A::Number>;
 
-    /// Those of any intervals.
-    fn handles_anywhere(before: Interval<f64>, after: Interval<f64>) -> Handles<f64> {
-        Self::handles(&mut Anywhere, before, after)
-    }
-
     /// The handle of the first or of the last key of a track.
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
@@ -216,7 +211,7 @@ impl Intervals {
             log: self.log(lane),
             key: self.outward(lane),
         };
-        let handles = R::handles_anywhere(interval(lane - 1), interval(lane));
+        let handles = R::handles(&mut Anywhere, interval(lane - 1), interval(lane));
         self.set_incoming(lane, handles.incoming);
         self.set_outgoing(lane, handles.outgoing);
     }

@@ -215,20 +215,19 @@ impl SmoothPreparation {
             self.end_values(prepared, stretch);
             self.beyond(prepared, stretch);
             let latest = prepared.parts[stretch.part].end;
-            let mut holds_frame = [true; LANES];
-            if let Some((rate, start)) = self.frames {
+            let holds_frame = self.frames.map(|(rate, start)| {
                 let mut held = FramesHeld {
                     clock: FrameClock::new(rate, start, latest),
                     intervals: &self.intervals,
-                    held: holds_frame,
+                    held: [true; LANES],
                 };
                 in_lanes(&mut held);
-                holds_frame = held.held;
-            }
+                held.held
+            });
             if self.interpolation.speed == Speed::Constant {
                 self.wait(stretch);
             } else {
-                self.push_spans(prepared, stretch, &holds_frame);
+                self.push_spans(prepared, stretch, holds_frame.as_ref());
             }
         }
         if let Some(direct) = &mut self.direct {
@@ -262,22 +261,26 @@ impl SmoothPreparation {
         &mut self,
         prepared: &mut Prepared,
         stretch: &Stretch,
-        holds_frame: &[bool; LANES],
+        holds_frame: Option<&[bool; LANES]>,
     ) {
         let first_span = prepared.spans.len();
         let starts = &self.intervals.starts[stretch.lanes()];
         prepared.spans.starts.extend_from_slice(starts);
-        let keys = (0..starts.len()).map(|i| stretch.key_at(i));
-        prepared.spans.keys.extend(keys);
+        let (keys, count) = (&mut prepared.spans.keys, starts.len());
+        match stretch.key {
+            NONE => keys.resize(keys.len() + count, NONE),
+            first => keys.extend(first..first + count as u32),
+        }
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
         let lanes = stretch.lanes();
-        let all_hold = lanes.clone().all(|lane| holds_frame[lane]);
+        let holds_frame = |lane: usize| holds_frame.is_none_or(|held| held[lane]);
+        let all_hold = lanes.clone().all(holds_frame);
         let fits_alike = !is_steady && !self.is_frozen() && all_hold;
         if fits_alike {
             self.take(prepared, lanes.clone());
         }
         for (i, lane) in lanes.enumerate().filter(|_| !fits_alike) {
-            let source = if !holds_frame[lane] {
+            let source = if !holds_frame(lane) {
                 Source::Constant(NONE)
             } else if is_steady {
                 let keys = self.intervals.keys(lane);
@@ -299,12 +302,10 @@ impl SmoothPreparation {
             prepared.spans.sources.push(source);
         }
         let spans = &mut prepared.parts[stretch.part].spans;
-        let start = if spans.start == spans.end {
-            first_span
-        } else {
-            spans.start
-        };
-        *spans = start..first_span + stretch.intervals.len();
+        if spans.start == spans.end {
+            spans.start = first_span;
+        }
+        spans.end = first_span + count;
     }
 
     /// Takes the curves in some lanes: each is the source of the next span.

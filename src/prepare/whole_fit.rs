@@ -3,7 +3,7 @@
 
 use bytemuck::Zeroable as _;
 
-use super::fit::{MOST, Samples, interpolate};
+use super::fit::{MOST, Samples, TOLERANCE, interpolate};
 use super::intervals::{LANES, ROOM, rounded};
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::{SineAndFall, Terms};
@@ -13,24 +13,26 @@ use crate::branchless::{normalised, product, scaled, square};
 use crate::cpu::{InLanes, Lanes, both, brought_behind, in_lanes};
 use crate::segment::PolynomialSegment;
 
-/// Lanes whose curves are to be fitted with as many powers.
+/// Some lanes.
 pub(super) struct List {
-    /// See [`super::fit::TOLERANCE`].
-    tolerance: f32,
     count: usize,
     lanes: [u32; ROOM_FOR],
 }
 
-/// As many as a block has, and the last vector; a power of two.
+/// As many as a block has, and the last vector, or each twice; a power of two.
 const ROOM_FOR: usize = 2 * LANES;
 
 impl List {
-    pub(super) fn new(tolerance: f32) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            tolerance,
             count: 0,
             lanes: [0; ROOM_FOR],
         }
+    }
+
+    /// Adds a lane.
+    pub(super) fn push(&mut self, lane: usize) {
+        self.push_if(true, lane);
     }
 
     /// Adds a lane where it `is_wanted`, without a branch.
@@ -40,9 +42,20 @@ impl List {
         self.count += usize::from(is_wanted);
     }
 
+    /// Takes the last one away.
+    pub(super) fn pop(&mut self) -> Option<usize> {
+        self.count = self.count.checked_sub(1)?;
+        Some(self.lanes[self.count] as usize)
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
     /// The lanes.
-    pub(super) fn lanes(&self) -> &[u32] {
-        &self.lanes[..self.count]
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = usize> {
+        self.lanes[..self.count].iter().map(|&lane| lane as usize)
     }
 
     /// Forgets them.
@@ -58,7 +71,7 @@ impl List {
         curves: &CurveNumbers,
         places: &[u32; ROOM],
         segments: &mut Vec<PolynomialSegment>,
-        unfit: &mut Vec<usize>,
+        unfit: &mut List,
     ) {
         if self.count == 0 {
             return;
@@ -77,18 +90,79 @@ impl List {
     }
 }
 
+/// Curves that wait until a block of them is full.
+pub(super) struct Queue {
+    numbers: CurveNumbers,
+    list: List,
+}
+
+impl Queue {
+    pub(super) fn new() -> Self {
+        Self {
+            numbers: [[[0.0; 4]; ROOM]; 4],
+            list: List::new(),
+        }
+    }
+
+    /// Takes the curve in a lane; gives its own.
+    pub(super) fn push(&mut self, numbers: &CurveNumbers, lane: usize) -> usize {
+        let own = self.list.count;
+        for (waiting, numbers) in self.numbers.iter_mut().zip(numbers) {
+            waiting[own] = numbers[lane];
+        }
+        self.list.push(own);
+        own
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.list.count
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.count() == LANES
+    }
+
+    /// A curve's numbers.
+    pub(super) fn numbers(&self, lane: usize) -> [[f32; 4]; 4] {
+        let [start, first, second, third] = &self.numbers;
+        [start[lane], first[lane], second[lane], third[lane]]
+    }
+
+    /// As [`List::fit`].
+    pub(super) fn fit<const PAIRS: usize>(
+        &self,
+        part: &Part<PAIRS>,
+        places: &[u32; ROOM],
+        segments: &mut Vec<PolynomialSegment>,
+        unfit: &mut List,
+    ) {
+        self.list.fit(part, &self.numbers, places, segments, unfit);
+    }
+
+    /// Forgets them.
+    pub(super) fn clear(&mut self) {
+        self.list.clear();
+    }
+}
+
 /// A part of curves' parameter, and the nodes at which they are sampled there.
 pub(super) struct Part<const PAIRS: usize> {
     nodes: &'static Nodes<PAIRS>,
     /// The basis functions at its middle.
     weights: [f32; 3],
     /// What they gain from there on, up to `-s` and to `s` at each node `s`.
-    gains: [[[f32; 3]; 2]; PAIRS],
+    gains: [[[Gain; 3]; 2]; PAIRS],
+    /// See [`TOLERANCE`].
+    tolerance: f32,
     /// Of all, or of a half: there the second gains as much after the middle as before.
     is_whole: bool,
 }
 
-pub(super) const GENTLE_WHOLE: Part<3> = Part::new(&GENTLE_NODES, 0.5, 1.0);
+/// Always near enough.
+pub(super) const GENTLE_WHOLE: Part<3> = Part {
+    tolerance: f32::INFINITY,
+    ..Part::new(&GENTLE_NODES, 0.5, 1.0)
+};
 pub(super) const WHOLE: Part<5> = Part::new(&FULL_NODES, 0.5, 1.0);
 pub(super) const HALVES: [Part<5>; 2] = [
     Part::new(&FULL_NODES, 0.25, 0.5),
@@ -105,7 +179,8 @@ impl<const PAIRS: usize> Part<PAIRS> {
                 ((3.0 - 2.0 * m) * m * m) as f32,
                 (m * m * m) as f32,
             ],
-            gains: [[[0.0; 3]; 2]; PAIRS],
+            gains: [[[Gain::new(0.0); 3]; 2]; PAIRS],
+            tolerance: TOLERANCE,
             is_whole: width == 1.0,
         };
         let mut k = 0;
@@ -119,13 +194,30 @@ impl<const PAIRS: usize> Part<PAIRS> {
 }
 
 /// What the basis functions have at `m + d` more than at `m`.
-const fn gains(m: f64, d: f64) -> [f32; 3] {
+const fn gains(m: f64, d: f64) -> [Gain; 3] {
     let n = 1.0 - m;
     [
-        (((d - 3.0 * n) * d + 3.0 * n * n) * d) as f32,
-        (((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d) as f32,
-        (((d + 3.0 * m) * d + 3.0 * m * m) * d) as f32,
+        Gain::new(((d - 3.0 * n) * d + 3.0 * n * n) * d),
+        Gain::new(((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d),
+        Gain::new(((d + 3.0 * m) * d + 3.0 * m * m) * d),
     ]
+}
+
+/// What a basis function gains.
+#[derive(Clone, Copy)]
+struct Gain {
+    gain: f32,
+    squared: f32,
+}
+
+impl Gain {
+    const fn new(gain: f64) -> Self {
+        let gain = gain as f32;
+        Self {
+            gain,
+            squared: gain * gain,
+        }
+    }
 }
 
 struct Fit<'a, const PAIRS: usize> {
@@ -134,7 +226,7 @@ struct Fit<'a, const PAIRS: usize> {
     curves: &'a CurveNumbers,
     places: &'a [u32; ROOM],
     segments: &'a mut [PolynomialSegment],
-    unfit: &'a mut Vec<usize>,
+    unfit: &'a mut List,
 }
 
 impl<const PAIRS: usize> InLanes for Fit<'_, PAIRS> {
@@ -151,11 +243,8 @@ impl<const PAIRS: usize> InLanes for Fit<'_, PAIRS> {
 impl<const PAIRS: usize> Fit<'_, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes, const IS_WHOLE: bool>(&mut self) {
-        let &List {
-            tolerance,
-            count,
-            ref lanes,
-        } = self.list;
+        let &List { count, ref lanes } = self.list;
+        let tolerance = self.part.tolerance;
         for i in (0..count).step_by(L::COUNT) {
             let lanes = &lanes[i..i + L::COUNT];
             let own = &lanes[..L::COUNT.min(count - i)];
@@ -165,7 +254,8 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
             let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
             let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
             let vectors = [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]];
-            let samples = samples::<L, PAIRS, IS_WHOLE>(start, vectors, self.part);
+            let mut samples = Samples::all(L::all(0.0));
+            sample::<L, PAIRS, IS_WHOLE>(&mut samples, start, vectors, self.part);
             let mut places = [self.segments.len() - 1; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
                 *place = self.places[lane as usize] as usize;
@@ -175,21 +265,22 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
             if (-tail).any_at_most(-tolerance) {
                 let mut tails = [0.0; MOST];
                 tail.store(&mut tails[..L::COUNT]);
-                let tails = own.iter().zip(tails);
-                let unfit = tails.filter(|(_, tail)| *tail > tolerance);
-                self.unfit.extend(unfit.map(|(&lane, _)| lane as usize));
+                for (&lane, tail) in own.iter().zip(tails) {
+                    self.unfit.push_if(tail > tolerance, lane as usize);
+                }
             }
         }
     }
 }
 
-/// Samples of curves from that key on, with those half-rotation vectors.
+/// Samples curves from that key on, with those half-rotation vectors.
 #[inline(always)]
-fn samples<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
+fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
+    samples: &mut Samples<L, PAIRS>,
     start: [L; 4],
     [w1, w2, w3]: [[L; 3]; 3],
     part: &Part<PAIRS>,
-) -> Samples<L, PAIRS> {
+) {
     let [b1, b2, b3] = part.weights;
     let third_turn = exp(scaled(w3, L::all(b3)));
     let second_turn = both(exp(scaled(w2, L::all(b2))), third_turn);
@@ -205,7 +296,6 @@ fn samples<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
     let v2 = brought_behind(w2, third_turn);
     let terms = Terms::about_middle(middle, [v1, v2, w3]);
     let squares = [square(v1), square(v2), square(w3)];
-    let mut samples = Samples::all(L::all(0.0));
     samples.middle = middle;
     for (k, [before, after]) in part.gains.iter().enumerate() {
         let after = turns(after, squares);
@@ -220,7 +310,6 @@ fn samples<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
         };
         samples.set_differences(k, terms.differences([before, after]));
     }
-    samples
 }
 
 /// Where the turns are longer, f32 would round more than that.
@@ -238,7 +327,7 @@ fn exact_middle<L: Lanes>(
 }
 
 #[inline(always)]
-fn turns<L: Lanes>(gains: &[f32; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
+fn turns<L: Lanes>(gains: &[Gain; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
     [
         turned(gains[0], squares[0]),
         turned(gains[1], squares[1]),
@@ -251,10 +340,10 @@ fn turns<L: Lanes>(gains: &[f32; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
 const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
 const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
-/// Of a vector with that square, times `gain`.
+/// Of a vector with that square, times a gain.
 #[inline(always)]
-fn turned<L: Lanes>(gain: f32, square: L) -> SineAndFall<L> {
-    let z = square * L::all(gain * gain);
+fn turned<L: Lanes>(Gain { gain, squared }: Gain, square: L) -> SineAndFall<L> {
+    let z = square * L::all(squared);
     let gain = L::all(gain);
     let sinc = ((L::all(SINC[2]) * z + L::all(SINC[1])) * z + L::all(SINC[0])) * z;
     let fall = ((L::all(FALL[2]) * z + L::all(FALL[1])) * z + L::all(FALL[0])) * z;
@@ -283,8 +372,8 @@ mod tests {
             let gains = parts.iter().flat_map(|part| part.gains.as_flattened());
             let most = gains
                 .flatten()
-                .fold(0.0f32, |most, gain| most.max(gain.abs()));
-            assert!(f64::from(most * most) * longest < LARGEST);
+                .fold(0.0f32, |most, gain| most.max(gain.squared));
+            assert!(f64::from(most) * longest < LARGEST);
         }
     }
 

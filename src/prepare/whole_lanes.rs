@@ -6,10 +6,10 @@
 //! where the curve turns little. One number is found in f64: the vector between the handles,
 //! in which all of the others' roundings would come together.
 
+use super::far_keys::{AT_ONCE, FarKeys};
 use super::intervals::{Intervals, ROOM, energy, load};
 use super::key_joints::KeyJoints;
 use super::key_steps::{KeySteps, LONGEST_CHORD};
-use super::passes::{Handles, Interval};
 use super::turns::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
 use crate::branchless::{self, Real as _, dot, product, scaled, square, sum};
 use crate::cpu::{InLanes, Lanes, both, minus};
@@ -42,10 +42,10 @@ pub(super) struct WholeLanes {
     pub(super) wanted: [bool; ROOM],
     /// Handles at the key that the interval starts with, towards the interval before it
     /// and towards this one.
-    incoming: [Row; 3],
-    outgoing: [Row; 3],
+    pub(super) incoming: [Row; 3],
+    pub(super) outgoing: [Row; 3],
     /// How far what they are made of goes; up to 1 where that holds.
-    far: Row,
+    pub(super) far: Row,
     pub(super) numbers: CurveNumbers,
     /// The sum of the vectors' squares; far more where they do not hold, and of the lane
     /// behind which none is.
@@ -71,8 +71,8 @@ pub(super) struct FindHandles<'a> {
     pub(super) steps: &'a KeySteps,
     pub(super) joints: &'a KeyJoints,
     pub(super) intervals: &'a Intervals,
-    /// Those of a key that f32 does not find.
-    pub(super) handles: fn(Interval<f64>, Interval<f64>) -> Handles<f64>,
+    /// Finds those that f32 does not.
+    pub(super) find_far: fn(&mut FarKeys),
 }
 
 impl InLanes for FindHandles<'_> {
@@ -80,6 +80,7 @@ impl InLanes for FindHandles<'_> {
     fn run<L: Lanes>(&mut self) {
         let (steps, joints, intervals) = (self.steps, self.joints, self.intervals);
         let own = &mut *self.lanes;
+        let (mut far_keys, mut far_count) = ([0; ROOM], 0);
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let key = lane + 1;
             if !own.wanted[lane..key + L::COUNT].contains(&true) {
@@ -103,26 +104,15 @@ impl InLanes for FindHandles<'_> {
             far.store(&mut own.far[key..key + L::COUNT]);
             if (-far).any_at_most(-1.0) {
                 for key in key..key + L::COUNT {
-                    if own.far[key] >= 1.0 && joints.kinds[key] == INNER {
-                        let before = steps.interval(intervals, key - 1);
-                        let after = steps.interval(intervals, key);
-                        own.set_handles(key, (self.handles)(before, after));
-                    }
+                    let is_far = own.far[key] >= 1.0 && joints.kinds[key] == INNER;
+                    far_keys[far_count] = key;
+                    far_count += usize::from(is_far);
                 }
             }
         }
-    }
-}
-
-impl WholeLanes {
-    /// Sets the handles of a key.
-    #[inline(never)]
-    fn set_handles(&mut self, key: usize, handles: Handles<f64>) {
-        for c in 0..3 {
-            self.incoming[c][key] = handles.incoming[c] as f32;
-            self.outgoing[c][key] = handles.outgoing[c] as f32;
+        for keys in far_keys[..far_count].chunks(AT_ONCE) {
+            own.set_far(keys, steps, intervals, self.find_far);
         }
-        self.far[key] = 0.0;
     }
 }
 
