@@ -178,7 +178,7 @@ fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
 
 /// `a v`, `v` a vector.
 #[inline(always)]
-fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
+pub(super) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     [
         a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
         a[3] * v[1] - a[0] * v[2] + a[2] * v[0],
@@ -193,7 +193,7 @@ pub(super) type SineAndFall<L> = (L, L);
 /// Cubics about the middle of their pieces, expanded, a lane to each: with `c_j` the cosine
 /// of the j-th angle and `s_j` its sine divided by the length of its vector,
 /// `q = Σ terms[4a+2b+c] {c,s}_1 {c,s}_2 {c,s}_3`.
-pub(super) struct Terms<L>([[L; 4]; 8]);
+struct Terms<L>([[L; 4]; 8]);
 
 /// The same with what the angles are made of.
 struct Expanded<L> {
@@ -203,14 +203,6 @@ struct Expanded<L> {
 }
 
 impl<L: Lanes> Terms<L> {
-    /// Of half-rotation vectors that are brought behind what follows them:
-    /// `m exp(v_1 b_1) exp(v_2 b_2) exp(v_3 b_3)`.
-    #[inline(always)]
-    pub(super) fn about_middle(m: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
-        let of_first = about(m, v1);
-        Self::new([m, about(m, v2), of_first, about(of_first, v2)], v3)
-    }
-
     /// From those without the third sine.
     #[inline(always)]
     fn new([of_none, of_second, of_first, of_both]: [[L; 4]; 4], v3: [L; 3]) -> Self {
@@ -228,14 +220,14 @@ impl<L: Lanes> Terms<L> {
 
     /// The rotation of the middle.
     #[inline(always)]
-    pub(super) fn middle(&self) -> [L; 4] {
+    fn middle(&self) -> [L; 4] {
         self.0[0]
     }
 
     /// What the rotations before and after the middle are more than it, side by side: each
     /// is a long chain.
     #[inline(always)]
-    pub(super) fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
+    fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
         let terms = &self.0;
         let mut differences = [terms[0]; 2];
         for i in 0..2 {
