@@ -37,7 +37,7 @@ pub(crate) fn minus<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
 }
 
 #[inline(always)]
-fn across<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
+pub(crate) fn across<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -46,7 +46,7 @@ fn across<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
 }
 
 #[inline(always)]
-fn along<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> N {
+pub(crate) fn along<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

@@ -41,7 +41,7 @@ pub use dispatch::{UnknownWidth, VectorWidth};
 pub(crate) use engine::CpuEngine;
 pub(crate) use evaluate::FEW;
 pub(crate) use gentle::{
-    Gentle, Turn, both, brought_behind, chord_of, gentle, minus, signed, step_vector,
+    Gentle, Turn, across, along, both, brought_behind, chord_of, gentle, minus, signed, step_vector,
 };
 pub(crate) use lanes::{Doubles, Lanes, Number, canonical};
 pub(crate) use long::{first_sample, is_in_stretches};

@@ -7,7 +7,9 @@ use super::shape::Sampling;
 use crate::branchless::{
     self, LONG_SQUARE, Real as _, SHORT_SQUARE, long_waves, product, scaled, short_waves, square,
 };
-use crate::cpu::{Doubles, Lanes, Number, short_sine_and_fall, sine_and_fall};
+use crate::cpu::{
+    Doubles, Lanes, Number, Turn, across, along, brought_behind, short_sine_and_fall, sine_and_fall,
+};
 use crate::formula::{Numbers, Product};
 use crate::segment::PolynomialSegment;
 
@@ -178,7 +180,7 @@ fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
 
 /// `a v`, `v` a vector.
 #[inline(always)]
-pub(super) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
+fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     [
         a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
         a[3] * v[1] - a[0] * v[2] + a[2] * v[0],
@@ -190,93 +192,80 @@ pub(super) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
 /// The sine of an angle divided by the length of its vector, and its cosine less 1.
 pub(super) type SineAndFall<L> = (L, L);
 
-/// Cubics about the middle of their pieces, expanded, a lane to each: with `c_j` the cosine
-/// of the j-th angle and `s_j` its sine divided by the length of its vector,
-/// `q = Σ terms[4a+2b+c] {c,s}_1 {c,s}_2 {c,s}_3`.
-struct Terms<L>([[L; 4]; 8]);
-
-/// The same with what the angles are made of.
-struct Expanded<L> {
-    terms: Terms<L>,
-    squares: [L; 3],
-    powers: [[L; 3]; 3],
+/// Cubics about the middle of their pieces, `m exp(v₁ b₁) exp(v₂ b₂) exp(v₃ b₃)`, a lane to
+/// each: half-rotation vectors are brought behind what follows them there.
+pub(super) struct AboutMiddle<L> {
+    middle: [L; 4],
+    /// `m v₁`.
+    first: [L; 4],
+    second: [L; 3],
+    third: [L; 3],
+    /// `v₂ v₃`.
+    both: [L; 4],
 }
 
-impl<L: Lanes> Terms<L> {
-    /// From those without the third sine.
+impl<L: Lanes> AboutMiddle<L> {
+    /// Of the rotation of the middle, and such vectors.
     #[inline(always)]
-    fn new([of_none, of_second, of_first, of_both]: [[L; 4]; 4], v3: [L; 3]) -> Self {
-        Self([
-            of_none,
-            about(of_none, v3),
-            of_second,
-            about(of_second, v3),
-            of_first,
-            about(of_first, v3),
-            of_both,
-            about(of_both, v3),
-        ])
-    }
-
-    /// The rotation of the middle.
-    #[inline(always)]
-    fn middle(&self) -> [L; 4] {
-        self.0[0]
+    pub(super) fn new(middle: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
+        let [x, y, z] = across(v2, v3);
+        Self {
+            middle,
+            first: about(middle, v1),
+            second: v2,
+            third: v3,
+            both: [x, y, z, -along(v2, v3)],
+        }
     }
 
     /// What the rotations before and after the middle are more than it, side by side: each
     /// is a long chain.
     #[inline(always)]
-    fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
-        let terms = &self.0;
-        let mut differences = [terms[0]; 2];
-        for i in 0..2 {
-            let [(s1, f1), (s2, f2), (s3, f3)] = sides[i];
+    pub(super) fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
+        let (m, first, both) = (self.middle, self.first, self.both);
+        let mut differences = [m; 2];
+        for (difference, side) in differences.iter_mut().zip(sides) {
+            let [(s1, f1), (s2, f2), (s3, f3)] = side;
             // With cosines as 1 + fall, nothing is lost where the angles are small.
-            let both = f2 + f3 + f2 * f3;
             let cs = s3 + f2 * s3;
             let sc = s2 + s2 * f3;
             let ss = s2 * s3;
-            let cc = L::all(1.0) + both;
-            let c1 = L::all(1.0) + f1;
-            let weights = [
-                both + cc * f1,
-                cs * c1,
-                sc * c1,
-                ss * c1,
-                cc * s1,
-                cs * s1,
-                sc * s1,
-                ss * s1,
+            let behind = [
+                self.second[0] * sc + self.third[0] * cs + both[0] * ss,
+                self.second[1] * sc + self.third[1] * cs + both[1] * ss,
+                self.second[2] * sc + self.third[2] * cs + both[2] * ss,
+                f2 + f3 + f2 * f3 + both[3] * ss,
             ];
-            for (c, difference) in differences[i].iter_mut().enumerate() {
-                let first = terms[0][c] * weights[0] + terms[1][c] * weights[1];
-                let second = terms[2][c] * weights[2] + terms[3][c] * weights[3];
-                let third = terms[4][c] * weights[4] + terms[5][c] * weights[5];
-                let fourth = terms[6][c] * weights[6] + terms[7][c] * weights[7];
-                *difference = (first + second) + (third + fourth);
-            }
+            let own = [
+                first[0] * s1 + m[0] * f1,
+                first[1] * s1 + m[1] * f1,
+                first[2] * s1 + m[2] * f1,
+                first[3] * s1 + m[3] * f1,
+            ];
+            let start = [m[0] + own[0], m[1] + own[1], m[2] + own[2], m[3] + own[3]];
+            let [x, y, z, w] = product(start, behind);
+            *difference = [x + own[0], y + own[1], z + own[2], w + own[3]];
         }
         differences
     }
 }
 
+/// The same with what the angles are made of.
+struct Expanded<L> {
+    curve: AboutMiddle<L>,
+    squares: [L; 3],
+    powers: [[L; 3]; 3],
+}
+
 impl<L: Lanes> Expanded<L> {
     #[inline(always)]
     fn new(base: [L::Doubles; 4], [first, second, third]: [Factor<L>; 3]) -> Self {
-        // What the rotations so far have made of it.
-        let base1 = product(base, first.turn);
-        let base2 = product(base1, second.turn);
-        let base3 = product(base2, third.turn);
-        let (r2, r3) = (rounded::<L>(second.turn), rounded::<L>(third.turn));
-        let (v1, v2) = (first.vector, second.vector);
-        let of_second = product(about(rounded::<L>(base2), v2), r3);
-        let to_second = product(about(rounded::<L>(base1), v1), r2);
-        let of_both = product(about(to_second, v2), r3);
-        let of_first = product(to_second, r3);
-        let of_none = rounded::<L>(base3);
+        let middle = product(product(product(base, first.turn), second.turn), third.turn);
+        let (r2, r3) = (turn(second.turn), turn(third.turn));
+        let v1 = brought_behind(brought_behind(first.vector, r2), r3);
+        let v2 = brought_behind(second.vector, r3);
         Self {
-            terms: Terms::new([of_none, of_second, of_first, of_both], third.vector),
+            curve: AboutMiddle::new(rounded::<L>(middle), [v1, v2, third.vector]),
             squares: [first.square, second.square, third.square],
             powers: [first.powers, second.powers, third.powers],
         }
@@ -289,7 +278,7 @@ impl<L: Lanes> Expanded<L> {
         nodes: &Nodes<PAIRS>,
     ) -> Samples<L, PAIRS> {
         let mut samples = Samples::all(L::all(0.0));
-        samples.middle = self.terms.middle();
+        samples.middle = self.curve.middle;
         for k in 0..PAIRS {
             let s = L::all(nodes.at[k]);
             let first = self.turns::<SHORT>(0, s);
@@ -297,7 +286,7 @@ impl<L: Lanes> Expanded<L> {
             let third = self.turns::<SHORT>(2, s);
             samples.set_differences(
                 k,
-                self.terms.differences([
+                self.curve.differences([
                     [first[0], second[0], third[0]],
                     [first[1], second[1], third[1]],
                 ]),
@@ -324,6 +313,15 @@ impl<L: Lanes> Expanded<L> {
         } else {
             [sine_and_fall(before, to), sine_and_fall(after, from)]
         }
+    }
+}
+
+/// In f32, by what its cosine is less than 1.
+#[inline(always)]
+fn turn<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> Turn<L> {
+    Turn {
+        vector: [L::rounded(x), L::rounded(y), L::rounded(z)],
+        fall: L::rounded(w - all::<L>(1.0)),
     }
 }
 

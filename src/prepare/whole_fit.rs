@@ -6,7 +6,7 @@ use bytemuck::Zeroable as _;
 use super::fit::{MOST, Samples, TOLERANCE, interpolate};
 use super::intervals::{LANES, ROOM, rounded};
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
-use super::sample::{SineAndFall, about};
+use super::sample::{AboutMiddle, SineAndFall};
 use super::turns::{exact_exp, exp, widened};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::{normalised, product, scaled, square};
@@ -309,67 +309,6 @@ fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
             turns(before, squares)
         };
         samples.set_differences(k, curve.differences([before, after]));
-    }
-}
-
-/// Curves about their middle: `m exp(v₁ b₁) exp(v₂ b₂) exp(v₃ b₃)`.
-struct AboutMiddle<L> {
-    middle: [L; 4],
-    /// `m v₁`.
-    first: [L; 4],
-    second: [L; 3],
-    third: [L; 3],
-    /// `v₂ v₃`.
-    both: [L; 4],
-}
-
-impl<L: Lanes> AboutMiddle<L> {
-    #[inline(always)]
-    fn new(middle: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
-        let cross = [
-            v2[1] * v3[2] - v2[2] * v3[1],
-            v2[2] * v3[0] - v2[0] * v3[2],
-            v2[0] * v3[1] - v2[1] * v3[0],
-        ];
-        let inner = v2[0] * v3[0] + v2[1] * v3[1] + v2[2] * v3[2];
-        Self {
-            middle,
-            first: about(middle, v1),
-            second: v2,
-            third: v3,
-            both: [cross[0], cross[1], cross[2], -inner],
-        }
-    }
-
-    /// What the rotations before and after the middle are more than it, side by side: each
-    /// is a long chain.
-    #[inline(always)]
-    fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
-        let (m, first, both) = (self.middle, self.first, self.both);
-        let mut differences = [m; 2];
-        for (difference, side) in differences.iter_mut().zip(sides) {
-            let [(s1, f1), (s2, f2), (s3, f3)] = side;
-            // With cosines as 1 + fall, nothing is lost where the angles are small.
-            let cs = s3 + f2 * s3;
-            let sc = s2 + s2 * f3;
-            let ss = s2 * s3;
-            let behind = [
-                self.second[0] * sc + self.third[0] * cs + both[0] * ss,
-                self.second[1] * sc + self.third[1] * cs + both[1] * ss,
-                self.second[2] * sc + self.third[2] * cs + both[2] * ss,
-                f2 + f3 + f2 * f3 + both[3] * ss,
-            ];
-            let own = [
-                first[0] * s1 + m[0] * f1,
-                first[1] * s1 + m[1] * f1,
-                first[2] * s1 + m[2] * f1,
-                first[3] * s1 + m[3] * f1,
-            ];
-            let start = [m[0] + own[0], m[1] + own[1], m[2] + own[2], m[3] + own[3]];
-            let [x, y, z, w] = product(start, behind);
-            *difference = [x + own[0], y + own[1], z + own[2], w + own[3]];
-        }
-        differences
     }
 }
 
