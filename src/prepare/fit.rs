@@ -13,7 +13,7 @@ use bytemuck::Zeroable;
 use super::curve::{Curve, Piece};
 use super::intervals::{Intervals, LANES, Lane};
 use super::motion;
-use super::nodes::Nodes;
+use super::nodes::{Nodes, tail};
 use super::pace::Pace;
 use super::shape::Shape;
 use crate::cpu::{Lanes, canonical};
@@ -341,7 +341,7 @@ pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
     let mut all = [[[L::all(0.0); PAIRS]; 2]; 4];
     let mut tails = L::all(0.0);
     for (c, own) in all.iter_mut().enumerate() {
-        *own = powers(nodes, samples, c);
+        *own = nodes.powers(samples, c);
         tails = tail(are_entire, own).larger(tails);
     }
     store(samples.middle, segments, places, 0);
@@ -353,56 +353,6 @@ pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
         store(even, segments, places, 2 * i + 2);
     }
     tails
-}
-
-/// The coefficients of s, s³, … and of s², s⁴, … of a component: of Newton's polynomials in
-/// s² through the samples, then of powers.
-#[inline(always)]
-fn powers<L: Lanes, const PAIRS: usize>(
-    nodes: &Nodes<PAIRS>,
-    samples: &Samples<L, PAIRS>,
-    c: usize,
-) -> [[L; PAIRS]; 2] {
-    let mut odd = [L::all(0.0); PAIRS];
-    let mut even = odd;
-    for k in 0..PAIRS {
-        odd[k] = samples.odd[k][c] * L::all(nodes.odd[k]);
-        even[k] = samples.even[k][c] * L::all(nodes.even[k]);
-    }
-    for l in 1..PAIRS {
-        for k in (l..PAIRS).rev() {
-            let quotient = L::all(nodes.quotients[l][k]);
-            odd[k] = (odd[k] - odd[k - 1]) * quotient;
-            even[k] = (even[k] - even[k - 1]) * quotient;
-        }
-    }
-    for k in (0..PAIRS - 1).rev() {
-        let square = L::all(nodes.squares[k]);
-        for i in k..PAIRS - 1 {
-            odd[i] = odd[i] - odd[i + 1] * square;
-            even[i] = even[i] - even[i + 1] * square;
-        }
-    }
-    [odd, even]
-}
-
-/// What the fit of a component leaves out, twice, about: from the last Chebyshev
-/// coefficients, by those of powers.
-#[inline(always)]
-fn tail<L: Lanes, const PAIRS: usize>(are_entire: bool, [odd, even]: &[[L; PAIRS]; 2]) -> L {
-    // That of sⁿ in Tₙ(2s) is 2²ⁿ⁻¹, that of sⁿ⁻² is -n 2²ⁿ⁻⁵.
-    let last = L::all(1.0 / (1u64 << (4 * PAIRS - 1)) as f32);
-    let (four, sixteen) = (L::all(4.0), L::all(16.0));
-    let last_odd = odd[PAIRS - 1] * last * four;
-    let last_even = even[PAIRS - 1] * last;
-    if are_entire {
-        return last_even.magnitude() + L::all(0.125) * last_odd.magnitude();
-    }
-    let degree = 2.0 * PAIRS as f32;
-    let odd_before = odd[PAIRS - 2] * last * four * sixteen + last_odd * L::all(degree - 1.0);
-    let even_before = even[PAIRS - 2] * last * sixteen + last_even * L::all(degree);
-    let before_last = odd_before.magnitude() + even_before.magnitude();
-    last_even.magnitude() + last_odd.magnitude() + L::all(0.25) * before_last
 }
 
 /// Stores the coefficients of a power to each lane's segment.

@@ -1,5 +1,8 @@
 //! Chebyshev nodes, and what leads from values at them to coefficients of powers.
 
+use super::fit::Samples;
+use crate::cpu::Lanes;
+
 /// Chebyshev nodes on one side of the middle, which is one more.
 pub(super) struct Nodes<const PAIRS: usize> {
     /// In the order in which Newton's polynomials take them: chosen for what f32 rounds.
@@ -44,5 +47,121 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
             k += 1;
         }
         nodes
+    }
+
+    /// The coefficients of s, s³, … and of s², s⁴, … of a component: of Newton's polynomials
+    /// in s² through the samples, then of powers.
+    #[inline(always)]
+    pub(super) fn powers<L: Lanes>(
+        &self,
+        samples: &Samples<L, PAIRS>,
+        c: usize,
+    ) -> [[L; PAIRS]; 2] {
+        let mut odd = [L::all(0.0); PAIRS];
+        let mut even = odd;
+        for k in 0..PAIRS {
+            odd[k] = samples.odd[k][c] * L::all(self.odd[k]);
+            even[k] = samples.even[k][c] * L::all(self.even[k]);
+        }
+        for l in 1..PAIRS {
+            for k in (l..PAIRS).rev() {
+                let quotient = L::all(self.quotients[l][k]);
+                odd[k] = (odd[k] - odd[k - 1]) * quotient;
+                even[k] = (even[k] - even[k - 1]) * quotient;
+            }
+        }
+        for k in (0..PAIRS - 1).rev() {
+            let square = L::all(self.squares[k]);
+            for i in k..PAIRS - 1 {
+                odd[i] = odd[i] - odd[i + 1] * square;
+                even[i] = even[i] - even[i + 1] * square;
+            }
+        }
+        [odd, even]
+    }
+}
+
+/// What the fit of a component leaves out, twice, about: from the last Chebyshev
+/// coefficients, by those of powers. Of curves that are
+/// [entire](super::shape::Shape::entire), or not.
+#[inline(always)]
+pub(super) fn tail<L: Lanes, const PAIRS: usize>(
+    are_entire: bool,
+    [odd, even]: &[[L; PAIRS]; 2],
+) -> L {
+    // That of sⁿ in Tₙ(2s) is 2²ⁿ⁻¹, that of sⁿ⁻² is -n 2²ⁿ⁻⁵.
+    let last = L::all(1.0 / (1u64 << (4 * PAIRS - 1)) as f32);
+    let (four, sixteen) = (L::all(4.0), L::all(16.0));
+    let last_odd = odd[PAIRS - 1] * last * four;
+    let last_even = even[PAIRS - 1] * last;
+    if are_entire {
+        return last_even.magnitude() + L::all(0.125) * last_odd.magnitude();
+    }
+    let degree = 2.0 * PAIRS as f32;
+    let odd_before = odd[PAIRS - 2] * last * four * sixteen + last_odd * L::all(degree - 1.0);
+    let even_before = even[PAIRS - 2] * last * sixteen + last_even * L::all(degree);
+    let before_last = odd_before.magnitude() + even_before.magnitude();
+    last_even.magnitude() + last_odd.magnitude() + L::all(0.25) * before_last
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+
+    /// Catches a wrong node or quotient, powers in another order, and a tail that takes one
+    /// Chebyshev coefficient for another.
+    #[test]
+    fn chebyshev_polynomials_come_back() {
+        come_back(&GENTLE_NODES);
+        come_back(&FULL_NODES);
+    }
+
+    /// `Tₙ(2s)` of every degree, in lane and component `c` times `c + 1`.
+    fn come_back<const PAIRS: usize>(nodes: &Nodes<PAIRS>) {
+        let degree = 2 * PAIRS;
+        for n in 1..=degree {
+            // What the powers of Tₙ come to, without their signs, is rounded.
+            let rounding = 2e-7 * libm::pow(1.0 + 2f64.sqrt(), n as f64);
+            let chebyshev = |s: f64| libm::cos(n as f64 * libm::acos(2.0 * s));
+            let mut samples = Samples::all(Vec4::ZERO);
+            for (k, &s) in nodes.at.iter().enumerate() {
+                let [before, after] = [-s, s].map(|s| chebyshev(s.into()) - chebyshev(0.0));
+                for c in 0..4 {
+                    let times = (c + 1) as f64;
+                    samples.even[k][c] = Vec4::splat((times * (after + before)) as f32);
+                    samples.odd[k][c] = Vec4::splat((times * (after - before)) as f32);
+                }
+            }
+            for c in 0..4 {
+                let times = (c + 1) as f64;
+                let found = nodes.powers(&samples, c);
+                for i in 0..=100 {
+                    let s = 0.01 * f64::from(i) - 0.5;
+                    let [odd, even] = found.map(|powers| {
+                        let of_squares = |sum: f64, power: &Vec4| sum * s * s + f64::from(power.x);
+                        powers.iter().rev().fold(0.0, of_squares)
+                    });
+                    let value = odd * s + even * s * s;
+                    let error = value - times * (chebyshev(s) - chebyshev(0.0));
+                    assert!(error.abs() < rounding * times, "T{n} at {s}: {error}");
+                }
+                let expected = |weights: [f64; 4]| {
+                    let weight = weights.get(degree - n).copied();
+                    weight.unwrap_or(0.0) * times
+                };
+                for (are_entire, weights) in [
+                    (true, [1.0, 0.125, 0.0, 0.0]),
+                    (false, [1.0, 1.0, 0.25, 0.25]),
+                ] {
+                    let error = f64::from(tail(are_entire, &found).x) - expected(weights);
+                    assert!(
+                        error.abs() < rounding * times,
+                        "T{n}, {are_entire}: {error}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -54,7 +54,7 @@ impl List {
     }
 
     /// The lanes.
-    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = usize> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = usize> {
         self.lanes[..self.count].iter().map(|&lane| lane as usize)
     }
 
