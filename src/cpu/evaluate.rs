@@ -1,5 +1,7 @@
 //! Twin of `shaders/kernel.wgsl`: the samples of one run, in vector lanes.
 
+use std::hint::black_box;
+
 use glam::Vec4;
 
 use super::lanes::{Lanes, Number as _};
@@ -68,9 +70,9 @@ pub(super) fn frames<L: Lanes, S: Evaluate>(
 ) {
     // What is left of a longer run goes into one more wide vector.
     if L::COUNT > L::Narrow::COUNT && count <= L::Narrow::COUNT {
-        frames_alike::<L::Narrow, S>(segment, affine, first, count, output);
+        frames_alike::<L::Narrow, S>(segment, affine, first, count, L::LOADS_SPREAD, output);
     } else {
-        frames_alike::<L, S>(segment, affine, first, count, output);
+        frames_alike::<L, S>(segment, affine, first, count, L::LOADS_SPREAD, output);
     }
 }
 
@@ -81,6 +83,7 @@ fn frames_alike<L: Lanes, S: Evaluate>(
     affine: Affine,
     first: f32,
     count: usize,
+    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     if count <= FEW {
@@ -91,7 +94,8 @@ fn frames_alike<L: Lanes, S: Evaluate>(
     }
     let next = L::all(first) + L::load(&STEPS);
     let step = L::all(L::COUNT as f32);
-    run(segment, affine, count, Frames { next, step }, output);
+    let distances = Frames { next, step };
+    run(segment, affine, count, distances, loads_spread, output);
 }
 
 /// The distances of a vector's samples from its first.
@@ -115,7 +119,8 @@ pub(super) fn distances<L: Lanes, S: Evaluate>(
         }
         return;
     }
-    run::<L, S>(segment, affine, count, Listed(distances), output);
+    let distances = Listed(distances);
+    run::<L, S>(segment, affine, count, distances, L::LOADS_SPREAD, output);
 }
 
 /// Evaluates the sample at a distance from the middle.
@@ -161,12 +166,13 @@ fn run<L: Lanes, S: Evaluate>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
+    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     if segment.is_canonical() {
-        vectors::<L, S, false>(segment, affine, count, distances, output);
+        vectors::<L, S, false>(segment, affine, count, distances, loads_spread, output);
     } else {
-        vectors::<L, S, true>(segment, affine, count, distances, output);
+        vectors::<L, S, true>(segment, affine, count, distances, loads_spread, output);
     }
 }
 
@@ -177,6 +183,7 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
     affine: Affine,
     count: usize,
     mut distances: impl Distances<L>,
+    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     let constant = L::all(segment.constant());
@@ -185,6 +192,13 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
     let mut vectors = output[..whole].chunks_exact_mut(L::COUNT);
     for rotations in &mut vectors {
         let parameter = distances.next() * scale + offset;
+        // Else all its numbers would be loaded first, more than there are registers for, and
+        // stored elsewhere until they are used.
+        let segment = if loads_spread {
+            black_box(segment)
+        } else {
+            segment
+        };
         vector::<L, S, FILTER>(segment, constant, parameter, rotations);
     }
     let rest = vectors.into_remainder();

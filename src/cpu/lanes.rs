@@ -41,6 +41,9 @@ pub(crate) trait Lanes: Number {
     /// How many.
     const COUNT: usize;
 
+    /// Whether an operation takes a number of memory for all lanes: AVX-512's do.
+    const LOADS_SPREAD: bool;
+
     /// What evaluates runs of few: these, or vectors half as wide.
     type Narrow: Lanes;
 
@@ -146,6 +149,7 @@ impl Number for Vec4 {
 
 impl Lanes for Vec4 {
     const COUNT: usize = 4;
+    const LOADS_SPREAD: bool = false;
 
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];

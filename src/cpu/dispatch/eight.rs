@@ -90,6 +90,7 @@ fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
 
 impl Lanes for Eight {
     const COUNT: usize = 8;
+    const LOADS_SPREAD: bool = false;
 
     type Narrow = Self;
     type Rotations = [[f32; 4]; 8];

@@ -104,6 +104,7 @@ fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
 
 impl Lanes for Sixteen {
     const COUNT: usize = 16;
+    const LOADS_SPREAD: bool = true;
 
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
