@@ -7,6 +7,7 @@ use glam::{Mat4, Vec4, Vec4Swizzles as _};
 use super::dispatch::Four;
 use super::stage::Line;
 use crate::branchless::{Arithmetic, Real};
+use crate::segment::PolynomialSegment;
 use crate::segment::shader::TINY_BITS;
 
 /// A number of one sample, or of several. Whatever it is of, an operation rounds alike.
@@ -98,6 +99,18 @@ pub(crate) trait Lanes: Number {
     #[inline(always)]
     fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(Self::rotations(components).as_ref());
+    }
+
+    /// Stores the coefficients of all powers, `x y z w`, four or more: each lane's to the
+    /// segment at its place.
+    #[inline(always)]
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+        for (power, &components) in powers.iter().enumerate() {
+            let rotations = Self::rotations(components);
+            for (&place, rotation) in places.iter().zip(rotations.as_ref()) {
+                segments[place].coefficients[power] = *rotation;
+            }
+        }
     }
 
     /// Stores a line past the caches, where that is faster; seen by other threads behind a
@@ -261,10 +274,36 @@ fn rows(columns: Mat4) -> [Vec4; 4] {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use bytemuck::Zeroable as _;
+
     use super::*;
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
+    }
+
+    /// Of as many powers as gentle curves have: four, and four of which one is among them.
+    fn powers_come_to_their_places<L: Lanes>() {
+        let number = |power: usize, lane: usize, c: usize| (100 * power + 10 * lane + c) as f32;
+        let component = |power: usize, c: usize| {
+            let own: Vec<f32> = (0..L::COUNT).map(|lane| number(power, lane, c)).collect();
+            L::load(&own)
+        };
+        let powers: Vec<[L; 4]> = (0..7)
+            .map(|power| [0, 1, 2, 3].map(|c| component(power, c)))
+            .collect();
+        let mut segments = vec![PolynomialSegment::zeroed(); L::COUNT];
+        let backward: Vec<usize> = (0..L::COUNT).rev().collect();
+        L::store_powers(&powers, &mut segments, &backward);
+        for (lane, &place) in backward.iter().enumerate() {
+            for (power, found) in segments[place].coefficients.iter().enumerate() {
+                let expected = match power {
+                    ..7 => [0, 1, 2, 3].map(|c| number(power, lane, c)),
+                    _ => [0.0; 4],
+                };
+                assert_eq!(*found, expected);
+            }
+        }
     }
 
     /// Catches lanes that are put together in another order than they were loaded in, and a
@@ -293,6 +332,7 @@ pub(crate) mod tests {
         L::store_rotations(gathered, &mut again);
         again.reverse();
         assert_eq!(bits(again.as_flattened()), bits(found.as_flattened()));
+        powers_come_to_their_places::<L>();
         let (numbers, ones) = (
             vec![[1.0, 20.0, 300.0, 4000.0]; L::COUNT],
             vec![[1.0; 4]; L::COUNT],

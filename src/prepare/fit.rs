@@ -16,10 +16,14 @@ use super::motion;
 use super::nodes::{Nodes, tail};
 use super::pace::Pace;
 use super::shape::Shape;
+use super::sides::Sides;
 use crate::cpu::{Lanes, canonical};
 use crate::formula::{Numbers, Product};
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
+
+/// Powers of a segment, with the constant.
+const POWERS: usize = 11;
 
 /// The most lanes that a vector has.
 pub(super) const MOST: usize = 16;
@@ -130,10 +134,10 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Sets what the rotations before and after the middle are more than it, at the `k`th
     /// pair of nodes.
     #[inline(always)]
-    pub(super) fn set_differences(&mut self, k: usize, [before, after]: [[L; 4]; 2]) {
-        for c in 0..4 {
-            self.even[k][c] = after[c] + before[c];
-            self.odd[k][c] = after[c] - before[c];
+    pub(super) fn set_differences(&mut self, k: usize, differences: [Sides<L>; 4]) {
+        for (c, &Sides { before, after }) in differences.iter().enumerate() {
+            self.even[k][c] = after + before;
+            self.odd[k][c] = after - before;
         }
     }
 
@@ -330,6 +334,7 @@ impl FitBlock {
 
 /// From the differences at the nodes to the coefficients, in each lane's segment; and what
 /// the fits leave out, twice, about. Curves are [entire](super::shape::Shape::entire), or not.
+#[allow(clippy::needless_range_loop)]
 #[inline(always)]
 pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
@@ -338,35 +343,19 @@ pub(super) fn interpolate<L: Lanes, const PAIRS: usize>(
     places: &[usize; MOST],
     segments: &mut [PolynomialSegment],
 ) -> L {
-    let mut all = [[[L::all(0.0); PAIRS]; 2]; 4];
+    let mut powers = [canonical(samples.middle); POWERS];
     let mut tails = L::all(0.0);
-    for (c, own) in all.iter_mut().enumerate() {
-        *own = nodes.powers(samples, c);
-        tails = tail(are_entire, own).larger(tails);
+    for c in 0..4 {
+        let own = nodes.powers(samples, c);
+        tails = tail(are_entire, &own).larger(tails);
+        let [odd, even] = own;
+        for i in 0..PAIRS {
+            powers[2 * i + 1][c] = odd[i].canonical();
+            powers[2 * i + 2][c] = even[i].canonical();
+        }
     }
-    store(samples.middle, segments, places, 0);
-    let [x, y, z, w] = &all;
-    for i in 0..PAIRS {
-        let odd = [x[0][i], y[0][i], z[0][i], w[0][i]];
-        let even = [x[1][i], y[1][i], z[1][i], w[1][i]];
-        store(odd, segments, places, 2 * i + 1);
-        store(even, segments, places, 2 * i + 2);
-    }
+    L::store_powers(&powers[..=2 * PAIRS], segments, places);
     tails
-}
-
-/// Stores the coefficients of a power to each lane's segment.
-#[inline(always)]
-fn store<L: Lanes>(
-    own: [L; 4],
-    segments: &mut [PolynomialSegment],
-    places: &[usize; MOST],
-    power: usize,
-) {
-    let rotations = L::rotations(canonical(own));
-    for (&place, rotation) in places.iter().zip(rotations.as_ref()) {
-        segments[place].coefficients[power] = *rotation;
-    }
 }
 
 /// Copies numbers of some lanes to consecutive ones, from `start` on.

@@ -25,6 +25,7 @@ mod retime;
 mod sample;
 mod set;
 mod shape;
+mod sides;
 mod smooth;
 mod steady;
 mod steps;

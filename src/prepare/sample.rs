@@ -4,6 +4,7 @@ use super::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use super::intervals::{LANES, load, load3, load4, rounded};
 use super::nodes::Nodes;
 use super::shape::Sampling;
+use super::sides::Sides;
 use crate::branchless::{
     self, LONG_SQUARE, Real as _, SHORT_SQUARE, long_waves, product, scaled, short_waves, square,
 };
@@ -218,36 +219,49 @@ impl<L: Lanes> AboutMiddle<L> {
         }
     }
 
-    /// What the rotations before and after the middle are more than it, side by side: each
-    /// is a long chain.
+    /// What the rotations before and after the middle are more than it.
     #[inline(always)]
-    pub(super) fn differences(&self, sides: [[SineAndFall<L>; 3]; 2]) -> [[L; 4]; 2] {
-        let (m, first, both) = (self.middle, self.first, self.both);
-        let mut differences = [m; 2];
-        for (difference, side) in differences.iter_mut().zip(sides) {
-            let [(s1, f1), (s2, f2), (s3, f3)] = side;
-            // With cosines as 1 + fall, nothing is lost where the angles are small.
-            let cs = s3 + f2 * s3;
-            let sc = s2 + s2 * f3;
-            let ss = s2 * s3;
-            let behind = [
-                self.second[0] * sc + self.third[0] * cs + both[0] * ss,
-                self.second[1] * sc + self.third[1] * cs + both[1] * ss,
-                self.second[2] * sc + self.third[2] * cs + both[2] * ss,
-                f2 + f3 + f2 * f3 + both[3] * ss,
-            ];
-            let own = [
-                first[0] * s1 + m[0] * f1,
-                first[1] * s1 + m[1] * f1,
-                first[2] * s1 + m[2] * f1,
-                first[3] * s1 + m[3] * f1,
-            ];
-            let start = [m[0] + own[0], m[1] + own[1], m[2] + own[2], m[3] + own[3]];
-            let [x, y, z, w] = product(start, behind);
-            *difference = [x + own[0], y + own[1], z + own[2], w + own[3]];
-        }
-        differences
+    pub(super) fn differences(
+        &self,
+        [(s1, f1), (s2, f2), (s3, f3)]: [SineAndFall<Sides<L>>; 3],
+    ) -> [Sides<L>; 4] {
+        let [m, first, both] = [
+            on_both_sides(self.middle),
+            on_both_sides(self.first),
+            on_both_sides(self.both),
+        ];
+        let [second, third] = [self.second, self.third];
+        let same = Sides::same;
+        // With cosines as 1 + fall, nothing is lost where the angles are small.
+        let cs = s3 + f2 * s3;
+        let sc = s2 + s2 * f3;
+        let ss = s2 * s3;
+        let behind = [
+            same(second[0]) * sc + same(third[0]) * cs + both[0] * ss,
+            same(second[1]) * sc + same(third[1]) * cs + both[1] * ss,
+            same(second[2]) * sc + same(third[2]) * cs + both[2] * ss,
+            f2 + f3 + f2 * f3 + both[3] * ss,
+        ];
+        let own = [
+            first[0] * s1 + m[0] * f1,
+            first[1] * s1 + m[1] * f1,
+            first[2] * s1 + m[2] * f1,
+            first[3] * s1 + m[3] * f1,
+        ];
+        let start = [m[0] + own[0], m[1] + own[1], m[2] + own[2], m[3] + own[3]];
+        let [x, y, z, w] = product(start, behind);
+        [x + own[0], y + own[1], z + own[2], w + own[3]]
     }
+}
+
+#[inline(always)]
+fn on_both_sides<L: Lanes>([x, y, z, w]: [L; 4]) -> [Sides<L>; 4] {
+    [
+        Sides::same(x),
+        Sides::same(y),
+        Sides::same(z),
+        Sides::same(w),
+    ]
 }
 
 /// The same with what the angles are made of.
@@ -281,37 +295,31 @@ impl<L: Lanes> Expanded<L> {
         samples.middle = self.curve.middle;
         for k in 0..PAIRS {
             let s = L::all(nodes.at[k]);
-            let first = self.turns::<SHORT>(0, s);
-            let second = self.turns::<SHORT>(1, s);
-            let third = self.turns::<SHORT>(2, s);
-            samples.set_differences(
-                k,
-                self.curve.differences([
-                    [first[0], second[0], third[0]],
-                    [first[1], second[1], third[1]],
-                ]),
-            );
+            let turns = [
+                self.turns::<SHORT>(0, s),
+                self.turns::<SHORT>(1, s),
+                self.turns::<SHORT>(2, s),
+            ];
+            samples.set_differences(k, self.curve.differences(turns));
         }
         samples
     }
 
     /// Of the j-th angle, at `-s` and at `s`.
     #[inline(always)]
-    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> [SineAndFall<L>; 2] {
+    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> SineAndFall<Sides<L>> {
         let [linear, quadratic, cubic] = self.powers[j];
         let rise = cubic * s;
-        // The same as with -s, to the bit.
-        let before = -((linear - (quadratic - rise) * s) * s);
-        let after = ((rise + quadratic) * s + linear) * s;
-        let square = self.squares[j];
-        let (to, from) = (square * (before * before), square * (after * after));
+        let angle = Sides {
+            // The same as with -s, to the bit.
+            before: -((linear - (quadratic - rise) * s) * s),
+            after: ((rise + quadratic) * s + linear) * s,
+        };
+        let square = Sides::same(self.squares[j]) * (angle * angle);
         if SHORT {
-            [
-                short_sine_and_fall(before, to),
-                short_sine_and_fall(after, from),
-            ]
+            short_sine_and_fall(angle, square)
         } else {
-            [sine_and_fall(before, to), sine_and_fall(after, from)]
+            sine_and_fall(angle, square)
         }
     }
 }

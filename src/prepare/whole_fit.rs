@@ -7,10 +7,11 @@ use super::fit::{MOST, Samples, TOLERANCE, interpolate};
 use super::intervals::{LANES, ROOM, rounded};
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::{AboutMiddle, SineAndFall};
+use super::sides::Sides;
 use super::turns::{exact_exp, exp, widened};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::{normalised, product, scaled, square};
-use crate::cpu::{InLanes, Lanes, both, brought_behind, in_lanes};
+use crate::cpu::{InLanes, Lanes, Number, both, brought_behind, in_lanes};
 use crate::segment::PolynomialSegment;
 
 /// Some lanes.
@@ -151,7 +152,7 @@ pub(super) struct Part<const PAIRS: usize> {
     /// The basis functions at its middle.
     weights: [f32; 3],
     /// What they gain from there on, up to `-s` and to `s` at each node `s`.
-    gains: [[[Gain; 3]; 2]; PAIRS],
+    gains: [[[Gain; 2]; 3]; PAIRS],
     /// See [`TOLERANCE`].
     tolerance: f32,
     /// Of all, or of a half: there the second gains as much after the middle as before.
@@ -179,14 +180,19 @@ impl<const PAIRS: usize> Part<PAIRS> {
                 ((3.0 - 2.0 * m) * m * m) as f32,
                 (m * m * m) as f32,
             ],
-            gains: [[[Gain::new(0.0); 3]; 2]; PAIRS],
+            gains: [[[Gain::new(0.0); 2]; 3]; PAIRS],
             tolerance: TOLERANCE,
             is_whole: width == 1.0,
         };
         let mut k = 0;
         while k < PAIRS {
             let s = nodes.at[k] as f64 * width;
-            part.gains[k] = [gains(m, -s), gains(m, s)];
+            let (before, after) = (gains(m, -s), gains(m, s));
+            let mut j = 0;
+            while j < 3 {
+                part.gains[k][j] = [before[j], after[j]];
+                j += 1;
+            }
             k += 1;
         }
         part
@@ -245,6 +251,7 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
     fn fit<L: Lanes, const IS_WHOLE: bool>(&mut self) {
         let &List { count, ref lanes } = self.list;
         let tolerance = self.part.tolerance;
+        let mut samples = Samples::all(L::all(0.0));
         for i in (0..count).step_by(L::COUNT) {
             let lanes = &lanes[i..i + L::COUNT];
             let own = &lanes[..L::COUNT.min(count - i)];
@@ -254,7 +261,6 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
             let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
             let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
             let vectors = [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]];
-            let mut samples = Samples::all(L::all(0.0));
             sample::<L, PAIRS, IS_WHOLE>(&mut samples, start, vectors, self.part);
             let mut places = [self.segments.len() - 1; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
@@ -297,18 +303,21 @@ fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
     let curve = AboutMiddle::new(middle, [v1, v2, w3]);
     let squares = [square(v1), square(v2), square(w3)];
     samples.middle = middle;
-    for (k, [before, after]) in part.gains.iter().enumerate() {
-        let after = turns(after, squares);
-        let before = if IS_WHOLE {
-            [
-                turned(before[0], squares[0]),
-                (-after[1].0, after[1].1),
-                turned(before[2], squares[2]),
-            ]
+    for (k, gains) in part.gains.iter().enumerate() {
+        let second = if IS_WHOLE {
+            let [_, after] = gains[1];
+            let (sine, fall) = turned(L::all(after.gain), L::all(after.squared), squares[1]);
+            let sine = Sides {
+                before: -sine,
+                after: sine,
+            };
+            (sine, Sides::same(fall))
         } else {
-            turns(before, squares)
+            on_both_sides(gains[1], squares[1])
         };
-        samples.set_differences(k, curve.differences([before, after]));
+        let first = on_both_sides(gains[0], squares[0]);
+        let third = on_both_sides(gains[2], squares[2]);
+        samples.set_differences(k, curve.differences([first, second, third]));
     }
 }
 
@@ -327,12 +336,16 @@ fn exact_middle<L: Lanes>(
 }
 
 #[inline(always)]
-fn turns<L: Lanes>(gains: &[Gain; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
-    [
-        turned(gains[0], squares[0]),
-        turned(gains[1], squares[1]),
-        turned(gains[2], squares[2]),
-    ]
+fn on_both_sides<L: Lanes>([before, after]: [Gain; 2], square: L) -> SineAndFall<Sides<L>> {
+    let gain = Sides {
+        before: L::all(before.gain),
+        after: L::all(after.gain),
+    };
+    let squared = Sides {
+        before: L::all(before.squared),
+        after: L::all(after.squared),
+    };
+    turned(gain, squared, Sides::same(square))
 }
 
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
@@ -340,13 +353,12 @@ fn turns<L: Lanes>(gains: &[Gain; 3], squares: [L; 3]) -> [SineAndFall<L>; 3] {
 const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
 const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
-/// Of a vector with that square, times a gain.
+/// Of a vector with that square, times a gain with the square `squared`.
 #[inline(always)]
-fn turned<L: Lanes>(Gain { gain, squared }: Gain, square: L) -> SineAndFall<L> {
-    let z = square * L::all(squared);
-    let gain = L::all(gain);
-    let sinc = ((L::all(SINC[2]) * z + L::all(SINC[1])) * z + L::all(SINC[0])) * z;
-    let fall = ((L::all(FALL[2]) * z + L::all(FALL[1])) * z + L::all(FALL[0])) * z;
+fn turned<N: Number>(gain: N, squared: N, square: N) -> SineAndFall<N> {
+    let z = square * squared;
+    let sinc = ((N::all(SINC[2]) * z + N::all(SINC[1])) * z + N::all(SINC[0])) * z;
+    let fall = ((N::all(FALL[2]) * z + N::all(FALL[1])) * z + N::all(FALL[0])) * z;
     (gain * sinc + gain, fall)
 }
 

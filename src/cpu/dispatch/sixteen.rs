@@ -7,9 +7,9 @@ use std::arch::x86_64::{
     _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
     _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
     _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
-    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_sqrt_pd,
-    _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps,
-    _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
+    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
+    _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
+    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
 };
 
 use super::Eight;
@@ -17,6 +17,7 @@ use super::doubles::doubles;
 use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
 use crate::cpu::stage::Line;
+use crate::segment::PolynomialSegment;
 use crate::segment::shader::TINY_BITS;
 
 /// What only processors with AVX-512 do.
@@ -65,6 +66,23 @@ impl Sixteen {
             let order = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
             _mm512_permutexvar_ps(order, self.0)
         })
+    }
+
+    /// The first quarters of four vectors side by side, and so on.
+    #[inline(always)]
+    fn quarters_exchanged([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        avx512! {
+            let ab_even = _mm512_shuffle_f32x4::<0b10_00_10_00>(a.0, b.0);
+            let ab_odd = _mm512_shuffle_f32x4::<0b11_01_11_01>(a.0, b.0);
+            let cd_even = _mm512_shuffle_f32x4::<0b10_00_10_00>(c.0, d.0);
+            let cd_odd = _mm512_shuffle_f32x4::<0b11_01_11_01>(c.0, d.0);
+            [
+                Self(_mm512_shuffle_f32x4::<0b10_00_10_00>(ab_even, cd_even)),
+                Self(_mm512_shuffle_f32x4::<0b10_00_10_00>(ab_odd, cd_odd)),
+                Self(_mm512_shuffle_f32x4::<0b11_01_11_01>(ab_even, cd_even)),
+                Self(_mm512_shuffle_f32x4::<0b11_01_11_01>(ab_odd, cd_odd)),
+            ]
+        }
     }
 
     /// A rotation in each quarter.
@@ -220,6 +238,28 @@ impl Lanes for Sixteen {
     #[inline(always)]
     fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+        // A vector for each lane and four powers: a quarter as many stores. The last four
+        // begin with what is stored already.
+        for i in 0..powers.len().div_ceil(4) {
+            let first = (4 * i).min(powers.len() - 4);
+            let a = Self::transposed(powers[first]);
+            let b = Self::transposed(powers[first + 1]);
+            let c = Self::transposed(powers[first + 2]);
+            let d = Self::transposed(powers[first + 3]);
+            for quarter in 0..4 {
+                let own = [a[quarter], b[quarter], c[quarter], d[quarter]];
+                let own = Self::quarters_exchanged(own);
+                for j in 0..4 {
+                    let rotations: [[f32; 4]; 4] = bytemuck::cast(own[j].0);
+                    let segment = &mut segments[places[4 * quarter + j]];
+                    segment.coefficients[first..first + 4].copy_from_slice(&rotations);
+                }
+            }
+        }
     }
 
     #[inline(always)]
