@@ -3,8 +3,6 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use super::arc_lanes::{LANES, arc_anyhow, arc_in_lanes};
 use super::set::Prepare;
 use super::{NONE, Part, Prepared, Source};
@@ -24,6 +22,8 @@ pub(crate) struct ArcBlock {
     count: usize,
     /// -1 where the second key's sign is turned.
     flips: [f32; LANES],
+    /// Whether any may be.
+    any_flips: bool,
     /// As if each interval's first key counted as stored.
     middles: [[f32; 4]; LANES],
     tangents: [[f32; 4]; LANES],
@@ -37,6 +37,7 @@ impl ArcBlock {
             is_first: [false; LANES],
             count: 0,
             flips: [1.0; LANES],
+            any_flips: false,
             middles: [[0.0; 4]; LANES],
             tangents: [[0.0; 4]; LANES],
         }
@@ -47,6 +48,7 @@ impl InLanes for ArcBlock {
     /// Works out every interval that waits.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
+        let mut any_flips = false;
         for j in (0..self.count).step_by(L::COUNT) {
             let lanes = j..j + L::COUNT;
             let from = L::load_rotations(&self.from[j..]);
@@ -54,6 +56,7 @@ impl InLanes for ArcBlock {
             L::store_rotations(arcs.middle, &mut self.middles[lanes.clone()]);
             L::store_rotations(arcs.tangent, &mut self.tangents[lanes.clone()]);
             arcs.flip.store(&mut self.flips[lanes.clone()]);
+            any_flips |= arcs.any_in_doubt || arcs.flip.any_at_most(-1.0);
             if arcs.any_in_doubt {
                 for lane in lanes {
                     let (arc, flip) = arc_anyhow(self.from[lane], self.to[lane]);
@@ -63,6 +66,7 @@ impl InLanes for ArcBlock {
                 }
             }
         }
+        self.any_flips = any_flips;
     }
 }
 
@@ -100,8 +104,8 @@ impl Prepare for ArcPreparation {
         let first_key = prepared.constants.len() as u32;
         let first_span = prepared.spans.len();
         let last_key = first_key + intervals.len() as u32;
-        let keys = track.keys[start..=end].iter();
-        prepared.constants.extend(keys.map(Quat::to_array));
+        let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
+        prepared.constants.extend_from_slice(&keys[start..=end]);
         // Every interval has one span and one segment; a long arc has two of each.
         let segments = (prepared.segments.len() + self.block.count) as u32;
         let spans = &mut prepared.spans;
@@ -138,22 +142,22 @@ impl Prepare for ArcPreparation {
             },
             beyond,
         });
+        if long.is_empty() {
+            self.push(prepared, keys, intervals);
+            return Ok(());
+        }
         let mut halves = long.iter().peekable();
         for key in intervals {
-            let middle = match long.is_empty() {
-                true => None,
-                false => halves.next_if(|half| half.key == key),
-            };
+            let middle = halves.next_if(|half| half.key == key);
             if let Some(half) = middle {
                 let lane = self.lane(prepared);
-                self.block.from[lane] = track.keys[key].to_array();
+                self.block.from[lane] = keys[key];
                 self.block.to[lane] = half.middle;
                 self.block.is_first[lane] = key == 0;
             }
             let lane = self.lane(prepared);
-            let from = middle.map_or(track.keys[key].to_array(), |half| half.middle);
-            self.block.from[lane] = from;
-            self.block.to[lane] = track.keys[key + 1].to_array();
+            self.block.from[lane] = middle.map_or(keys[key], |half| half.middle);
+            self.block.to[lane] = keys[key + 1];
             self.block.is_first[lane] = key == 0 && middle.is_none();
         }
         Ok(())
@@ -201,6 +205,23 @@ impl ArcPreparation {
         Ok(long)
     }
 
+    /// Takes intervals between these keys, none of which is long.
+    fn push(&mut self, prepared: &mut Prepared, keys: &[[f32; 4]], mut intervals: Range<usize>) {
+        while !intervals.is_empty() {
+            if self.block.count == LANES {
+                self.flush(prepared);
+            }
+            let own = self.block.count..LANES.min(self.block.count + intervals.len());
+            let end = intervals.start + own.len();
+            self.block.from[own.clone()].copy_from_slice(&keys[intervals.start..end]);
+            self.block.to[own.clone()].copy_from_slice(&keys[intervals.start + 1..=end]);
+            self.block.is_first[own.clone()].fill(false);
+            self.block.is_first[own.start] = intervals.start == 0;
+            self.block.count = own.end;
+            intervals.start = end;
+        }
+    }
+
     /// The next lane that is free.
     #[inline(always)]
     fn lane(&mut self, prepared: &mut Prepared) -> usize {
@@ -218,23 +239,31 @@ impl ArcPreparation {
         };
         let block = &mut self.block;
         let count = std::mem::take(&mut block.count);
+        let arcs = block.middles.iter().zip(&block.tangents).take(count);
+        if !block.any_flips && self.sign == 1.0 {
+            segments.extend(arcs.map(|(&middle, &tangent)| ArcSegment { middle, tangent }));
+            return;
+        }
         let lanes = block.is_first.iter().zip(&block.flips);
-        let arcs = block.middles.iter().zip(&block.tangents);
-        segments.extend(lanes.zip(arcs).take(count).map(
-            |((&is_first, flip), (&middle, &tangent))| {
-                let sign = if is_first { 1.0 } else { self.sign };
-                self.sign = sign * flip;
-                ArcSegment {
-                    middle: middle.map(|c| c * sign),
-                    tangent: tangent.map(|c| c * sign),
-                }
-            },
-        ));
+        segments.extend(
+            lanes
+                .zip(arcs)
+                .map(|((&is_first, flip), (&middle, &tangent))| {
+                    let sign = if is_first { 1.0 } else { self.sign };
+                    self.sign = sign * flip;
+                    ArcSegment {
+                        middle: middle.map(|c| c * sign),
+                        tangent: tangent.map(|c| c * sign),
+                    }
+                }),
+        );
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
     use crate::cpu::at_every_width;
 

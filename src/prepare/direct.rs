@@ -86,24 +86,30 @@ impl Direct {
         !self.steps.are_in_doubt
     }
 
-    /// -1 where the sign of an interval's second key is turned.
-    pub(super) fn flip(&self, lane: usize) -> f64 {
-        f64::from(self.steps.flips[lane])
+    /// Sets the signs of the first keys of a stretch, the first of which has this one; that of
+    /// the key that it ends with.
+    pub(super) fn align(&self, intervals: &mut Intervals, stretch: &Stretch, first: f64) -> f64 {
+        let signs = &mut intervals.signs[stretch.lanes()];
+        if !self.steps.any_flips {
+            signs.fill(first);
+            return first;
+        }
+        let mut next = first;
+        for (sign, &flip) in signs.iter_mut().zip(&self.steps.flips[stretch.lanes()]) {
+            *sign = next;
+            next *= f64::from(flip);
+        }
+        next
     }
 
     /// Finds what curves are made of; the signs of the intervals' first keys are known.
     pub(super) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         self.joints.bring(intervals, stretches);
-        if self.gentle.look(&self.steps, stretches) {
+        self.gentle.look(&self.steps, stretches);
+        if self.gentle.may_hold() {
             (self.gentle).prepare(intervals, &self.steps, &self.joints, stretches);
         }
-        self.whole.wanted.fill(false);
-        for lanes in stretches.iter().map(Stretch::lanes) {
-            let are_gentle = &self.gentle.holds[lanes.clone()];
-            for (wanted, is_gentle) in self.whole.wanted[lanes].iter_mut().zip(are_gentle) {
-                *wanted = !is_gentle;
-            }
-        }
+        self.whole.wanted = self.gentle.holds.map(|is_gentle| !is_gentle);
         in_lanes(&mut FindHandles {
             lanes: &mut self.whole,
             steps: &self.steps,
@@ -128,19 +134,27 @@ impl Direct {
         for (i, own) in self.places[lanes.clone()].iter_mut().enumerate() {
             *own = (first_place + i) as u32;
         }
-        let energies = self.whole.energies[lanes.clone()].iter();
-        let are_gentle = self.gentle.holds[lanes.clone()].iter();
-        for (lane, (&energy, &is_gentle)) in lanes.zip(energies.zip(are_gentle)) {
-            let is_short = energy <= GENTLE as f32;
-            let is_whole = energy <= LONGEST_WHOLE as f32;
-            // Which lanes are which cannot be foreseen.
-            self.few_powers.push_if(is_short & !is_gentle, lane);
-            (self.all_powers).push_if(is_whole & !is_short & !is_gentle, lane);
-            if is_gentle {
+        if self.gentle.may_hold() {
+            for lane in lanes.clone().filter(|&lane| self.gentle.holds[lane]) {
                 let place = self.places[lane] as usize;
                 self.gentle.write(lane, &mut polynomials(prepared)[place]);
-            } else if energy <= LONGEST_DIRECT as f32 {
-                self.long.push_if(!is_whole, lane);
+                // On no list.
+                self.whole.energies[lane] = -1.0;
+            }
+        }
+        let energies = &self.whole.energies[lanes.clone()];
+        let [short, whole, direct] =
+            [GENTLE, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
+        let is_usual = |energy: f32| energy > short && energy <= whole;
+        (self.all_powers).push_where(lanes.clone(), energies, is_usual);
+        for (lane, &energy) in lanes.zip(energies) {
+            if is_usual(energy) {
+                continue;
+            }
+            if energy <= short {
+                self.few_powers.push_if(energy >= 0.0, lane);
+            } else if energy <= direct {
+                self.long.push(lane);
             } else {
                 self.left_over.push(lane);
             }

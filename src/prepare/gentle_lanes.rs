@@ -37,8 +37,8 @@ impl GentleLanes {
         }
     }
 
-    /// Finds out which keys are near each other; whether any curve may turn little.
-    pub(super) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) -> bool {
+    /// Finds out which keys are near each other.
+    pub(super) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) {
         for j in 1..LANES {
             let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
             self.near[j] = (chords[0] <= LONGEST_STEP)
@@ -53,7 +53,6 @@ impl GentleLanes {
         }
         // A lane's curve is worked out one lane before it.
         self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
-        last.is_some()
     }
 
     /// Prepares them; the signs of the intervals' first keys are known.
@@ -84,6 +83,11 @@ impl GentleLanes {
             }
             own.holds[lane] = curve.holds;
         }
+    }
+
+    /// Whether any lane may have its curve.
+    pub(super) fn may_hold(&self) -> bool {
+        self.wanted > 0
     }
 
     /// Writes it.

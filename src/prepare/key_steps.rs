@@ -20,6 +20,8 @@ pub(super) struct KeySteps {
     may_flip: bool,
     /// -1 where the sign of an interval's second key is turned.
     pub(super) flips: Row,
+    /// Whether any is.
+    pub(super) any_flips: bool,
     /// The squares of the differences of keys.
     pub(super) chords: Row,
     /// The steps' logarithms.
@@ -33,6 +35,7 @@ impl KeySteps {
         Self {
             may_flip: path == Path::Shortest,
             flips: [1.0; ROOM],
+            any_flips: false,
             chords: [0.0; ROOM],
             logs: [[0.0; ROOM]; 3],
             are_in_doubt: false,
@@ -51,7 +54,7 @@ impl InLanes for FindSteps<'_> {
     fn run<L: Lanes>(&mut self) {
         let Intervals { from, to, .. } = self.intervals;
         let own = &mut *self.steps;
-        let mut are_in_doubt = false;
+        let (mut are_in_doubt, mut any_flips) = (false, false);
         for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
             let start = L::load_rotations(&from[lane..]);
             let [x, y, z, w] = L::load_rotations(&to[lane..]);
@@ -70,10 +73,11 @@ impl InLanes for FindSteps<'_> {
                 vector: step_vector(start, chord),
                 fall: chord_square * L::all(-0.5),
             };
+            any_flips |= flip.any_at_most(-1.0);
             flip.store(&mut own.flips[lane..lane + L::COUNT]);
             chord_square.store(&mut own.chords[lane..lane + L::COUNT]);
             store(&mut own.logs, lane, log(step, &LOG));
         }
-        own.are_in_doubt = are_in_doubt;
+        (own.are_in_doubt, own.any_flips) = (are_in_doubt, any_flips);
     }
 }

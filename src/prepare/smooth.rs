@@ -3,8 +3,6 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use super::direct::Direct;
 use super::fitting::Fitting;
 use super::intervals::{Intervals, LANES, Stretch};
@@ -91,8 +89,10 @@ impl Prepare for SmoothPreparation {
         let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
         let last_key = first_key + intervals.len() as u32;
         if of_rotations && meets_keys {
-            let keys = track.keys[intervals.start..=intervals.end].iter();
-            prepared.constants.extend(keys.map(Quat::to_array));
+            let keys = &track.keys[intervals.start..=intervals.end];
+            prepared
+                .constants
+                .extend_from_slice(bytemuck::cast_slice(keys));
         } else if meets_keys {
             prepared.constant(STILL);
         }
@@ -352,12 +352,12 @@ impl SmoothPreparation {
             if stretch.begins {
                 self.sign = 1.0;
             }
+            if let (false, Some(direct)) = (by_steps, &self.direct) {
+                self.sign = direct.align(&mut self.intervals, stretch, self.sign);
+                continue;
+            }
             for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
                 self.intervals.signs[lane] = self.sign;
-                if let (false, Some(direct)) = (by_steps, &self.direct) {
-                    self.sign *= direct.flip(lane);
-                    continue;
-                }
                 let dot = self.intervals.dots[lane];
                 // A method that takes its own path has its own way between opposites.
                 let refuses = self.interpolation.method.path.is_none();

@@ -1,6 +1,8 @@
 //! Curves from their first key and three half-rotation vectors, in vector lanes of f32: fits
 //! of the whole, or of its halves.
 
+use std::ops::Range;
+
 use bytemuck::Zeroable as _;
 
 use super::fit::{MOST, Samples, TOLERANCE, interpolate};
@@ -41,6 +43,22 @@ impl List {
     pub(super) fn push_if(&mut self, is_wanted: bool, lane: usize) {
         self.lanes[self.count % ROOM_FOR] = lane as u32;
         self.count += usize::from(is_wanted);
+    }
+
+    /// Adds those of some lanes that are wanted: which they are cannot be foreseen.
+    #[inline]
+    pub(super) fn push_where(
+        &mut self,
+        lanes: Range<usize>,
+        energies: &[f32],
+        is_wanted: impl Fn(f32) -> bool,
+    ) {
+        let mut count = self.count;
+        for (lane, &energy) in lanes.zip(energies) {
+            self.lanes[count % ROOM_FOR] = lane as u32;
+            count += usize::from(is_wanted(energy));
+        }
+        self.count = count;
     }
 
     /// Takes the last one away.
