@@ -11,7 +11,7 @@ use crate::branchless::{Anywhere, log, normalised, step};
 use crate::cpu::{InLanes, Lanes, in_lanes};
 
 /// Worked out together: a block has few of them.
-pub(super) const AT_ONCE: usize = 4;
+pub(super) const AT_ONCE: usize = 8;
 
 /// A number of each.
 type Row = [f64; AT_ONCE];

@@ -17,7 +17,7 @@ use crate::method::Quantity;
 use crate::tracks::Track;
 
 /// Lanes worked out together.
-pub(super) const LANES: usize = 64;
+pub(super) const LANES: usize = 128;
 
 /// Room for the lanes, and for passes that look one further and end on whole vectors.
 pub(super) const ROOM: usize = LANES + 8;
