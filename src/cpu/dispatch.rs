@@ -25,7 +25,7 @@ use sixteen::Sixteen;
 use super::evaluate::Evaluate;
 use super::lanes::Lanes;
 use super::row::row;
-use super::stage::{Output, Staged};
+use super::stage::{Line, Output, Staged};
 use crate::clock::{FramesError, Timeline};
 use crate::cycle::Cycle;
 use crate::prepare::PartRef;
@@ -189,7 +189,7 @@ impl Kernels {
     }
 
     /// Whether long results are better written past the caches. A core of Intel's waits for
-    /// each line that it overwrites; AMD's (Zen 3) write as fast either way.
+    /// each line that it overwrites; AMD's (Zen 3, Zen 5) write about as fast either way.
     pub(crate) fn gain_past_caches(&self) -> bool {
         static IS_INTEL: OnceLock<bool> = OnceLock::new();
         self.width > VectorWidth::Baseline && *IS_INTEL.get_or_init(is_intel)
@@ -238,6 +238,18 @@ fn is_intel() -> bool {
 #[cfg(not(target_arch = "x86_64"))]
 fn is_intel() -> bool {
     false
+}
+
+/// Has memory brought into the cache, while what comes next is done.
+pub(crate) fn bring_near(memory: &[u8]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in memory.chunks(size_of::<Line>()) {
+        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+        // SAFETY: SSE is always there; nothing is read that counts.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = memory;
 }
 
 /// What this thread stored past the caches is seen before what it stores from here on.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Quat;
 use rayon::prelude::*;
 
-use super::dispatch::{Kernels, VectorWidth};
+use super::dispatch::{Kernels, VectorWidth, bring_near};
 use super::evaluate::FEW;
 use super::few::FewTimes;
 use super::memory::{Memories, Memory};
@@ -300,7 +300,13 @@ impl CpuEngine {
             for first in tracks.clone().step_by(tracks_each) {
                 prepared.clear();
                 let own = first..(first + tracks_each).min(tracks.end);
+                let next = own.end..(own.end + tracks_each).min(tracks.end);
                 preparation.push(prepared, set, own)?;
+                // By then the results have pushed everything out of the caches.
+                for (times, keys) in next.map(|track| set.times_and_keys(track)) {
+                    bring_near(bytemuck::cast_slice(times));
+                    bring_near(bytemuck::cast_slice(keys));
+                }
                 for part in &prepared.parts {
                     let part = PartRef { prepared, part };
                     stage.row(samples, |samples, output| {
@@ -317,7 +323,7 @@ impl CpuEngine {
         }
         let work = || {
             // Several turns for each task, whose memory serves them all.
-            let tasks = 8 * rayon::current_num_threads();
+            let tasks = 32 * rayon::current_num_threads();
             let turns = tracks.len().div_ceil(tracks_each).div_ceil(tasks);
             let each = turns * tracks_each;
             output

@@ -15,7 +15,10 @@ pub(super) struct Memory {
     pub(super) preparation: Preparation,
 }
 
-/// What threads have given back.
+/// So many ways to interpolate are asked for in turns; transforms alone take three.
+const KEPT_EACH: usize = 4;
+
+/// What threads have given back, the latest last.
 #[derive(Default)]
 pub(super) struct Memories(Mutex<Vec<Memory>>);
 
@@ -27,9 +30,11 @@ impl Memories {
         timeline: &Timeline,
         set: &TrackSet,
     ) -> Memory {
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let suits = |memory: &Memory| memory.interpolation == *interpolation;
-        let mut memory = kept.filter(suits).unwrap_or_else(|| Memory {
+        let own = (kept.iter().rposition(suits)).map(|place| kept.remove(place));
+        drop(kept);
+        let mut memory = own.unwrap_or_else(|| Memory {
             interpolation: *interpolation,
             prepared: Prepared::new(interpolation),
             preparation: Preparation::new(interpolation),
@@ -41,8 +46,40 @@ impl Memories {
     /// Only after success: what failed may be half way.
     pub(super) fn give_back(&self, memory: Memory) {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() < rayon::current_num_threads() {
-            kept.push(memory);
+        if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
+            kept.remove(0);
         }
+        kept.push(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::Generate;
+    use crate::{Device, Engine, Frames, method};
+
+    /// Catches what is made anew where two methods take turns, and memory without end.
+    #[test]
+    fn each_way_to_interpolate_finds_its_memory_again() {
+        let set = Generate::default().track_set().unwrap();
+        let clip = (Engine::new(Device::Cpu).unwrap())
+            .upload(&set, method::SLERP)
+            .unwrap();
+        let timeline = clip.timeline(&Frames::fps(60)).unwrap();
+        let memories = Memories::default();
+        let take = |own| memories.take(&Interpolation::from(own), &timeline, &set);
+        let kept = || memories.0.lock().unwrap().len();
+        for own in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            memories.give_back(take(own));
+        }
+        assert_eq!(kept(), 2);
+        let first = take(method::SLERP);
+        assert_eq!(kept(), 1);
+        memories.give_back(first);
+        for _ in 0..9 * rayon::current_num_threads() {
+            memories.give_back(Memories::default().take(&method::SLERP.into(), &timeline, &set));
+        }
+        assert_eq!(kept(), KEPT_EACH * rayon::current_num_threads());
     }
 }
