@@ -27,6 +27,9 @@ use crate::window::Window;
 /// share a short result among all threads.
 const TASK: usize = 16 * 1024;
 
+/// Rotations of a task's turn at most, where results are long.
+const TURN: usize = 3 * TASK;
+
 /// Tracks whose rows are made before they are written into frames: whole cache lines.
 const TILE: usize = 16;
 
@@ -286,7 +289,10 @@ impl CpuEngine {
             return self.sampled(set, tracks, (interpolation, straight), timeline, output);
         }
         let keys_each = set.key_count().div_ceil(set.track_count()).max(1);
-        let tracks_each = (TASK / samples).min(TASK_KEYS / keys_each).max(1);
+        // As many as fill blocks best, where there are turns enough for all threads.
+        let shared = tracks.len() / (8 * rayon::current_num_threads());
+        let tracks_each = shared.clamp(TASK / samples, TURN / samples);
+        let tracks_each = tracks_each.min(TASK_KEYS / keys_each).max(1);
         let rotations = output.len();
         let task = |first: usize, rows: &mut [_]| -> Result<(), Error> {
             let tracks = first..first + rows.len() / samples;

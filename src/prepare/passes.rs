@@ -1,6 +1,7 @@
 //! Passes over the lanes of a block, in vectors.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use super::fit::MOST;
 use super::intervals::{
@@ -76,25 +77,20 @@ fn keys<L: Lanes>(keys: &[[f32; 4]; ROOM], signs: &Lane, lane: usize) -> [L::Dou
 pub(super) struct FramesHeld<'a> {
     pub(super) clock: FrameClock,
     pub(super) intervals: &'a Intervals,
+    pub(super) lanes: Range<usize>,
     pub(super) held: [bool; LANES],
 }
 
 impl InLanes for FramesHeld<'_> {
-    // Loops that the compiler makes vectors of.
-    #[allow(clippy::needless_range_loop)]
+    // A loop that the compiler makes vectors of.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let (mut from, mut to) = ([0.0; LANES], [0.0; LANES]);
         let Intervals { starts, ends, .. } = self.intervals;
-        for j in 0..LANES {
-            from[j] = self.clock.first_frame(starts[j]);
-            to[j] = self.clock.first_frame(ends[j]);
+        let (starts, ends) = (&starts[self.lanes.clone()], &ends[self.lanes.clone()]);
+        let held = &mut self.held[self.lanes.clone()];
+        for j in 0..starts.len().min(ends.len()).min(held.len()) {
+            held[j] = self.clock.first_frame(starts[j]) < self.clock.first_frame(ends[j]);
         }
-        let mut held = [true; LANES];
-        for j in 0..LANES {
-            held[j] = from[j] < to[j];
-        }
-        self.held = held;
     }
 }
 

@@ -219,6 +219,7 @@ impl SmoothPreparation {
                 let mut held = FramesHeld {
                     clock: FrameClock::new(rate, start, latest),
                     intervals: &self.intervals,
+                    lanes: stretch.lanes(),
                     held: [true; LANES],
                 };
                 in_lanes(&mut held);
