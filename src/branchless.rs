@@ -12,8 +12,8 @@ use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub(crate) use near::{
-    Algebra, Anywhere, LONG_SQUARE, Near, SHORT_SQUARE, long_waves, near_arc_square, near_waves,
-    short_waves,
+    Algebra, Anywhere, LONG_SQUARE, MEDIUM_SQUARE, Near, SHORT_SQUARE, long_waves, medium_waves,
+    near_arc_square, near_waves, short_waves,
 };
 
 use crate::numeric::nearest_whole;

@@ -107,6 +107,23 @@ const SHORT_COSINE: [f64; 4] = [
 /// The largest square of an angle that [`short_waves`] takes.
 pub(crate) const SHORT_SQUARE: f64 = 0.25;
 
+/// The same for x² up to [`MEDIUM_SQUARE`], within 7e-9.
+const MEDIUM_SINC: [f64; 4] = [
+    -0.1666666661964308,
+    0.008333321292269242,
+    -0.0001983644687633356,
+    2.693786858624223e-06,
+];
+const MEDIUM_COSINE: [f64; 4] = [
+    -0.4999999948424723,
+    0.04166653459468085,
+    -0.001388359752363535,
+    2.412155240317313e-05,
+];
+
+/// The largest square of an angle that [`medium_waves`] takes.
+pub(crate) const MEDIUM_SQUARE: f64 = 1.25;
+
 /// The largest square of an angle that [`long_waves`] takes.
 pub(crate) const LONG_SQUARE: f64 = FRAC_PI_2 * FRAC_PI_2;
 
@@ -186,6 +203,15 @@ pub(crate) fn short_waves<R: Real>(square: R) -> (R, R) {
     (
         one_plus(&SHORT_SINC, square),
         one_plus(&SHORT_COSINE, square),
+    )
+}
+
+/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`MEDIUM_SQUARE`]; within 7e-9.
+#[inline(always)]
+pub(crate) fn medium_waves<R: Real>(square: R) -> (R, R) {
+    (
+        one_plus(&MEDIUM_SINC, square),
+        one_plus(&MEDIUM_COSINE, square),
     )
 }
 
@@ -287,7 +313,7 @@ mod tests {
 
     /// Catches a wrong digit in a polynomial.
     #[test]
-    fn short_waves_are_those_of_libm() {
+    fn short_and_medium_waves_are_those_of_libm() {
         for i in 0..=5_000 {
             let x = f64::from(i) * 1e-4;
             let (sinc, cosine) = short_waves(x * x);
@@ -295,6 +321,12 @@ mod tests {
             assert!((cosine - libm::cos(x)).abs() < 3e-12, "{x}");
         }
         assert_eq!(SHORT_SQUARE, 0.5 * 0.5);
+        for i in 0..=10_000 {
+            let square = MEDIUM_SQUARE * f64::from(i) / 10_000.0;
+            let (x, (sinc, cosine)) = (libm::sqrt(square), medium_waves(square));
+            assert!((sinc * x - libm::sin(x)).abs() < 1e-9, "{x}");
+            assert!((cosine - libm::cos(x)).abs() < 7e-9, "{x}");
+        }
     }
 
     /// Catches a wrong digit in a polynomial, and one used beyond its range.

@@ -76,10 +76,10 @@ impl Cutter {
         self.curves.push(curve);
     }
 
-    /// Adds the segments of a curve that is cut already.
-    pub(super) fn push_halves(&mut self, span: usize, segments: [usize; 2]) {
-        let halves = Piece::WHOLE.halves().into_iter().zip(segments);
-        self.parts.extend(halves.map(|(piece, segment)| Part {
+    /// Adds the segments of a curve that is cut into equal parts already.
+    pub(super) fn push_parts<const COUNT: usize>(&mut self, span: usize, segments: [usize; COUNT]) {
+        let parts = Piece::parts(COUNT).zip(segments);
+        self.parts.extend(parts.map(|(piece, segment)| Part {
             span,
             curve: NONE,
             piece,

@@ -1,5 +1,5 @@
 //! Smooth curves straight from keys, in f32: those that turn little as a series, others by
-//! a fit of the whole or of its halves. What is left over waits for a block of its own, in
+//! a fit of the whole, of its halves or of its quarters. What is left over waits for a block of its own, in
 //! f64.
 
 use std::ops::Range;
@@ -9,12 +9,12 @@ use super::far_keys::FarKeys;
 use super::fit::{GENTLE, LONGEST_WHOLE};
 use super::fitting::{Fitting, polynomials};
 use super::gentle_lanes::GentleLanes;
-use super::halves::Halves;
+use super::in_parts::{InParts, TakenCurves};
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
 use super::key_joints::KeyJoints;
 use super::key_steps::{FindSteps, KeySteps};
 use super::passes::Steps;
-use super::whole_fit::{GENTLE_WHOLE, List, Queue, WHOLE};
+use super::whole_fit::{GENTLE_WHOLE, HALVES, LONGEST_HALVED, List, QUARTERS, Queue, WHOLE};
 use super::whole_lanes::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
 use crate::cpu::in_lanes;
 use crate::method::{Ends, FromKeys, Path, Smooth};
@@ -38,10 +38,12 @@ pub(super) struct Direct {
     few_powers: List,
     waiting: Queue,
     waiting_places: [u32; ROOM],
-    /// Lanes that are too long for that, or do not fit.
+    /// Lanes that are too long for that, or do not fit; and even longer ones.
     long: List,
+    longest: List,
     /// Where they wait; made when there is one.
-    halves: Option<Box<Halves>>,
+    halves: Option<Box<InParts<2>>>,
+    quarters: Option<Box<InParts<4>>>,
     /// Lanes that are left over.
     left_over: List,
     /// Where they wait; made when there is one.
@@ -67,7 +69,9 @@ impl Direct {
             waiting: Queue::new(),
             waiting_places: [0; ROOM],
             long: List::new(),
+            longest: List::new(),
             halves: None,
+            quarters: None,
             left_over: List::new(),
             rest: None,
             find_far: how.find_far,
@@ -143,8 +147,8 @@ impl Direct {
             }
         }
         let energies = &self.whole.energies[lanes.clone()];
-        let [short, whole, direct] =
-            [GENTLE, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
+        let [short, whole, halved, direct] =
+            [GENTLE, LONGEST_WHOLE, LONGEST_HALVED, LONGEST_DIRECT].map(|most| most as f32);
         let is_usual = |energy: f32| energy > short && energy <= whole;
         (self.all_powers).push_where(lanes.clone(), energies, is_usual);
         for (lane, &energy) in lanes.zip(energies) {
@@ -153,8 +157,10 @@ impl Direct {
             }
             if energy <= short {
                 self.few_powers.push_if(energy >= 0.0, lane);
-            } else if energy <= direct {
+            } else if energy <= halved {
                 self.long.push(lane);
+            } else if energy <= direct {
+                self.longest.push(lane);
             } else {
                 self.left_over.push(lane);
             }
@@ -221,6 +227,9 @@ impl Direct {
         if let Some(halves) = &mut self.halves {
             halves.flush(prepared, fitting);
         }
+        if let Some(quarters) = &mut self.quarters {
+            quarters.flush(prepared, fitting);
+        }
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }
@@ -252,16 +261,25 @@ impl Direct {
 
     /// Has the longer curves cut.
     fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
-        for lane in self.long.iter() {
-            let shape = self.smooth.shape;
-            let halves = (self.halves).get_or_insert_with(|| Box::new(Halves::new(shape)));
-            let (span, place) = (self.spans[lane], self.places[lane]);
-            let duration = intervals.durations[lane];
-            if halves.push(&self.whole.numbers, lane, duration, span, place) {
-                halves.flush(prepared, fitting);
-            }
+        let shape = self.smooth.shape;
+        let curves = TakenCurves {
+            numbers: &self.whole.numbers,
+            durations: &intervals.durations,
+            spans: &self.spans,
+            places: &self.places,
+        };
+        if self.long.count() > 0 {
+            let new = || Box::new(InParts::new(&HALVES, shape));
+            let halves = self.halves.get_or_insert_with(new);
+            halves.take(&self.long, &curves, prepared, fitting);
+        }
+        if self.longest.count() > 0 {
+            let new = || Box::new(InParts::new(&QUARTERS, shape));
+            let quarters = self.quarters.get_or_insert_with(new);
+            quarters.take(&self.longest, &curves, prepared, fitting);
         }
         self.long.clear();
+        self.longest.clear();
     }
 }
 

@@ -135,9 +135,9 @@ impl Fitting {
         source
     }
 
-    /// Takes the segments of a span's curve, which is cut in two.
-    pub(super) fn take_halves(&mut self, span: usize, segments: [usize; 2]) {
-        self.cutter.push_halves(span, segments);
+    /// Takes the segments of a span's curve, which is cut into equal parts.
+    pub(super) fn take_parts<const COUNT: usize>(&mut self, span: usize, segments: [usize; COUNT]) {
+        self.cutter.push_parts(span, segments);
     }
 
     /// Takes the curve of a span that has its segment, and cuts it.

@@ -13,7 +13,7 @@ mod far_keys;
 mod fit;
 mod fitting;
 mod gentle_lanes;
-mod halves;
+mod in_parts;
 mod intervals;
 mod key_joints;
 mod key_steps;

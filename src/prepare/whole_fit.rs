@@ -1,5 +1,5 @@
 //! Curves from their first key and three half-rotation vectors, in vector lanes of f32: fits
-//! of the whole, or of its halves.
+//! of the whole, or of parts of equal length.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use super::intervals::{LANES, ROOM, rounded};
 use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
 use super::sample::{AboutMiddle, SineAndFall};
 use super::sides::Sides;
-use super::turns::{exact_exp, exp, widened};
+use super::turns::{exact_exp, long_exp, short_exp, widened};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::{normalised, product, scaled, square};
-use crate::cpu::{InLanes, Lanes, Number, both, brought_behind, in_lanes};
+use crate::cpu::{InLanes, Lanes, Number, Turn, both, brought_behind, in_lanes};
 use crate::segment::PolynomialSegment;
 
 /// Some lanes.
@@ -173,7 +173,7 @@ pub(super) struct Part<const PAIRS: usize> {
     gains: [[[Gain; 2]; 3]; PAIRS],
     /// See [`TOLERANCE`].
     tolerance: f32,
-    /// Of all, or of a half: there the second gains as much after the middle as before.
+    /// Of all, not of less: there the second gains as much after the middle as before.
     is_whole: bool,
 }
 
@@ -187,6 +187,15 @@ pub(super) const HALVES: [Part<5>; 2] = [
     Part::new(&FULL_NODES, 0.25, 0.5),
     Part::new(&FULL_NODES, 0.75, 0.5),
 ];
+pub(super) const QUARTERS: [Part<5>; 4] = [
+    Part::new(&FULL_NODES, 0.125, 0.25),
+    Part::new(&FULL_NODES, 0.375, 0.25),
+    Part::new(&FULL_NODES, 0.625, 0.25),
+    Part::new(&FULL_NODES, 0.875, 0.25),
+];
+
+/// Above this hardly any curve is fitted in halves.
+pub(super) const LONGEST_HALVED: f64 = 0.6;
 
 impl<const PAIRS: usize> Part<PAIRS> {
     const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
@@ -306,10 +315,10 @@ fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
     part: &Part<PAIRS>,
 ) {
     let [b1, b2, b3] = part.weights;
-    let third_turn = exp(scaled(w3, L::all(b3)));
-    let second_turn = both(exp(scaled(w2, L::all(b2))), third_turn);
+    let third_turn = exp::<L, IS_WHOLE>(w3, b3);
+    let second_turn = both(exp::<L, IS_WHOLE>(w2, b2), third_turn);
     let middle = if IS_WHOLE {
-        let turn = both(exp(scaled(w1, L::all(b1))), second_turn);
+        let turn = both(exp::<L, IS_WHOLE>(w1, b1), second_turn);
         let [x, y, z] = turn.vector;
         let [x, y, z, w] = product(start, [x, y, z, turn.fall]);
         [x + start[0], y + start[1], z + start[2], w + start[3]]
@@ -336,6 +345,17 @@ fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
         let first = on_both_sides(gains[0], squares[0]);
         let third = on_both_sides(gains[2], squares[2]);
         samples.set_differences(k, curve.differences([first, second, third]));
+    }
+}
+
+/// The exponential of so many times a vector.
+#[inline(always)]
+fn exp<L: Lanes, const SHORT: bool>(vector: [L; 3], times: f32) -> Turn<L> {
+    let vector = scaled(vector, L::all(times));
+    if SHORT {
+        short_exp(vector)
+    } else {
+        long_exp(vector)
     }
 }
 
@@ -394,10 +414,10 @@ mod tests {
         assert_near(&SINC.map(f64::from), LARGEST, sinc, 3e-9);
         let cosine = |z: f64| libm::cos(libm::sqrt(z));
         assert_near(&FALL.map(f64::from), LARGEST, cosine, 3e-9);
-        let [first, second] = &HALVES;
         for (parts, longest) in [
-            (&[&WHOLE][..], LONGEST_WHOLE),
-            (&[first, second], LONGEST_DIRECT),
+            (&[WHOLE][..], LONGEST_WHOLE),
+            (&HALVES, LONGEST_HALVED),
+            (&QUARTERS, LONGEST_DIRECT),
         ] {
             let gains = parts.iter().flat_map(|part| part.gains.as_flattened());
             let most = gains

@@ -1,4 +1,5 @@
-//! Curves straight from keys that are fitted in halves: they wait until a block is full.
+//! Curves straight from keys that are fitted in parts of equal length: they wait until a block
+//! is full.
 
 use std::array;
 
@@ -9,71 +10,86 @@ use super::curve::{Curve, Piece};
 use super::fitting::{Fitting, polynomials};
 use super::intervals::{LANES, ROOM};
 use super::shape::Shape;
-use super::whole_fit::{HALVES, List, Queue};
+use super::whole_fit::{List, Part, Queue};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::ratio;
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
-/// Such curves.
-pub(super) struct Halves {
+/// Curves in the lanes of a block, each of which is to become the span that has this segment.
+pub(super) struct TakenCurves<'a> {
+    pub(super) numbers: &'a CurveNumbers,
+    pub(super) durations: &'a [f64; ROOM],
+    pub(super) spans: &'a [u32; ROOM],
+    pub(super) places: &'a [u32; ROOM],
+}
+
+/// Such curves, of so many parts each.
+pub(super) struct InParts<const COUNT: usize> {
+    parts: &'static [Part<5>; COUNT],
     shape: &'static Shape,
     waiting: Queue,
     durations: [f64; LANES],
-    /// The spans that they become, and the segments of their halves.
+    /// The spans that they become, and the segments of their parts.
     spans: [usize; LANES],
-    places: [[u32; ROOM]; 2],
+    places: [[u32; ROOM]; COUNT],
     /// Those that do not fit.
     unfit: List,
 }
 
-impl Halves {
-    pub(super) fn new(shape: &'static Shape) -> Self {
+impl<const COUNT: usize> InParts<COUNT> {
+    pub(super) fn new(parts: &'static [Part<5>; COUNT], shape: &'static Shape) -> Self {
         Self {
+            parts,
             shape,
             waiting: Queue::new(),
             durations: [1.0; LANES],
             spans: [0; LANES],
-            places: [[0; ROOM]; 2],
+            places: [[0; ROOM]; COUNT],
             unfit: List::new(),
         }
     }
 
-    /// Takes the curve in a lane, which is to become the span that has this segment; whether
-    /// the block is full.
-    pub(super) fn push(
+    /// Takes the curves in some lanes, and fits a block of them whenever there is one.
+    pub(super) fn take(
         &mut self,
-        numbers: &CurveNumbers,
-        lane: usize,
-        duration: f64,
-        span: u32,
-        place: u32,
-    ) -> bool {
-        let own = self.waiting.push(numbers, lane);
-        self.durations[own] = duration;
-        self.spans[own] = span as usize;
-        self.places[0][own] = place;
-        self.waiting.is_full()
+        lanes: &List,
+        curves: &TakenCurves,
+        prepared: &mut Prepared,
+        fitting: &mut Fitting,
+    ) {
+        for lane in lanes.iter() {
+            let own = self.waiting.push(curves.numbers, lane);
+            self.durations[own] = curves.durations[lane];
+            self.spans[own] = curves.spans[lane] as usize;
+            self.places[0][own] = curves.places[lane];
+            if self.waiting.is_full() {
+                self.flush(prepared, fitting);
+            }
+        }
     }
 
     /// Fits them; those that do not fit are cut further.
     pub(super) fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         let count = self.waiting.count();
         let segments = polynomials(prepared);
-        for place in &mut self.places[1][..count] {
+        for place in self.places[1..]
+            .iter_mut()
+            .flat_map(|all| &mut all[..count])
+        {
             *place = segments.len() as u32;
             segments.push(PolynomialSegment::zeroed());
         }
-        for (half, places) in HALVES.iter().zip(&self.places) {
-            (self.waiting).fit(half, places, segments, &mut self.unfit);
+        for (part, places) in self.parts.iter().zip(&self.places) {
+            (self.waiting).fit(part, places, segments, &mut self.unfit);
         }
         for lane in 0..count {
             let span = self.spans[lane];
-            let [first, second] = [0, 1].map(|half| self.places[half][lane] as usize);
+            let places = self.places.each_ref().map(|all| all[lane] as usize);
             if self.unfit.iter().any(|unfit| unfit == lane) {
-                fitting.take_long(span, self.curve(lane), first);
+                fitting.take_long(span, self.curve(lane), places[0]);
             } else {
-                fitting.take_halves(span, [first, second]);
+                fitting.take_parts(span, places);
             }
         }
         self.waiting.clear();
@@ -107,23 +123,25 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
+    use crate::prepare::whole_fit::HALVES;
 
     /// Catches numbers in another order, or of another lane: few curves come this way.
     #[test]
     fn what_does_not_fit_is_the_same_curve_in_f64() {
         let random = &mut Rng::with_seed(1);
         let mut number = || random.f32() - 0.5;
-        let mut halves = Halves::new(Shape::BERNSTEIN);
+        let mut halves = InParts::new(&HALVES, Shape::BERNSTEIN);
         let [x, y, z, w] = [0.1, -0.7, 0.5, 0.5f32];
         let key = DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
-        for lane in 0..3 {
+        for _ in 0..3 {
             let mut numbers: CurveNumbers = [[[0.0; 4]; ROOM]; 4];
             numbers[0][7] = [x, y, z, w];
             for vectors in &mut numbers[1..] {
                 vectors[7] = [number(), number(), number(), 1.0];
             }
-            halves.push(&numbers, 7, 2.0, 0, 0);
-            let curve = halves.curve(lane);
+            let own = halves.waiting.push(&numbers, 7);
+            halves.durations[own] = 2.0;
+            let curve = halves.curve(own);
             for t in [0.0, 0.3, 1.0] {
                 let u: f64 = 1.0 - t;
                 let basis = [1.0 - u * u * u, (3.0 - 2.0 * t) * t * t, t * t * t];
