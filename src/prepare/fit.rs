@@ -141,6 +141,17 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
+    /// Sets the derivatives at the ends, which are the last two nodes, as if each were a node
+    /// a little further: with what it has more than the other as a quotient of 1.
+    #[inline(always)]
+    pub(super) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
+        for (c, &Sides { before, after }) in slopes.iter().enumerate() {
+            let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
+            self.even[PAIRS - 1][c] = (after - before) - L::all(3.0) * even;
+            self.odd[PAIRS - 1][c] = (after + before) - odd;
+        }
+    }
+
     /// Every lane's.
     #[inline(always)]
     pub(super) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {

@@ -26,7 +26,7 @@ pub(super) struct TakenCurves<'a> {
 
 /// Such curves, of so many parts each.
 pub(super) struct InParts<const COUNT: usize> {
-    parts: &'static [Part<5>; COUNT],
+    parts: &'static [Part<5, 5>; COUNT],
     shape: &'static Shape,
     waiting: Queue,
     durations: [f64; LANES],
@@ -38,7 +38,7 @@ pub(super) struct InParts<const COUNT: usize> {
 }
 
 impl<const COUNT: usize> InParts<COUNT> {
-    pub(super) fn new(parts: &'static [Part<5>; COUNT], shape: &'static Shape) -> Self {
+    pub(super) fn new(parts: &'static [Part<5, 5>; COUNT], shape: &'static Shape) -> Self {
         Self {
             parts,
             shape,
@@ -98,7 +98,7 @@ impl<const COUNT: usize> InParts<COUNT> {
 
     /// The curve in f64: from the first key on, with the half-rotation vectors that f32 has.
     fn curve(&self, lane: usize) -> Curve {
-        let [start, first, second, third] = self.waiting.numbers(lane);
+        let [start, first, second, third, _] = self.waiting.numbers(lane);
         let own = array::from_fn(|i| match i {
             0..4 => start[i],
             4..7 => first[i - 4],
@@ -134,9 +134,9 @@ mod tests {
         let [x, y, z, w] = [0.1, -0.7, 0.5, 0.5f32];
         let key = DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
         for _ in 0..3 {
-            let mut numbers: CurveNumbers = [[[0.0; 4]; ROOM]; 4];
+            let mut numbers: CurveNumbers = [[[0.0; 4]; ROOM]; 5];
             numbers[0][7] = [x, y, z, w];
-            for vectors in &mut numbers[1..] {
+            for vectors in &mut numbers[1..4] {
                 vectors[7] = [number(), number(), number(), 1.0];
             }
             let own = halves.waiting.push(&numbers, 7);

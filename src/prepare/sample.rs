@@ -181,7 +181,7 @@ fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
 
 /// `a v`, `v` a vector.
 #[inline(always)]
-fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
+pub(super) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     [
         a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
         a[3] * v[1] - a[0] * v[2] + a[2] * v[0],

@@ -7,8 +7,8 @@ use bytemuck::Zeroable as _;
 
 use super::fit::{MOST, Samples, TOLERANCE, interpolate};
 use super::intervals::{LANES, ROOM, rounded};
-use super::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
-use super::sample::{AboutMiddle, SineAndFall};
+use super::nodes::{END_NODES, FULL_NODES, GENTLE_NODES, Nodes};
+use super::sample::{AboutMiddle, SineAndFall, about};
 use super::sides::Sides;
 use super::turns::{exact_exp, long_exp, short_exp, widened};
 use super::whole_lanes::CurveNumbers;
@@ -84,9 +84,9 @@ impl List {
 
     /// Fits a part of the curves to the segments at their lanes' places; those that do not
     /// fit are `unfit`.
-    pub(super) fn fit<const PAIRS: usize>(
+    pub(super) fn fit<const SAMPLED: usize, const PAIRS: usize>(
         &self,
-        part: &Part<PAIRS>,
+        part: &Part<SAMPLED, PAIRS>,
         curves: &CurveNumbers,
         places: &[u32; ROOM],
         segments: &mut Vec<PolynomialSegment>,
@@ -118,7 +118,7 @@ pub(super) struct Queue {
 impl Queue {
     pub(super) fn new() -> Self {
         Self {
-            numbers: [[[0.0; 4]; ROOM]; 4],
+            numbers: [[[0.0; 4]; ROOM]; 5],
             list: List::new(),
         }
     }
@@ -142,15 +142,14 @@ impl Queue {
     }
 
     /// A curve's numbers.
-    pub(super) fn numbers(&self, lane: usize) -> [[f32; 4]; 4] {
-        let [start, first, second, third] = &self.numbers;
-        [start[lane], first[lane], second[lane], third[lane]]
+    pub(super) fn numbers(&self, lane: usize) -> [[f32; 4]; 5] {
+        self.numbers.each_ref().map(|all| all[lane])
     }
 
     /// As [`List::fit`].
-    pub(super) fn fit<const PAIRS: usize>(
+    pub(super) fn fit<const SAMPLED: usize, const PAIRS: usize>(
         &self,
-        part: &Part<PAIRS>,
+        part: &Part<SAMPLED, PAIRS>,
         places: &[u32; ROOM],
         segments: &mut Vec<PolynomialSegment>,
         unfit: &mut List,
@@ -164,13 +163,14 @@ impl Queue {
     }
 }
 
-/// A part of curves' parameter, and the nodes at which they are sampled there.
-pub(super) struct Part<const PAIRS: usize> {
+/// A part of curves' parameter, and the nodes at which they are sampled there: all of them,
+/// or all but the ends, where keys and handles say what the curve does.
+pub(super) struct Part<const SAMPLED: usize, const PAIRS: usize> {
     nodes: &'static Nodes<PAIRS>,
     /// The basis functions at its middle.
     weights: [f32; 3],
-    /// What they gain from there on, up to `-s` and to `s` at each node `s`.
-    gains: [[[Gain; 2]; 3]; PAIRS],
+    /// What they gain from there on, up to `-s` and to `s` at each node `s` that is sampled.
+    gains: [[[Gain; 2]; 3]; SAMPLED],
     /// See [`TOLERANCE`].
     tolerance: f32,
     /// Of all, not of less: there the second gains as much after the middle as before.
@@ -178,16 +178,16 @@ pub(super) struct Part<const PAIRS: usize> {
 }
 
 /// Always near enough.
-pub(super) const GENTLE_WHOLE: Part<3> = Part {
+pub(super) const GENTLE_WHOLE: Part<3, 3> = Part {
     tolerance: f32::INFINITY,
     ..Part::new(&GENTLE_NODES, 0.5, 1.0)
 };
-pub(super) const WHOLE: Part<5> = Part::new(&FULL_NODES, 0.5, 1.0);
-pub(super) const HALVES: [Part<5>; 2] = [
+pub(super) const WHOLE: Part<3, 5> = Part::new(&END_NODES, 0.5, 1.0);
+pub(super) const HALVES: [Part<5, 5>; 2] = [
     Part::new(&FULL_NODES, 0.25, 0.5),
     Part::new(&FULL_NODES, 0.75, 0.5),
 ];
-pub(super) const QUARTERS: [Part<5>; 4] = [
+pub(super) const QUARTERS: [Part<5, 5>; 4] = [
     Part::new(&FULL_NODES, 0.125, 0.25),
     Part::new(&FULL_NODES, 0.375, 0.25),
     Part::new(&FULL_NODES, 0.625, 0.25),
@@ -197,7 +197,7 @@ pub(super) const QUARTERS: [Part<5>; 4] = [
 /// Above this hardly any curve is fitted in halves.
 pub(super) const LONGEST_HALVED: f64 = 0.6;
 
-impl<const PAIRS: usize> Part<PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
     const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
         let (m, n) = (middle, 1.0 - middle);
         let mut part = Self {
@@ -207,12 +207,12 @@ impl<const PAIRS: usize> Part<PAIRS> {
                 ((3.0 - 2.0 * m) * m * m) as f32,
                 (m * m * m) as f32,
             ],
-            gains: [[[Gain::new(0.0); 2]; 3]; PAIRS],
+            gains: [[[Gain::new(0.0); 2]; 3]; SAMPLED],
             tolerance: TOLERANCE,
             is_whole: width == 1.0,
         };
         let mut k = 0;
-        while k < PAIRS {
+        while k < SAMPLED {
             let s = nodes.at[k] as f64 * width;
             let (before, after) = (gains(m, -s), gains(m, s));
             let mut j = 0;
@@ -253,16 +253,16 @@ impl Gain {
     }
 }
 
-struct Fit<'a, const PAIRS: usize> {
+struct Fit<'a, const SAMPLED: usize, const PAIRS: usize> {
     list: &'a List,
-    part: &'a Part<PAIRS>,
+    part: &'a Part<SAMPLED, PAIRS>,
     curves: &'a CurveNumbers,
     places: &'a [u32; ROOM],
     segments: &'a mut [PolynomialSegment],
     unfit: &'a mut List,
 }
 
-impl<const PAIRS: usize> InLanes for Fit<'_, PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> InLanes for Fit<'_, SAMPLED, PAIRS> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         if self.part.is_whole {
@@ -273,7 +273,7 @@ impl<const PAIRS: usize> InLanes for Fit<'_, PAIRS> {
     }
 }
 
-impl<const PAIRS: usize> Fit<'_, PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> Fit<'_, SAMPLED, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes, const IS_WHOLE: bool>(&mut self) {
         let &List { count, ref lanes } = self.list;
@@ -282,13 +282,17 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
         for i in (0..count).step_by(L::COUNT) {
             let lanes = &lanes[i..i + L::COUNT];
             let own = &lanes[..L::COUNT.min(count - i)];
-            let [starts, firsts, seconds, thirds] = self.curves;
+            let [starts, firsts, seconds, thirds, ends] = self.curves;
             let start = L::gather_rotations(starts, lanes);
             let [x1, y1, z1, _] = L::gather_rotations(firsts, lanes);
             let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
             let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
             let vectors = [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]];
-            sample::<L, PAIRS, IS_WHOLE>(&mut samples, start, vectors, self.part);
+            sample::<L, SAMPLED, PAIRS, IS_WHOLE>(&mut samples, start, vectors, self.part);
+            if SAMPLED < PAIRS {
+                let end = L::gather_rotations(ends, lanes);
+                set_ends(&mut samples, [start, end], vectors);
+            }
             let mut places = [self.segments.len() - 1; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
                 *place = self.places[lane as usize] as usize;
@@ -308,11 +312,11 @@ impl<const PAIRS: usize> Fit<'_, PAIRS> {
 
 /// Samples curves from that key on, with those half-rotation vectors.
 #[inline(always)]
-fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
+fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bool>(
     samples: &mut Samples<L, PAIRS>,
     start: [L; 4],
     [w1, w2, w3]: [[L; 3]; 3],
-    part: &Part<PAIRS>,
+    part: &Part<SAMPLED, PAIRS>,
 ) {
     let [b1, b2, b3] = part.weights;
     let third_turn = exp::<L, IS_WHOLE>(w3, b3);
@@ -346,6 +350,33 @@ fn sample<L: Lanes, const PAIRS: usize, const IS_WHOLE: bool>(
         let third = on_both_sides(gains[2], squares[2]);
         samples.set_differences(k, curve.differences([first, second, third]));
     }
+}
+
+/// Sets what curves do at their ends: they pass through the keys, and the derivatives there,
+/// `3 q₀ w₁` and `3 q₁ w₃`, are those of the handles.
+#[inline(always)]
+fn set_ends<L: Lanes, const PAIRS: usize>(
+    samples: &mut Samples<L, PAIRS>,
+    [start, end]: [[L; 4]; 2],
+    [w1, _, w3]: [[L; 3]; 3],
+) {
+    let middle = samples.middle;
+    let three = L::all(3.0);
+    let slopes = [
+        about(start, scaled(w1, three)),
+        about(end, scaled(w3, three)),
+    ];
+    // Written out: closures are not always inlined.
+    let mut differences = [Sides::same(three); 4];
+    let mut derivatives = differences;
+    for c in 0..4 {
+        differences[c].before = start[c] - middle[c];
+        differences[c].after = end[c] - middle[c];
+        derivatives[c].before = slopes[0][c];
+        derivatives[c].after = slopes[1][c];
+    }
+    samples.set_differences(PAIRS - 2, differences);
+    samples.set_slopes(derivatives);
 }
 
 /// The exponential of so many times a vector.
@@ -414,13 +445,15 @@ mod tests {
         assert_near(&SINC.map(f64::from), LARGEST, sinc, 3e-9);
         let cosine = |z: f64| libm::cos(libm::sqrt(z));
         assert_near(&FALL.map(f64::from), LARGEST, cosine, 3e-9);
-        for (parts, longest) in [
-            (&[WHOLE][..], LONGEST_WHOLE),
-            (&HALVES, LONGEST_HALVED),
-            (&QUARTERS, LONGEST_DIRECT),
+        let of_parts = |parts: &[Part<5, 5>]| parts.iter().flat_map(|part| part.gains).collect();
+        for (gains, longest) in [
+            (WHOLE.gains.to_vec(), LONGEST_WHOLE),
+            (of_parts(&HALVES), LONGEST_HALVED),
+            (of_parts(&QUARTERS), LONGEST_DIRECT),
         ] {
-            let gains = parts.iter().flat_map(|part| part.gains.as_flattened());
+            let gains = gains.as_flattened();
             let most = gains
+                .iter()
                 .flatten()
                 .fold(0.0f32, |most, gain| most.max(gain.squared));
             assert!(f64::from(most) * longest < LARGEST);

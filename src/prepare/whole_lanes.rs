@@ -35,8 +35,8 @@ const LONGEST_FALL: f32 = 0.5645;
 /// other branch of its logarithm is nearer.
 const LONGEST_PART: f32 = 1.5 * 1.5;
 
-/// The first key of each curve in its sign, and its three half-rotation vectors.
-pub(super) type CurveNumbers = [[[f32; 4]; ROOM]; 4];
+/// The first key of each curve in its sign, its three half-rotation vectors, and its last key.
+pub(super) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
 /// Such curves of a block's intervals.
 pub(super) struct WholeLanes {
@@ -61,7 +61,7 @@ impl WholeLanes {
             incoming: [[0.0; ROOM]; 3],
             outgoing: [[0.0; ROOM]; 3],
             far: [0.0; ROOM],
-            numbers: [[[0.0; 4]; ROOM]; 4],
+            numbers: [[[0.0; 4]; ROOM]; 5],
             energies: [f32::INFINITY; ROOM],
         }
     }
@@ -167,6 +167,7 @@ impl InLanes for FindCurves<'_> {
             let doubt = (far - L::all(1.0)).sign() + L::all(1.0);
             let energy = energy([w1, w2, w3]) + doubt;
             let sign = L::rounded(load::<L>(&intervals.signs, own));
+            let end_sign = sign * flip;
             let numbers = [
                 [
                     start[0] * sign,
@@ -177,6 +178,12 @@ impl InLanes for FindCurves<'_> {
                 [w1[0], w1[1], w1[2], sign],
                 [w2[0], w2[1], w2[2], sign],
                 [w3[0], w3[1], w3[2], sign],
+                [
+                    end[0] * end_sign,
+                    end[1] * end_sign,
+                    end[2] * end_sign,
+                    end[3] * end_sign,
+                ],
             ];
             energy.store(&mut whole.energies[own..own + L::COUNT]);
             for (i, all) in whole.numbers.iter_mut().enumerate() {
