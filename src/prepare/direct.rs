@@ -1,6 +1,6 @@
 //! Smooth curves straight from keys, in f32: those that turn little as a series, others by
-//! a fit of the whole, of its halves or of its quarters. What is left over waits for a block of its own, in
-//! f64.
+//! a fit of the whole, of its halves or of its quarters. What is left over waits for a block of
+//! its own, in f64.
 
 use std::ops::Range;
 
@@ -38,7 +38,7 @@ pub(super) struct Direct {
     few_powers: List,
     waiting: Queue,
     waiting_places: [u32; ROOM],
-    /// Lanes that are too long for that, or do not fit; and even longer ones.
+    /// Lanes that are too long for that, or do not fit: for halves, and for quarters.
     long: List,
     longest: List,
     /// Where they wait; made when there is one.
@@ -259,7 +259,7 @@ impl Direct {
         self.waiting.clear();
     }
 
-    /// Has the longer curves cut.
+    /// Lets the longer curves wait, to be fitted in parts.
     fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
         let shape = self.smooth.shape;
         let curves = TakenCurves {

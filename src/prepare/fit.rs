@@ -141,8 +141,9 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Sets the derivatives at the ends, which are the last two nodes, as if each were a node
-    /// a little further: with what it has more than the other as a quotient of 1.
+    /// Sets the derivatives by s at the ends: the last pair of nodes, which comes twice. They
+    /// take the form of one more sample there, so that [`Nodes::powers`] finds, as what it has
+    /// more than the sample itself, the derivatives of its polynomials by s².
     #[inline(always)]
     pub(super) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
         for (c, &Sides { before, after }) in slopes.iter().enumerate() {

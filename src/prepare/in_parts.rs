@@ -16,7 +16,7 @@ use crate::branchless::ratio;
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
-/// Curves in the lanes of a block, each of which is to become the span that has this segment.
+/// Curves in the lanes of a block, and the spans that they become, which have these segments.
 pub(super) struct TakenCurves<'a> {
     pub(super) numbers: &'a CurveNumbers,
     pub(super) durations: &'a [f64; ROOM],
@@ -73,12 +73,11 @@ impl<const COUNT: usize> InParts<COUNT> {
     pub(super) fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         let count = self.waiting.count();
         let segments = polynomials(prepared);
-        for place in self.places[1..]
-            .iter_mut()
-            .flat_map(|all| &mut all[..count])
-        {
-            *place = segments.len() as u32;
-            segments.push(PolynomialSegment::zeroed());
+        for places in &mut self.places[1..] {
+            for place in &mut places[..count] {
+                *place = segments.len() as u32;
+                segments.push(PolynomialSegment::zeroed());
+            }
         }
         for (part, places) in self.parts.iter().zip(&self.places) {
             (self.waiting).fit(part, places, segments, &mut self.unfit);
@@ -123,7 +122,8 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::prepare::whole_fit::HALVES;
+    use crate::method::BESSEL_OVERHAUSER;
+    use crate::prepare::whole_fit::{HALVES, QUARTERS};
 
     /// Catches numbers in another order, or of another lane: few curves come this way.
     #[test]
@@ -155,5 +155,31 @@ mod tests {
             }
             assert_eq!(curve.rate, 0.5);
         }
+    }
+
+    /// Catches a list that is too short for every part of every curve.
+    #[test]
+    fn a_block_of_which_no_part_fits_is_cut_further() {
+        let mut prepared = Prepared::new(&BESSEL_OVERHAUSER.into());
+        let mut fitting = Fitting::new(Shape::BERNSTEIN, Quantity::Rotation);
+        let mut quarters = InParts::new(&QUARTERS, Shape::BERNSTEIN);
+        let mut numbers: CurveNumbers = [[[0.0; 4]; ROOM]; 5];
+        numbers[0] = [[0.0, 0.0, 0.0, 1.0]; ROOM];
+        numbers[1] = [[9.0, -2.0, 1.0, 1.0]; ROOM];
+        numbers[2] = [[-3.0, 8.0, 1.0, 1.0]; ROOM];
+        numbers[3] = [[2.0, -7.0, 8.0, 1.0]; ROOM];
+        let (spans, places) = (array::from_fn(|i| i as u32), array::from_fn(|i| i as u32));
+        prepared.new_segments(LANES);
+        let curves = TakenCurves {
+            numbers: &numbers,
+            durations: &[1.0; ROOM],
+            spans: &spans,
+            places: &places,
+        };
+        let mut lanes = List::new();
+        (0..LANES).for_each(|lane| lanes.push(lane));
+        quarters.take(&lanes, &curves, &mut prepared, &mut fitting);
+        assert_eq!(quarters.waiting.count(), 0);
+        assert_eq!(quarters.unfit.count(), 0);
     }
 }

@@ -22,8 +22,8 @@ pub(super) struct List {
     lanes: [u32; ROOM_FOR],
 }
 
-/// As many as a block has, and the last vector, or each twice; a power of two.
-const ROOM_FOR: usize = 2 * LANES;
+/// As many as a block has, and the last vector; or each for every quarter of it. A power of two.
+const ROOM_FOR: usize = 4 * LANES;
 
 impl List {
     pub(super) fn new() -> Self {
