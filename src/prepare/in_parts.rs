@@ -9,8 +9,9 @@ use super::Prepared;
 use super::curve::{Curve, Piece};
 use super::fitting::{Fitting, polynomials};
 use super::intervals::{LANES, ROOM};
+use super::part::Part;
 use super::shape::Shape;
-use super::whole_fit::{List, Part, Queue};
+use super::whole_fit::{List, Queue};
 use super::whole_lanes::CurveNumbers;
 use crate::branchless::ratio;
 use crate::method::Quantity;
@@ -123,7 +124,7 @@ mod tests {
 
     use super::*;
     use crate::method::BESSEL_OVERHAUSER;
-    use crate::prepare::whole_fit::{HALVES, QUARTERS};
+    use crate::prepare::part::{HALVES, QUARTERS};
 
     /// Catches numbers in another order, or of another lane: few curves come this way.
     #[test]

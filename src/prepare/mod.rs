@@ -20,6 +20,7 @@ mod key_steps;
 mod motion;
 mod nodes;
 mod pace;
+mod part;
 mod passes;
 mod retime;
 mod sample;
