@@ -39,12 +39,9 @@ pub(super) struct Direct {
     few_powers: List,
     waiting: Queue,
     waiting_places: [u32; ROOM],
-    /// Lanes that are too long for that, or do not fit: for halves, and for quarters.
-    long: List,
-    longest: List,
-    /// Where they wait; made when there is one.
-    halves: Option<Box<InParts<2>>>,
-    quarters: Option<Box<InParts<4>>>,
+    /// Curves that are too long for that, or do not fit.
+    halves: InParts<2>,
+    quarters: InParts<4>,
     /// Lanes that are left over.
     left_over: List,
     /// Where they wait; made when there is one.
@@ -69,10 +66,8 @@ impl Direct {
             few_powers: List::new(),
             waiting: Queue::new(),
             waiting_places: [0; ROOM],
-            long: List::new(),
-            longest: List::new(),
-            halves: None,
-            quarters: None,
+            halves: InParts::new(&HALVES, smooth.shape),
+            quarters: InParts::new(&QUARTERS, smooth.shape),
             left_over: List::new(),
             rest: None,
             find_far: how.find_far,
@@ -159,9 +154,9 @@ impl Direct {
             if energy <= short {
                 self.few_powers.push_if(energy >= 0.0, lane);
             } else if energy <= halved {
-                self.long.push(lane);
+                self.halves.lanes.push(lane);
             } else if energy <= direct {
-                self.longest.push(lane);
+                self.quarters.lanes.push(lane);
             } else {
                 self.left_over.push(lane);
             }
@@ -225,12 +220,8 @@ impl Direct {
     /// Has what was left over fitted.
     pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         self.fit_few_powers(prepared);
-        if let Some(halves) = &mut self.halves {
-            halves.flush(prepared, fitting);
-        }
-        if let Some(quarters) = &mut self.quarters {
-            quarters.flush(prepared, fitting);
-        }
+        self.halves.finish(prepared, fitting);
+        self.quarters.finish(prepared, fitting);
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }
@@ -239,7 +230,7 @@ impl Direct {
     fn fit_all_powers(&mut self, prepared: &mut Prepared) {
         let segments = polynomials(prepared);
         let (whole, places) = (&self.whole.numbers, &self.places);
-        (self.all_powers).fit(&WHOLE, whole, places, segments, &mut self.long);
+        (self.all_powers).fit(&WHOLE, whole, places, segments, &mut self.halves.lanes);
         self.all_powers.clear();
     }
 
@@ -256,31 +247,20 @@ impl Direct {
 
     fn fit_few_powers(&mut self, prepared: &mut Prepared) {
         let (segments, places) = (polynomials(prepared), &self.waiting_places);
-        (self.waiting).fit(&GENTLE_WHOLE, places, segments, &mut self.long);
+        (self.waiting).fit(&GENTLE_WHOLE, places, segments, &mut self.halves.lanes);
         self.waiting.clear();
     }
 
     /// Lets the longer curves wait, to be fitted in parts.
     fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
-        let shape = self.smooth.shape;
         let curves = TakenCurves {
             numbers: &self.whole.numbers,
             durations: &intervals.durations,
             spans: &self.spans,
             places: &self.places,
         };
-        if self.long.count() > 0 {
-            let new = || Box::new(InParts::new(&HALVES, shape));
-            let halves = self.halves.get_or_insert_with(new);
-            halves.take(&self.long, &curves, prepared, fitting);
-        }
-        if self.longest.count() > 0 {
-            let new = || Box::new(InParts::new(&QUARTERS, shape));
-            let quarters = self.quarters.get_or_insert_with(new);
-            quarters.take(&self.longest, &curves, prepared, fitting);
-        }
-        self.long.clear();
-        self.longest.clear();
+        self.halves.take(&curves, prepared, fitting);
+        self.quarters.take(&curves, prepared, fitting);
     }
 }
 

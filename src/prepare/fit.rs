@@ -146,6 +146,8 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// more than the sample itself, the derivatives of its polynomials by s².
     #[inline(always)]
     pub(super) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
+        // By s², even / 2s² rises there by 2 (after - before) - 8 even, and odd / 2s by after +
+        // before - 2 odd; the samples there stand for 2 even, and for odd.
         for (c, &Sides { before, after }) in slopes.iter().enumerate() {
             let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
             self.even[PAIRS - 1][c] = (after - before) - L::all(3.0) * even;

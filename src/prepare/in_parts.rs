@@ -29,6 +29,14 @@ pub(super) struct TakenCurves<'a> {
 pub(super) struct InParts<const COUNT: usize> {
     parts: &'static [Part<5, 5>; COUNT],
     shape: &'static Shape,
+    /// The lanes of a block that are to be taken.
+    pub(super) lanes: List,
+    /// Made when there is a curve for it.
+    block: Option<Box<Block<COUNT>>>,
+}
+
+/// Curves that wait.
+struct Block<const COUNT: usize> {
     waiting: Queue,
     durations: [f64; LANES],
     /// The spans that they become, and the segments of their parts.
@@ -43,6 +51,39 @@ impl<const COUNT: usize> InParts<COUNT> {
         Self {
             parts,
             shape,
+            lanes: List::new(),
+            block: None,
+        }
+    }
+
+    /// Takes the curves in the lanes, and fits a block of them whenever there is one.
+    pub(super) fn take(
+        &mut self,
+        curves: &TakenCurves,
+        prepared: &mut Prepared,
+        fitting: &mut Fitting,
+    ) {
+        for lane in self.lanes.iter() {
+            let block = (self.block).get_or_insert_with(|| Box::new(Block::new()));
+            block.push(curves, lane);
+            if block.waiting.is_full() {
+                block.fit(self.parts, self.shape, prepared, fitting);
+            }
+        }
+        self.lanes.clear();
+    }
+
+    /// Fits those that still wait.
+    pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        if let Some(block) = &mut self.block {
+            block.fit(self.parts, self.shape, prepared, fitting);
+        }
+    }
+}
+
+impl<const COUNT: usize> Block<COUNT> {
+    fn new() -> Self {
+        Self {
             waiting: Queue::new(),
             durations: [1.0; LANES],
             spans: [0; LANES],
@@ -51,27 +92,21 @@ impl<const COUNT: usize> InParts<COUNT> {
         }
     }
 
-    /// Takes the curves in some lanes, and fits a block of them whenever there is one.
-    pub(super) fn take(
-        &mut self,
-        lanes: &List,
-        curves: &TakenCurves,
-        prepared: &mut Prepared,
-        fitting: &mut Fitting,
-    ) {
-        for lane in lanes.iter() {
-            let own = self.waiting.push(curves.numbers, lane);
-            self.durations[own] = curves.durations[lane];
-            self.spans[own] = curves.spans[lane] as usize;
-            self.places[0][own] = curves.places[lane];
-            if self.waiting.is_full() {
-                self.flush(prepared, fitting);
-            }
-        }
+    fn push(&mut self, curves: &TakenCurves, lane: usize) {
+        let own = self.waiting.push(curves.numbers, lane);
+        self.durations[own] = curves.durations[lane];
+        self.spans[own] = curves.spans[lane] as usize;
+        self.places[0][own] = curves.places[lane];
     }
 
     /// Fits them; those that do not fit are cut further.
-    pub(super) fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+    fn fit(
+        &mut self,
+        parts: &[Part<5, 5>; COUNT],
+        shape: &'static Shape,
+        prepared: &mut Prepared,
+        fitting: &mut Fitting,
+    ) {
         let count = self.waiting.count();
         let segments = polynomials(prepared);
         for places in &mut self.places[1..] {
@@ -80,14 +115,14 @@ impl<const COUNT: usize> InParts<COUNT> {
                 segments.push(PolynomialSegment::zeroed());
             }
         }
-        for (part, places) in self.parts.iter().zip(&self.places) {
+        for (part, places) in parts.iter().zip(&self.places) {
             (self.waiting).fit(part, places, segments, &mut self.unfit);
         }
         for lane in 0..count {
             let span = self.spans[lane];
             let places = self.places.each_ref().map(|all| all[lane] as usize);
             if self.unfit.iter().any(|unfit| unfit == lane) {
-                fitting.take_long(span, self.curve(lane), places[0]);
+                fitting.take_long(span, self.curve(lane, shape), places[0]);
             } else {
                 fitting.take_parts(span, places);
             }
@@ -97,7 +132,7 @@ impl<const COUNT: usize> InParts<COUNT> {
     }
 
     /// The curve in f64: from the first key on, with the half-rotation vectors that f32 has.
-    fn curve(&self, lane: usize) -> Curve {
+    fn curve(&self, lane: usize, shape: &'static Shape) -> Curve {
         let [start, first, second, third, _] = self.waiting.numbers(lane);
         let own = array::from_fn(|i| match i {
             0..4 => start[i],
@@ -107,8 +142,8 @@ impl<const COUNT: usize> InParts<COUNT> {
         });
         let own: [f32; 13] = own;
         Curve {
-            shape: self.shape,
-            numbers: self.shape.with(|i| f64::from(own[i])),
+            shape,
+            numbers: shape.with(|i| f64::from(own[i])),
             piece: Piece::WHOLE,
             quantity: Quantity::Rotation,
             rate: ratio(1.0, self.durations[lane]),
@@ -124,14 +159,14 @@ mod tests {
 
     use super::*;
     use crate::method::BESSEL_OVERHAUSER;
-    use crate::prepare::part::{HALVES, QUARTERS};
+    use crate::prepare::part::QUARTERS;
 
     /// Catches numbers in another order, or of another lane: few curves come this way.
     #[test]
     fn what_does_not_fit_is_the_same_curve_in_f64() {
         let random = &mut Rng::with_seed(1);
         let mut number = || random.f32() - 0.5;
-        let mut halves = InParts::new(&HALVES, Shape::BERNSTEIN);
+        let mut halves = Block::<2>::new();
         let [x, y, z, w] = [0.1, -0.7, 0.5, 0.5f32];
         let key = DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
         for _ in 0..3 {
@@ -142,7 +177,7 @@ mod tests {
             }
             let own = halves.waiting.push(&numbers, 7);
             halves.durations[own] = 2.0;
-            let curve = halves.curve(own);
+            let curve = halves.curve(own, Shape::BERNSTEIN);
             for t in [0.0, 0.3, 1.0] {
                 let u: f64 = 1.0 - t;
                 let basis = [1.0 - u * u * u, (3.0 - 2.0 * t) * t * t, t * t * t];
@@ -177,10 +212,9 @@ mod tests {
             spans: &spans,
             places: &places,
         };
-        let mut lanes = List::new();
-        (0..LANES).for_each(|lane| lanes.push(lane));
-        quarters.take(&lanes, &curves, &mut prepared, &mut fitting);
-        assert_eq!(quarters.waiting.count(), 0);
-        assert_eq!(quarters.unfit.count(), 0);
+        (0..LANES).for_each(|lane| quarters.lanes.push(lane));
+        quarters.take(&curves, &mut prepared, &mut fitting);
+        let block = quarters.block.expect("curves waited");
+        assert_eq!((block.waiting.count(), block.unfit.count()), (0, 0));
     }
 }

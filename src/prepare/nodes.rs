@@ -130,6 +130,22 @@ mod tests {
         come_back(&END_NODES);
     }
 
+    /// Catches ends' nodes that are not the best, or another factor.
+    #[test]
+    fn ends_leave_out_less_than_twice_what_chebyshev_nodes_do() {
+        let most = |nodes: &Nodes<5>| {
+            let distances = |i: u32| {
+                let s = f64::from(i) / 20_000.0;
+                let nodes = nodes.at.iter().map(|&node| f64::from(node));
+                nodes.fold(s, |product, node| product * (s * s - node * node))
+            };
+            let all = (0..=10_000).map(|i| distances(i).abs());
+            all.fold(0.0, f64::max)
+        };
+        let factor = most(&END_NODES) / most(&FULL_NODES);
+        assert!((factor - 1.88).abs() < 0.005, "{factor}");
+    }
+
     /// `Tₙ(2s)` of every degree, in lane and component `c` times `c + 1`.
     fn come_back<const PAIRS: usize>(nodes: &Nodes<PAIRS>) {
         let degree = 2 * PAIRS;
