@@ -48,16 +48,6 @@ impl Piece {
         [self.from, self.from + length].map(|from| Self { from, length })
     }
 
-    /// The parts of the whole when it is cut into so many, a power of two.
-    pub(super) fn parts(count: usize) -> impl Iterator<Item = Self> {
-        let length = Self::WHOLE.length / count as u8;
-        let part = move |i| Self {
-            from: i * length,
-            length,
-        };
-        (0..count as u8).map(part)
-    }
-
     /// Where it starts, and its width, as parts of the whole.
     pub(super) fn extent(self) -> (f64, f64) {
         let part = |of: u8| f64::from(of) / f64::from(Self::WHOLE.length);

@@ -9,9 +9,6 @@ use super::shape::Shape;
 use crate::method::Quantity;
 use crate::segment::PolynomialSegment;
 
-/// See [`Part`].
-const NONE: usize = usize::MAX;
-
 /// Cuts curves; what it needs for that is kept.
 pub(super) struct Cutter {
     shape: &'static Shape,
@@ -29,7 +26,7 @@ pub(super) struct Cutter {
 pub(super) struct Part {
     /// The span that the curve is of.
     pub(super) span: usize,
-    /// Its place among the curves given; [`NONE`] where only its segments were.
+    /// Its place among the curves given.
     curve: usize,
     pub(super) piece: Piece,
     /// Its place among the segments, given when it is fitted; nothing where even the finest
@@ -74,17 +71,6 @@ impl Cutter {
         let whole = self.part(span, &curve, Some(segment));
         self.waiting.extend(whole.halves());
         self.curves.push(curve);
-    }
-
-    /// Adds the segments of a curve that is cut into equal parts already.
-    pub(super) fn push_parts<const COUNT: usize>(&mut self, span: usize, segments: [usize; COUNT]) {
-        let parts = Piece::parts(COUNT).zip(segments);
-        self.parts.extend(parts.map(|(piece, segment)| Part {
-            span,
-            curve: NONE,
-            piece,
-            segment: Some(segment),
-        }));
     }
 
     /// Adds the curve of a span, to be cut where it does not fit whole.

@@ -1,22 +1,20 @@
 //! Smooth curves straight from keys, in f32: those that turn little as a series, others by
-//! a fit of the whole, of its halves or of its quarters. What is left over waits for a block of
-//! its own, in f64.
+//! a fit of the whole or of its halves. What is left over waits for a block of its own, in f64.
 
 use std::ops::Range;
 
-use super::Prepared;
 use super::far_keys::FarKeys;
-use super::fit::{GENTLE, LONGEST_WHOLE};
 use super::fitting::{Fitting, polynomials};
 use super::gentle_lanes::GentleLanes;
-use super::in_parts::{InParts, TakenCurves};
 use super::intervals::{Intervals, LANES, ROOM, Stretch};
+use super::key_curves::{List, WaitingCurves, fit};
+use super::key_fit::Halves;
 use super::key_joints::KeyJoints;
 use super::key_steps::{FindSteps, KeySteps};
-use super::part::{GENTLE_WHOLE, HALVES, LONGEST_HALVED, QUARTERS, WHOLE};
+use super::part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
 use super::passes::Steps;
-use super::whole_fit::{List, Queue};
 use super::whole_lanes::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
+use super::{NONE, Prepared};
 use crate::cpu::in_lanes;
 use crate::method::{Ends, FromKeys, Path, Smooth};
 
@@ -24,24 +22,30 @@ use crate::method::{Ends, FromKeys, Path, Smooth};
 /// f64: alone each would bring two neighbours.
 const MOST_ALONE: usize = 3;
 
+/// As many as the lanes of a block become. A power of two.
+const SPANS: usize = 2 * LANES;
+
 /// The curves of a block that come straight from keys.
 pub(super) struct Direct {
     steps: KeySteps,
     joints: KeyJoints,
     gentle: GentleLanes,
     whole: WholeLanes,
-    /// The spans and the segments that lanes become.
+    /// The spans and the segments that lanes become, the first where there are two.
     spans: [u32; ROOM],
     places: [u32; ROOM],
     /// Lanes to fit.
-    all_powers: List,
-    /// Lanes to fit with few powers, and where they wait: a block has few of them.
-    few_powers: List,
-    waiting: Queue,
-    waiting_places: [u32; ROOM],
-    /// Curves that are too long for that, or do not fit.
-    halves: InParts<2>,
-    quarters: InParts<4>,
+    usual: List,
+    /// Those that few powers serve, and those to fit in two: of either a block has few.
+    few_powers: WaitingCurves<Part<1, 4>>,
+    halves: WaitingCurves<Halves>,
+    /// Lanes that are fitted in two, or not here.
+    long: List,
+    /// 1 where a lane becomes two spans.
+    cut: [u32; ROOM],
+    /// Of spans that begin.
+    starts: [f64; SPANS],
+    keys: [u32; SPANS],
     /// Lanes that are left over.
     left_over: List,
     /// Where they wait; made when there is one.
@@ -62,12 +66,13 @@ impl Direct {
             whole: WholeLanes::new(),
             spans: [0; ROOM],
             places: [0; ROOM],
-            all_powers: List::new(),
-            few_powers: List::new(),
-            waiting: Queue::new(),
-            waiting_places: [0; ROOM],
-            halves: InParts::new(&HALVES, smooth.shape),
-            quarters: InParts::new(&QUARTERS, smooth.shape),
+            usual: List::new(),
+            few_powers: WaitingCurves::new(&FEW_POWERS),
+            halves: WaitingCurves::new(&Halves),
+            long: List::new(),
+            cut: [0; ROOM],
+            starts: [0.0; SPANS],
+            keys: [NONE; SPANS],
             left_over: List::new(),
             rest: None,
             find_far: how.find_far,
@@ -125,42 +130,85 @@ impl Direct {
         });
     }
 
-    /// Takes the curves in some lanes: each becomes the source of the next span.
-    pub(super) fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>) {
-        let (first_span, first_place) = prepared.new_segments(lanes.len());
-        for (i, own) in self.spans[lanes.clone()].iter_mut().enumerate() {
-            *own = (first_span + i) as u32;
-        }
-        for (i, own) in self.places[lanes.clone()].iter_mut().enumerate() {
-            *own = (first_place + i) as u32;
-        }
+    /// Takes the curves in some lanes: they become the next spans, the first with this constant
+    /// at its start.
+    pub(super) fn take(
+        &mut self,
+        prepared: &mut Prepared,
+        intervals: &Intervals,
+        lanes: Range<usize>,
+        key: u32,
+    ) {
         if self.gentle.may_hold() {
             for lane in lanes.clone().filter(|&lane| self.gentle.holds[lane]) {
-                let place = self.places[lane] as usize;
-                self.gentle.write(lane, &mut polynomials(prepared)[place]);
                 // On no list.
                 self.whole.energies[lane] = -1.0;
             }
         }
-        let energies = &self.whole.energies[lanes.clone()];
-        let [short, whole, halved, direct] =
-            [GENTLE, LONGEST_WHOLE, LONGEST_HALVED, LONGEST_DIRECT].map(|most| most as f32);
-        let is_usual = |energy: f32| energy > short && energy <= whole;
-        (self.all_powers).push_where(lanes.clone(), energies, is_usual);
-        for (lane, &energy) in lanes.zip(energies) {
-            if is_usual(energy) {
-                continue;
+        self.list(lanes.clone());
+        self.begin(prepared, intervals, lanes.clone(), key);
+        if self.gentle.may_hold() {
+            for lane in lanes.filter(|&lane| self.gentle.holds[lane]) {
+                let place = self.places[lane] as usize;
+                self.gentle.write(lane, &mut polynomials(prepared)[place]);
             }
-            if energy <= short {
-                self.few_powers.push_if(energy >= 0.0, lane);
-            } else if energy <= halved {
+        }
+    }
+
+    /// Lists what is to become of lanes.
+    fn list(&mut self, lanes: Range<usize>) {
+        let energies = &self.whole.energies[lanes.clone()];
+        let [few, whole, direct] =
+            [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
+        let is_usual = |energy: f32| energy > few && energy <= whole;
+        (self.usual).push_where(lanes.clone(), energies, is_usual);
+        let takes_few = |energy: f32| energy >= 0.0 && energy <= few;
+        (self.few_powers.lanes).push_where(lanes.clone(), energies, takes_few);
+        let is_cut = |energy: f32| energy > whole && energy <= direct;
+        for (cut, &energy) in self.cut[lanes.clone()].iter_mut().zip(energies) {
+            *cut = u32::from(is_cut(energy));
+        }
+        self.long
+            .push_where(lanes.clone(), energies, |energy: f32| {
+                energy > whole || energy.is_nan()
+            });
+        for lane in self.long.iter() {
+            let energy = self.whole.energies[lane];
+            if energy <= direct {
                 self.halves.lanes.push(lane);
-            } else if energy <= direct {
-                self.quarters.lanes.push(lane);
             } else {
                 self.left_over.push(lane);
             }
         }
+        self.long.clear();
+    }
+
+    /// Begins the spans and the segments that lanes become.
+    fn begin(
+        &mut self,
+        prepared: &mut Prepared,
+        intervals: &Intervals,
+        lanes: Range<usize>,
+        key: u32,
+    ) {
+        let first_place = polynomials(prepared).len() as u32;
+        let first_span = prepared.spans.sources.len() as u32;
+        let mut next = 0;
+        for (i, lane) in lanes.clone().enumerate() {
+            self.spans[lane] = first_span + next as u32;
+            self.places[lane] = first_place + next as u32;
+            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
+            let own = if key == NONE { NONE } else { key + i as u32 };
+            // The next one takes the place of the second where this one is not cut.
+            let second = (next + 1) % SPANS;
+            (self.starts[next % SPANS], self.keys[next % SPANS]) = (start, own);
+            (self.starts[second], self.keys[second]) = (start + (end - start) * 0.5, NONE);
+            next += 1 + self.cut[lane] as usize;
+        }
+        let spans = &mut prepared.spans;
+        spans.starts.extend_from_slice(&self.starts[..next]);
+        spans.keys.extend_from_slice(&self.keys[..next]);
+        prepared.new_segments(next);
     }
 
     /// Fits the curves that were taken. What is left over waits, here or in `fitting`;
@@ -173,9 +221,11 @@ impl Direct {
         is_exact: bool,
         fitting: &mut Fitting,
     ) {
-        self.fit_all_powers(prepared);
-        self.wait(prepared);
-        self.cut(prepared, intervals, fitting);
+        let (numbers, places) = (&self.whole.numbers, &self.places);
+        fit(&WHOLE, &self.usual, numbers, places, prepared);
+        self.usual.clear();
+        self.few_powers.take(numbers, places, prepared);
+        self.halves.take(numbers, places, prepared);
         let are_many = MOST_ALONE * self.left_over.count() > intervals.count;
         if are_many && !is_exact {
             in_lanes(&mut Steps(intervals));
@@ -219,48 +269,11 @@ impl Direct {
 
     /// Has what was left over fitted.
     pub(super) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        self.fit_few_powers(prepared);
-        self.halves.finish(prepared, fitting);
-        self.quarters.finish(prepared, fitting);
+        self.few_powers.finish(prepared);
+        self.halves.finish(prepared);
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }
-    }
-
-    fn fit_all_powers(&mut self, prepared: &mut Prepared) {
-        let segments = polynomials(prepared);
-        let (whole, places) = (&self.whole.numbers, &self.places);
-        (self.all_powers).fit(&WHOLE, whole, places, segments, &mut self.halves.lanes);
-        self.all_powers.clear();
-    }
-
-    /// Lets curves that few powers serve wait.
-    fn wait(&mut self, prepared: &mut Prepared) {
-        while let Some(lane) = self.few_powers.pop() {
-            let own = self.waiting.push(&self.whole.numbers, lane);
-            self.waiting_places[own] = self.places[lane];
-            if self.waiting.is_full() {
-                self.fit_few_powers(prepared);
-            }
-        }
-    }
-
-    fn fit_few_powers(&mut self, prepared: &mut Prepared) {
-        let (segments, places) = (polynomials(prepared), &self.waiting_places);
-        (self.waiting).fit(&GENTLE_WHOLE, places, segments, &mut self.halves.lanes);
-        self.waiting.clear();
-    }
-
-    /// Lets the longer curves wait, to be fitted in parts.
-    fn cut(&mut self, prepared: &mut Prepared, intervals: &Intervals, fitting: &mut Fitting) {
-        let curves = TakenCurves {
-            numbers: &self.whole.numbers,
-            durations: &intervals.durations,
-            spans: &self.spans,
-            places: &self.places,
-        };
-        self.halves.take(&curves, prepared, fitting);
-        self.quarters.take(&curves, prepared, fitting);
     }
 }
 

@@ -141,6 +141,22 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
+    /// Makes them those of the curves from their other end.
+    #[inline(always)]
+    pub(super) fn turn_round(&mut self) {
+        for odd in self.odd.as_flattened_mut() {
+            *odd = -*odd;
+        }
+    }
+
+    /// Sets the derivative by s at the middle, which is the first of the nodes too, and half of
+    /// the second.
+    #[inline(always)]
+    pub(super) fn set_middle(&mut self, derivative: [L; 4], half_second: [L; 4]) {
+        self.odd[0] = derivative;
+        self.even[0] = half_second;
+    }
+
     /// Sets the derivatives by s at the ends: the last pair of nodes, which comes twice. They
     /// take the form of one more sample there, so that [`Nodes::powers`] finds, as what it has
     /// more than the sample itself, the derivatives of its polynomials by s².

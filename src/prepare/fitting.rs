@@ -66,15 +66,18 @@ impl Fitting {
     }
 
     /// Takes the curves in some lanes of `curves`, which are to be [brought](Fitting::bring)
-    /// before they are others: each is the source of the next span.
+    /// before they are others: each becomes the next span, the first with this constant at its
+    /// start.
     #[inline]
     pub(super) fn take(
         &mut self,
         prepared: &mut Prepared,
         curves: &Intervals,
         lanes: Range<usize>,
+        key: u32,
     ) {
-        let (first_span, _) = prepared.new_segments(lanes.len());
+        (prepared.spans).begin(&curves.starts[lanes.clone()], key);
+        let first_span = prepared.new_segments(lanes.len());
         for (span, lane) in (first_span..).zip(lanes) {
             self.queue(prepared, curves, lane, span);
         }
@@ -135,16 +138,6 @@ impl Fitting {
         source
     }
 
-    /// Takes the segments of a span's curve, which is cut into equal parts.
-    pub(super) fn take_parts<const COUNT: usize>(&mut self, span: usize, segments: [usize; COUNT]) {
-        self.cutter.push_parts(span, segments);
-    }
-
-    /// Takes the curve of a span that has its segment, and cuts it.
-    pub(super) fn take_long(&mut self, span: usize, curve: Curve, segment: usize) {
-        self.cutter.push(span, curve, segment);
-    }
-
     /// Takes any curve.
     pub(super) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
         self.cutter.push_whole(prepared.spans.sources.len(), curve);
@@ -193,9 +186,9 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
 }
 
 /// Segments that are not fitted yet: as a constant, so many of them are cleared at once.
-static ZERO: [PolynomialSegment; LANES] = [PolynomialSegment {
+static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
     coefficients: [[0.0; 4]; 11],
-}; LANES];
+}; 2 * LANES];
 
 /// Of curves that are cut untried.
 const UNTRIED: Source = Source::Segment(NONE);
@@ -209,18 +202,17 @@ pub(super) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
 }
 
 impl Prepared {
-    /// As many segments, which are zero, each the source of the next span: the first of
-    /// these spans and of the segments.
+    /// As many segments, two for each lane at most, which are zero, each the source of the next
+    /// span; the first of these spans.
     #[inline]
-    pub(super) fn new_segments(&mut self, count: usize) -> (usize, usize) {
+    pub(super) fn new_segments(&mut self, count: usize) -> usize {
         let segments = polynomials(self);
         let places = segments.len()..segments.len() + count;
-        let first_place = places.start;
         segments.extend_from_slice(&ZERO[..count]);
         let sources = &mut self.spans.sources;
         let first_span = sources.len();
         sources.extend(places.map(|place| Source::Segment(place as u32)));
-        (first_span, first_place)
+        first_span
     }
 
     /// Puts the parts of curves that were cut where these are among the spans.

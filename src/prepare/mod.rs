@@ -13,8 +13,9 @@ mod far_keys;
 mod fit;
 mod fitting;
 mod gentle_lanes;
-mod in_parts;
 mod intervals;
+mod key_curves;
+mod key_fit;
 mod key_joints;
 mod key_steps;
 mod motion;
@@ -32,7 +33,6 @@ mod steady;
 mod steps;
 mod turns;
 mod vectors;
-mod whole_fit;
 mod whole_lanes;
 
 pub(crate) use arc_lanes::{
@@ -149,6 +149,17 @@ impl Part {
 impl Spans {
     pub(crate) fn len(&self) -> usize {
         self.starts.len()
+    }
+
+    /// Begins spans at these times, the first at this constant and the others at those behind
+    /// it; their sources are to come.
+    #[inline]
+    fn begin(&mut self, starts: &[f64], key: u32) {
+        self.starts.extend_from_slice(starts);
+        match key {
+            NONE => self.keys.resize(self.keys.len() + starts.len(), NONE),
+            first => self.keys.extend(first..first + starts.len() as u32),
+        }
     }
 
     /// Adds some of other spans.

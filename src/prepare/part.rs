@@ -1,60 +1,79 @@
 //! Parts of curves that are fitted by one polynomial each, and what their basis functions do
 //! there.
 
-use super::fit::TOLERANCE;
-use super::nodes::{END_NODES, FULL_NODES, GENTLE_NODES, Nodes};
+use super::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
 
-/// A part of curves' parameter, and the nodes at which they are sampled there: all of them,
-/// or all but the ends, where keys and handles say what the curve does.
+/// Sums of the three half-rotation vectors' squares up to which curves are fitted within 7e-8
+/// of a component by [`FEW_POWERS`], and by [`WHOLE`]. Two halves leave out less of any longer
+/// one that comes straight from keys.
+pub(super) const LONGEST_OF_FEW: f64 = 0.01;
+pub(super) const LONGEST_WHOLE: f64 = 0.16;
+
+/// A part of curves' parameter, from their start on or back from their end, and the nodes at which they are sampled
+/// there. What they do at its ends is known, and at its middle.
 pub(super) struct Part<const SAMPLED: usize, const PAIRS: usize> {
     pub(super) nodes: &'static Nodes<PAIRS>,
-    /// The basis functions at its middle.
-    pub(super) weights: [f32; 3],
+    pub(super) middle: Place,
+    /// Half of the basis functions' second derivatives there.
+    pub(super) bends: [f32; 3],
     /// What they gain from there on, up to `-s` and to `s` at each node `s` that is sampled.
     pub(super) gains: [[[Gain; 2]; 3]; SAMPLED],
-    /// See [`TOLERANCE`].
-    pub(super) tolerance: f32,
-    /// Of all, not of less: there the second gains as much after the middle as before.
-    pub(super) is_whole: bool,
+    /// From vectors at keys to derivatives there.
+    pub(super) slope: f32,
 }
 
-/// Always near enough.
-pub(super) const GENTLE_WHOLE: Part<3, 3> = Part {
-    tolerance: f32::INFINITY,
-    ..Part::new(&GENTLE_NODES, 0.5, 1.0)
-};
-pub(super) const WHOLE: Part<3, 5> = Part::new(&END_NODES, 0.5, 1.0);
-pub(super) const HALVES: [Part<5, 5>; 2] = [
-    Part::new(&FULL_NODES, 0.25, 0.5),
-    Part::new(&FULL_NODES, 0.75, 0.5),
-];
-pub(super) const QUARTERS: [Part<5, 5>; 4] = [
-    Part::new(&FULL_NODES, 0.125, 0.25),
-    Part::new(&FULL_NODES, 0.375, 0.25),
-    Part::new(&FULL_NODES, 0.625, 0.25),
-    Part::new(&FULL_NODES, 0.875, 0.25),
-];
+/// Degree 8.
+pub(super) const FEW_POWERS: Part<1, 4> = Part::new(&FEW_END_NODES, 0.5, 1.0);
+pub(super) const WHOLE: Part<2, 5> = Part::new(&END_NODES, 0.5, 1.0);
+pub(super) const HALF: Part<2, 5> = Part::new(&HALF_END_NODES, 0.25, 0.5);
+/// From the end on: there the last of the vectors is the first that turns.
+pub(super) const LAST_HALF: Part<2, 5> = HALF.backward();
+/// Where both meet.
+pub(super) const JOINT: Place = Place::new(0.5, 0.5);
 
-/// Above this hardly any curve is fitted in halves.
-pub(super) const LONGEST_HALVED: f64 = 0.6;
+/// The basis functions at some place, and their derivatives by a part's parameter.
+pub(super) struct Place {
+    pub(super) weights: [f32; 3],
+    pub(super) rates: [f32; 3],
+}
 
-impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
-    const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
-        let (m, n) = (middle, 1.0 - middle);
-        let mut part = Self {
-            nodes,
+impl Place {
+    /// For a part of that width.
+    const fn new(m: f64, width: f64) -> Self {
+        let n = 1.0 - m;
+        Self {
             weights: [
                 (1.0 - n * n * n) as f32,
                 ((3.0 - 2.0 * m) * m * m) as f32,
                 (m * m * m) as f32,
             ],
+            rates: [
+                (3.0 * n * n * width) as f32,
+                (6.0 * m * n * width) as f32,
+                (3.0 * m * m * width) as f32,
+            ],
+        }
+    }
+}
+
+impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
+    const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
+        let (m, square) = (middle, width * width);
+        let mut part = Self {
+            nodes,
+            middle: Place::new(middle, width),
+            bends: [
+                (-3.0 * (1.0 - m) * square) as f32,
+                ((3.0 - 6.0 * m) * square) as f32,
+                (3.0 * m * square) as f32,
+            ],
             gains: [[[Gain::new(0.0); 2]; 3]; SAMPLED],
-            tolerance: TOLERANCE,
-            is_whole: width == 1.0,
+            slope: (3.0 * width) as f32,
         };
         let mut k = 0;
         while k < SAMPLED {
-            let s = nodes.at[k] as f64 * width;
+            // The first is the middle.
+            let s = nodes.at[k + 1] as f64 * width;
             let (before, after) = (gains(m, -s), gains(m, s));
             let mut j = 0;
             while j < 3 {
@@ -65,6 +84,22 @@ impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
         }
         part
     }
+}
+
+impl Part<2, 5> {
+    /// The basis functions, each 1 less itself, of the parameter that goes the other way.
+    const fn backward(mut self) -> Self {
+        self.middle.weights = backward(self.middle.weights);
+        self.middle.rates = backward(self.middle.rates);
+        self.bends = backward(self.bends);
+        let [first, second] = self.gains;
+        self.gains = [backward(first), backward(second)];
+        self
+    }
+}
+
+const fn backward<N: Copy>([first, second, third]: [N; 3]) -> [N; 3] {
+    [third, second, first]
 }
 
 /// What the basis functions have at `m + d` more than at `m`.

@@ -265,20 +265,13 @@ impl SmoothPreparation {
         holds_frame: Option<&[bool; LANES]>,
     ) {
         let first_span = prepared.spans.len();
-        let starts = &self.intervals.starts[stretch.lanes()];
-        prepared.spans.starts.extend_from_slice(starts);
-        let (keys, count) = (&mut prepared.spans.keys, starts.len());
-        match stretch.key {
-            NONE => keys.resize(keys.len() + count, NONE),
-            first => keys.extend(first..first + count as u32),
-        }
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
         let lanes = stretch.lanes();
         let holds_frame = |lane: usize| holds_frame.is_none_or(|held| held[lane]);
         let all_hold = lanes.clone().all(holds_frame);
         let fits_alike = !is_steady && !self.is_frozen() && all_hold;
         if fits_alike {
-            self.take(prepared, lanes.clone());
+            self.take(prepared, stretch, lanes.clone());
         }
         for (i, lane) in lanes.enumerate().filter(|_| !fits_alike) {
             let source = if !holds_frame(lane) {
@@ -287,7 +280,7 @@ impl SmoothPreparation {
                 let keys = self.intervals.keys(lane);
                 self.fitting.take_steady(prepared, keys)
             } else if !self.holds(stretch, lane) {
-                self.take(prepared, lane..lane + 1);
+                self.take(prepared, stretch, lane..lane + 1);
                 continue;
             } else if stretch.key != NONE {
                 Source::Constant(stretch.key_at(i))
@@ -297,23 +290,26 @@ impl SmoothPreparation {
                     _ => STILL,
                 }))
             };
-            if let Source::Constant(_) = source {
-                prepared.spans.keys[first_span + i] = NONE;
-            }
-            prepared.spans.sources.push(source);
+            let key = match source {
+                Source::Constant(_) => NONE,
+                _ => stretch.key_at(i),
+            };
+            prepared.push_span(self.intervals.starts[lane], source, key);
         }
+        let end = prepared.spans.len();
         let spans = &mut prepared.parts[stretch.part].spans;
         if spans.start == spans.end {
             spans.start = first_span;
         }
-        spans.end = first_span + count;
+        spans.end = end;
     }
 
-    /// Takes the curves in some lanes: each is the source of the next span.
-    fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>) {
+    /// Takes the curves in some lanes of a stretch: they become the next spans.
+    fn take(&mut self, prepared: &mut Prepared, stretch: &Stretch, lanes: Range<usize>) {
+        let key = stretch.key_at(lanes.start - stretch.lane);
         match &mut self.direct {
-            Some(direct) => direct.take(prepared, lanes),
-            None => self.fitting.take(prepared, &self.intervals, lanes),
+            Some(direct) => direct.take(prepared, &self.intervals, lanes, key),
+            None => self.fitting.take(prepared, &self.intervals, lanes, key),
         }
     }
 
