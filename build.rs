@@ -19,8 +19,9 @@ mod spirv;
 /// those also store two words of 64 bits, not four of 32.
 const READS: [&str; 2] = ["storage", "texels"];
 
-/// What the kernel is joined with: one of each, and its name is that of all three.
-const FORMS: [&str; 2] = ["arc", "polynomial"];
+/// What the kernel is joined with: one of each, and its name is that of all three. Each with
+/// the file that it needs beside its own.
+const FORMS: [(&str, &str); 2] = [("arc", "sine_cosine"), ("polynomial", "polynomial")];
 /// How work is listed, with the files for that.
 const LISTINGS: [(&str, &[&str], &str); 3] = [
     ("frames", &["kernel", "distance_in_frames"], "items"),
@@ -52,7 +53,7 @@ const SAMPLED: [(&str, &[&str], &[&str]); 3] = [
     ),
     (
         "sampled_pairs",
-        &["sine_cosine", "evaluate_arc", "arc", "steady"],
+        &["sine_cosine", "evaluate_arc", "arc", "steady", "polynomial"],
         &["sampled"],
     ),
     ("sampled_cubics", &["gentle"], &["sampled", "joints"]),
@@ -67,13 +68,13 @@ fn pipelines() -> Vec<(String, Vec<String>)> {
             .to_vec(),
     )];
     for reads in READS {
-        for form in FORMS {
+        for (form, formula) in FORMS {
             for (listing, entry, listed) in LISTINGS {
                 for (encoding, needed) in ENCODINGS {
                     let own = [
                         "canonical",
                         "launch",
-                        "sine_cosine",
+                        formula,
                         &format!("evaluate_{form}"),
                         &format!("store_{encoding}"),
                     ];

@@ -19,11 +19,12 @@ fn between(key: u32, start: vec4f, next: u32, known: Known) -> vec4f {
     let before = signed_at(select(key, key - 1u, first.kind == INNER));
     let after = signed_at(select(next, next + 1u, last.kind == INNER));
     let curve = gentle(before, start, signed_at(next), after, first, last);
-    // As `evaluate_polynomial`, whose other powers are 0.
+    // As `polynomial`, whose other powers are 0.
     let c = curve.powers;
     let s = known.parameter;
     let z = s * s;
-    let even = c[6] * (z * z) + (c[4] * z + c[2]);
-    let odd = c[5] * (z * z) + (c[3] * z + c[1]);
-    return select(vec4f(0.0), c[0] + (odd * s + even * z), curve.holds);
+    let third = c[3] * s + c[2];
+    let high = c[6] * z + (c[5] * s + c[4]);
+    let gain = high * (z * z) + (third * z + c[1] * s);
+    return select(vec4f(0.0), c[0] + gain, curve.holds);
 }

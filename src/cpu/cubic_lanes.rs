@@ -64,14 +64,14 @@ impl InLanes for CubicBlock {
             let c = &curve.powers;
             let s = self.parameters[j];
             let t = s * s;
-            let tt = t * t;
             let is_held = self.held[j] == 1.0;
             let found = if curve.holds { 1.0 } else { 0.0 };
             macro_rules! component {
                 ($c:literal) => {{
-                    let even = c[6][$c] * tt + (c[4][$c] * t + c[2][$c]);
-                    let odd = c[5][$c] * tt + (c[3][$c] * t + c[1][$c]);
-                    let own = canonical(c[0][$c] + (odd * s + even * t));
+                    let third = c[3][$c] * s + c[2][$c];
+                    let high = c[6][$c] * t + (c[5][$c] * s + c[4][$c]);
+                    let gain = high * (t * t) + (third * t + c[1][$c] * s);
+                    let own = canonical(c[0][$c] + gain);
                     let own = if curve.holds { own } else { 0.0 };
                     if is_held { start[j][$c] } else { own }
                 }};

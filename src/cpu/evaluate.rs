@@ -1,6 +1,6 @@
 //! Twin of `shaders/kernel.wgsl`: the samples of one run, in vector lanes.
 
-use std::hint::black_box;
+use std::marker::PhantomData;
 
 use glam::Vec4;
 
@@ -18,9 +18,25 @@ pub(crate) trait Evaluate {
         0.0
     }
 
-    /// The rotations at as many parameters of the segment: those of the first quarter side by
-    /// side, and so on.
-    fn evaluate<L: Lanes>(&self, constant: L, parameters: L) -> [L; 4];
+    /// How many samples are worked out at once.
+    fn samples<L: Lanes>() -> usize;
+
+    /// Their distances, or parameters, as [`Evaluate::evaluate`] takes them.
+    fn load<L: Lanes>(distances: &[f32]) -> L;
+
+    /// What only the parameters say.
+    type Arguments<L: Lanes>: Copy;
+
+    fn arguments<L: Lanes>(parameters: L) -> Self::Arguments<L>;
+
+    /// The rotations at some parameters of the segment; where these may have tiny components,
+    /// `FILTER` makes them [`canonical`].
+    fn evaluate<L: Lanes, const FILTER: bool>(
+        &self,
+        constant: L,
+        arguments: Self::Arguments<L>,
+        rotations: &mut [[f32; 4]],
+    );
 
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
@@ -69,10 +85,11 @@ pub(super) fn frames<L: Lanes, S: Evaluate>(
     output: &mut [[f32; 4]],
 ) {
     // What is left of a longer run goes into one more wide vector.
-    if L::COUNT > L::Narrow::COUNT && count <= L::Narrow::COUNT {
-        frames_alike::<L::Narrow, S>(segment, affine, first, count, L::LOADS_SPREAD, output);
+    let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
+    if all > narrow && count <= narrow {
+        frames_alike::<L::Narrow, S>(segment, affine, first, count, output);
     } else {
-        frames_alike::<L, S>(segment, affine, first, count, L::LOADS_SPREAD, output);
+        frames_alike::<L, S>(segment, affine, first, count, output);
     }
 }
 
@@ -83,7 +100,6 @@ fn frames_alike<L: Lanes, S: Evaluate>(
     affine: Affine,
     first: f32,
     count: usize,
-    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     if count <= FEW {
@@ -92,10 +108,10 @@ fn frames_alike<L: Lanes, S: Evaluate>(
         }
         return;
     }
-    let next = L::all(first) + L::load(&STEPS);
-    let step = L::all(L::COUNT as f32);
+    let next = L::all(first) + S::load(&STEPS);
+    let step = L::all(S::samples::<L>() as f32);
     let distances = Frames { next, step };
-    run(segment, affine, count, distances, loads_spread, output);
+    run(segment, affine, count, distances, output);
 }
 
 /// The distances of a vector's samples from its first.
@@ -119,8 +135,8 @@ pub(super) fn distances<L: Lanes, S: Evaluate>(
         }
         return;
     }
-    let distances = Listed(distances);
-    run::<L, S>(segment, affine, count, distances, L::LOADS_SPREAD, output);
+    let distances = Listed::<S>(distances, PhantomData);
+    run::<L, S>(segment, affine, count, distances, output);
 }
 
 /// Evaluates the sample at a distance from the middle.
@@ -149,14 +165,17 @@ impl<L: Lanes> Distances<L> for Frames<L> {
     }
 }
 
-struct Listed<'a>(&'a [f32]);
+struct Listed<'a, S>(&'a [f32], PhantomData<S>);
 
-impl<L: Lanes> Distances<L> for Listed<'_> {
+impl<L: Lanes, S: Evaluate> Distances<L> for Listed<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        let (own, rest) = self.0.split_at(L::COUNT);
+        // The last is asked for one more.
+        let Some((own, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
+            return L::all(0.0);
+        };
         self.0 = rest;
-        L::load(own)
+        S::load(own)
     }
 }
 
@@ -166,72 +185,46 @@ fn run<L: Lanes, S: Evaluate>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     if segment.is_canonical() {
-        vectors::<L, S, false>(segment, affine, count, distances, loads_spread, output);
+        vectors::<L, S, false>(segment, affine, count, distances, output);
     } else {
-        vectors::<L, S, true>(segment, affine, count, distances, loads_spread, output);
+        vectors::<L, S, true>(segment, affine, count, distances, output);
     }
 }
 
-/// Evaluated and put together a vector at a time.
+/// A vector at a time.
 #[inline(always)]
 fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
     mut distances: impl Distances<L>,
-    loads_spread: bool,
     output: &mut [[f32; 4]],
 ) {
     let constant = L::all(segment.constant());
     let (scale, offset) = (L::all(affine.scale), L::all(affine.offset));
-    let whole = count.next_multiple_of(L::COUNT).min(output.len());
-    let mut vectors = output[..whole].chunks_exact_mut(L::COUNT);
+    let samples = S::samples::<L>();
+    let whole = count.next_multiple_of(samples).min(output.len());
+    let mut vectors = output[..whole].chunks_exact_mut(samples);
+    let mut next = S::arguments(distances.next() * scale + offset);
     for rotations in &mut vectors {
-        let parameter = distances.next() * scale + offset;
-        // Else all its numbers would be loaded first, more than there are registers for, and
-        // stored elsewhere until they are used.
-        let segment = if loads_spread {
-            black_box(segment)
-        } else {
-            segment
-        };
-        vector::<L, S, FILTER>(segment, constant, parameter, rotations);
+        let own = next;
+        // A turn ahead: nothing waits for them.
+        next = S::arguments(distances.next() * scale + offset);
+        segment.evaluate::<L, FILTER>(constant, own, rotations);
     }
     let rest = vectors.into_remainder();
     if !rest.is_empty() {
         let mut rotations = Rotations([[0.0; 4]; STEPS.len()]);
-        let parameter = distances.next() * scale + offset;
-        vector::<L, S, FILTER>(segment, constant, parameter, &mut rotations.0[..L::COUNT]);
+        segment.evaluate::<L, FILTER>(constant, next, &mut rotations.0[..samples]);
         rest.copy_from_slice(&rotations.0[..rest.len()]);
     }
 }
 
 #[repr(align(64))]
 struct Rotations([[f32; 4]; STEPS.len()]);
-
-#[inline(always)]
-fn vector<L: Lanes, S: Evaluate, const FILTER: bool>(
-    segment: &S,
-    constant: L,
-    parameter: L,
-    rotations: &mut [[f32; 4]],
-) {
-    let mut quarters = segment.evaluate(constant, parameter);
-    if FILTER {
-        // Written out: `lanes::canonical` here costs SSE2 half as much again.
-        quarters = [
-            quarters[0].canonical(),
-            quarters[1].canonical(),
-            quarters[2].canonical(),
-            quarters[3].canonical(),
-        ];
-    }
-    rotations.copy_from_slice(L::joined(quarters).as_ref());
-}
 
 /// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.
 #[inline(always)]

@@ -3,7 +3,7 @@
 use glam::Vec4;
 
 use super::evaluate::{COARSE, Evaluate, is_coarse};
-use super::lanes::{Lanes, Number};
+use super::lanes::{Lanes, Number, canonical};
 use super::sine_cosine::short_sine_and_fall;
 use crate::segment::ArcSegment;
 
@@ -14,18 +14,44 @@ impl Evaluate for ArcSegment {
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes>(&self, square: L, parameter: L) -> [L; 4] {
+    fn samples<L: Lanes>() -> usize {
+        L::COUNT
+    }
+
+    #[inline(always)]
+    fn load<L: Lanes>(distances: &[f32]) -> L {
+        L::load(distances)
+    }
+
+    type Arguments<L: Lanes> = L;
+
+    #[inline(always)]
+    fn arguments<L: Lanes>(parameters: L) -> L {
+        parameters
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Lanes, const FILTER: bool>(
+        &self,
+        square: L,
+        parameter: L,
+        rotations: &mut [[f32; 4]],
+    ) {
         let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
         let z = parameter * parameter * square;
         let (sine, fall) = short_sine_and_fall(parameter, z);
         let (s, f) = (sine.fourfold(), fall.fourfold());
         // Written out: closures are not always inlined.
-        [
+        let mut quarters = [
             turned(middle, tangent, s[0], f[0]),
             turned(middle, tangent, s[1], f[1]),
             turned(middle, tangent, s[2], f[2]),
             turned(middle, tangent, s[3], f[3]),
-        ]
+        ];
+        if FILTER {
+            quarters = canonical(quarters);
+        }
+        rotations.copy_from_slice(L::joined(quarters).as_ref());
     }
 
     #[inline(always)]

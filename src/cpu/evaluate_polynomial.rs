@@ -1,4 +1,5 @@
-//! Twin of `shaders/evaluate_polynomial.wgsl`: the same names, the same order.
+//! Twin of `shaders/evaluate_polynomial.wgsl` and `shaders/polynomial.wgsl`: the same names,
+//! the same order.
 
 use glam::Vec4;
 
@@ -7,22 +8,44 @@ use super::lanes::{Lanes, Number};
 use crate::segment::PolynomialSegment;
 
 impl Evaluate for PolynomialSegment {
+    /// A quarter of the lanes: with all four components of a rotation side by side, the
+    /// coefficients of a run nearly fit into the registers there are.
     #[inline(always)]
-    fn evaluate<L: Lanes>(&self, _: L, s: L) -> [L; 4] {
+    fn samples<L: Lanes>() -> usize {
+        L::COUNT / 4
+    }
+
+    #[inline(always)]
+    fn load<L: Lanes>(distances: &[f32]) -> L {
+        L::fourfold_of(distances)
+    }
+
+    type Arguments<L: Lanes> = [L; 3];
+
+    /// `s`, `s²` and `s⁴`.
+    #[inline(always)]
+    fn arguments<L: Lanes>(s: L) -> [L; 3] {
+        powers(s)
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Lanes, const FILTER: bool>(
+        &self,
+        _: L,
+        powers: [L; 3],
+        rotations: &mut [[f32; 4]],
+    ) {
         // Written out: closures are not always inlined.
-        macro_rules! component {
-            ($c:literal, $($power:literal)+) => {
-                polynomial([$(L::all(self.coefficients[$power][$c])),+], s)
+        macro_rules! coefficients {
+            ($($power:literal)+) => {
+                [$(L::repeated(self.coefficients[$power])),+]
             };
         }
-        // A component at a time: with all four in a vector, coefficients need fewer
-        // registers, but more than there are.
-        L::transposed([
-            component!(0, 0 1 2 3 4 5 6 7 8 9 10),
-            component!(1, 0 1 2 3 4 5 6 7 8 9 10),
-            component!(2, 0 1 2 3 4 5 6 7 8 9 10),
-            component!(3, 0 1 2 3 4 5 6 7 8 9 10),
-        ])
+        let mut q = by_powers(coefficients!(0 1 2 3 4 5 6 7 8 9 10), powers);
+        if FILTER {
+            q = q.canonical();
+        }
+        q.store_side_by_side(rotations);
     }
 
     #[inline(always)]
@@ -52,13 +75,22 @@ impl PolynomialSegment {
 /// By the coefficients of 1, s, s², … s¹⁰.
 #[inline(always)]
 pub(super) fn polynomial<N: Number>(c: [N; 11], s: N) -> N {
+    by_powers(c, powers(s))
+}
+
+/// `s`, `s²` and `s⁴`.
+#[inline(always)]
+fn powers<N: Number>(s: N) -> [N; 3] {
     let z = s * s;
-    let zz = z * z;
-    let even_low = c[4] * z + c[2];
-    let even_high = c[8] * z + c[6];
-    let even = (c[10] * zz + even_high) * zz + even_low;
-    let odd_low = c[3] * z + c[1];
-    let odd_high = c[7] * z + c[5];
-    let odd = (c[9] * zz + odd_high) * zz + odd_low;
-    c[0] + (odd * s + even * z)
+    [s, z, z * z]
+}
+
+#[inline(always)]
+fn by_powers<N: Number>(c: [N; 11], [s, z, zz]: [N; 3]) -> N {
+    let third = c[3] * s + c[2];
+    let fifth = c[5] * s + c[4];
+    let seventh = c[7] * s + c[6];
+    let ninth = c[9] * s + c[8];
+    let high = (c[10] * z + ninth) * zz + (seventh * z + fifth);
+    c[0] + (high * zz + (third * z + c[1] * s))
 }

@@ -42,9 +42,6 @@ pub(crate) trait Lanes: Number {
     /// How many.
     const COUNT: usize;
 
-    /// Whether an operation takes a number of memory for all lanes: AVX-512's do.
-    const LOADS_SPREAD: bool;
-
     /// What evaluates runs of few: these, or vectors half as wide.
     type Narrow: Lanes;
 
@@ -81,6 +78,12 @@ pub(crate) trait Lanes: Number {
     /// Each number four times over, for the components of its sample's rotation: those of
     /// the first quarter of the samples, and so on.
     fn fourfold(self) -> [Self; 4];
+
+    /// Each of a quarter of [`Lanes::COUNT`] numbers four times over.
+    fn fourfold_of(samples: &[f32]) -> Self;
+
+    /// To a quarter of [`Lanes::COUNT`] rotations, `x y z w x y z w …`.
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]);
 
     /// From `x y z w`, the rotations of the first quarter of the samples side by side, and so
     /// on.
@@ -162,8 +165,6 @@ impl Number for Vec4 {
 
 impl Lanes for Vec4 {
     const COUNT: usize = 4;
-    const LOADS_SPREAD: bool = false;
-
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];
     type Doubles = Four;
@@ -228,6 +229,16 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn fourfold(self) -> [Self; 4] {
         [self.xxxx(), self.yyyy(), self.zzzz(), self.wwww()]
+    }
+
+    #[inline(always)]
+    fn fourfold_of(samples: &[f32]) -> Self {
+        Self::splat(samples[0])
+    }
+
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(&[self.to_array()]);
     }
 
     #[inline(always)]

@@ -90,7 +90,6 @@ fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
 
 impl Lanes for Eight {
     const COUNT: usize = 8;
-    const LOADS_SPREAD: bool = false;
 
     type Narrow = Self;
     type Rotations = [[f32; 4]; 8];
@@ -186,6 +185,17 @@ impl Lanes for Eight {
                 Self(_mm256_permute_ps::<0b11_11_11_11>(self.0)),
             ]
         }
+    }
+
+    #[inline(always)]
+    fn fourfold_of(samples: &[f32]) -> Self {
+        let [a, b]: [f32; 2] = *samples.first_chunk().expect("two samples");
+        Self::of_two([a; 4], [b; 4])
+    }
+
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 2]>(self.0));
     }
 
     #[inline(always)]

@@ -122,7 +122,6 @@ fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
 
 impl Lanes for Sixteen {
     const COUNT: usize = 16;
-    const LOADS_SPREAD: bool = true;
 
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
@@ -216,6 +215,17 @@ impl Lanes for Sixteen {
                 Self(_mm512_permute_ps::<0b11_11_11_11>(self.0)),
             ]
         }
+    }
+
+    #[inline(always)]
+    fn fourfold_of(samples: &[f32]) -> Self {
+        let [a, b, c, d]: [f32; 4] = *samples.first_chunk().expect("four samples");
+        Self(bytemuck::cast([[a; 4], [b; 4], [c; 4], [d; 4]]))
+    }
+
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 4]>(self.0));
     }
 
     #[inline(always)]
