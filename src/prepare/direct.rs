@@ -168,10 +168,8 @@ impl Direct {
         for (cut, &energy) in self.cut[lanes.clone()].iter_mut().zip(energies) {
             *cut = u32::from(is_cut(energy));
         }
-        self.long
-            .push_where(lanes.clone(), energies, |energy: f32| {
-                energy > whole || energy.is_nan()
-            });
+        let is_long = |energy: f32| energy > whole || energy.is_nan();
+        (self.long).push_where(lanes.clone(), energies, is_long);
         for lane in self.long.iter() {
             let energy = self.whole.energies[lane];
             if energy <= direct {
