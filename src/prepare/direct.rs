@@ -37,8 +37,8 @@ pub(super) struct Direct {
     /// Lanes to fit.
     usual: List,
     /// Those that few powers serve, and those to fit in two: of either a block has few.
-    few_powers: WaitingCurves<Part<1, 4>>,
-    halves: WaitingCurves<Halves>,
+    few_powers: WaitingCurves<Part<1, 4>, 4>,
+    halves: WaitingCurves<Halves, 5>,
     /// Lanes that are fitted in two, or not here.
     long: List,
     /// 1 where a lane becomes two spans.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 
 use super::Prepared;
-use super::fit::MOST;
+use super::fit::{MOST, Samples};
 use super::fitting::polynomials;
 use super::intervals::{LANES, ROOM};
 use super::key_fit::{BetweenKeys, KeyFit};
@@ -33,14 +33,8 @@ impl List {
 
     /// Adds a lane.
     pub(super) fn push(&mut self, lane: usize) {
-        self.push_if(true, lane);
-    }
-
-    /// Adds a lane where it `is_wanted`, without a branch.
-    #[inline(always)]
-    pub(super) fn push_if(&mut self, is_wanted: bool, lane: usize) {
         self.lanes[self.count % ROOM_FOR] = lane as u32;
-        self.count += usize::from(is_wanted);
+        self.count += 1;
     }
 
     /// Adds those of some lanes that are wanted: which they are cannot be foreseen.
@@ -81,7 +75,7 @@ impl List {
 }
 
 /// Curves that wait.
-pub(super) struct WaitingCurves<F: 'static> {
+pub(super) struct WaitingCurves<F: 'static, const PAIRS: usize> {
     how: &'static F,
     /// The lanes of a block that are to be taken.
     pub(super) lanes: List,
@@ -95,7 +89,7 @@ struct Block {
     own: List,
 }
 
-impl<F: KeyFit> WaitingCurves<F> {
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> WaitingCurves<F, PAIRS> {
     pub(super) fn new(how: &'static F) -> Self {
         Self {
             how,
@@ -147,15 +141,15 @@ impl Block {
         self.own.push(own);
     }
 
-    fn fit(&mut self, how: &impl KeyFit, prepared: &mut Prepared) {
+    fn fit<const PAIRS: usize>(&mut self, how: &impl KeyFit<PAIRS>, prepared: &mut Prepared) {
         fit(how, &self.own, &self.numbers, &self.places, prepared);
         self.own.clear();
     }
 }
 
 /// Fits the curves in some lanes to the segments at their places.
-pub(super) fn fit(
-    how: &impl KeyFit,
+pub(super) fn fit<const PAIRS: usize>(
+    how: &impl KeyFit<PAIRS>,
     list: &List,
     curves: &CurveNumbers,
     places: &[u32; ROOM],
@@ -168,7 +162,7 @@ pub(super) fn fit(
     let count = segments.len();
     // For the last vector's lanes that have no curve.
     segments.extend([PolynomialSegment::zeroed(); 2]);
-    in_lanes(&mut Fit {
+    in_lanes(&mut Fit::<_, PAIRS> {
         how,
         list,
         curves,
@@ -178,7 +172,7 @@ pub(super) fn fit(
     segments.truncate(count);
 }
 
-struct Fit<'a, F> {
+struct Fit<'a, F, const PAIRS: usize> {
     how: &'a F,
     list: &'a List,
     curves: &'a CurveNumbers,
@@ -187,11 +181,12 @@ struct Fit<'a, F> {
     segments: &'a mut [PolynomialSegment],
 }
 
-impl<F: KeyFit> InLanes for Fit<'_, F> {
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let &List { count, ref lanes } = self.list;
-        let mut samples = F::samples::<L>();
+        // Made once, as they are cleared before.
+        let mut samples = Samples::<L, PAIRS>::all(L::all(0.0));
         for i in (0..count).step_by(L::COUNT) {
             let lanes = &lanes[i..i + L::COUNT];
             let own = &lanes[..L::COUNT.min(count - i)];

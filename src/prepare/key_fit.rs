@@ -20,17 +20,13 @@ pub(super) struct BetweenKeys<L> {
     pub(super) end: [L; 4],
 }
 
-/// How such curves are fitted.
-pub(super) trait KeyFit {
-    /// What of them is sampled: made once, as it is cleared before.
-    type Samples<L: Lanes>;
-
-    fn samples<L: Lanes>() -> Self::Samples<L>;
-
-    /// Fits them: to segments at these places, and behind each where they are cut.
+/// How such curves are fitted, by so many pairs of nodes.
+pub(super) trait KeyFit<const PAIRS: usize> {
+    /// Fits them: to segments at these places, and behind each where they are cut. Whatever
+    /// the samples were.
     fn fit<L: Lanes>(
         &self,
-        samples: &mut Self::Samples<L>,
+        samples: &mut Samples<L, PAIRS>,
         curves: &BetweenKeys<L>,
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
@@ -38,26 +34,20 @@ pub(super) trait KeyFit {
 }
 
 /// The whole.
-impl<const SAMPLED: usize, const PAIRS: usize> KeyFit for Part<SAMPLED, PAIRS> {
-    type Samples<L: Lanes> = Samples<L, PAIRS>;
-
-    #[inline(always)]
-    fn samples<L: Lanes>() -> Samples<L, PAIRS> {
-        Samples::all(L::all(0.0))
-    }
-
+impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes>(
         &self,
         samples: &mut Samples<L, PAIRS>,
-        &BetweenKeys {
-            start,
-            vectors,
-            end,
-        }: &BetweenKeys<L>,
+        curves: &BetweenKeys<L>,
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
+        let BetweenKeys {
+            start,
+            vectors,
+            end,
+        } = *curves;
         let [w1, _, w3] = vectors;
         let ends = [
             End::new(start, w1, self.slope),
@@ -72,26 +62,20 @@ impl<const SAMPLED: usize, const PAIRS: usize> KeyFit for Part<SAMPLED, PAIRS> {
 /// In two.
 pub(super) struct Halves;
 
-impl KeyFit for Halves {
-    type Samples<L: Lanes> = Samples<L, 5>;
-
-    #[inline(always)]
-    fn samples<L: Lanes>() -> Samples<L, 5> {
-        Samples::all(L::all(0.0))
-    }
-
+impl KeyFit<5> for Halves {
     #[inline(always)]
     fn fit<L: Lanes>(
         &self,
         samples: &mut Samples<L, 5>,
-        &BetweenKeys {
-            start,
-            vectors,
-            end,
-        }: &BetweenKeys<L>,
+        curves: &BetweenKeys<L>,
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
+        let BetweenKeys {
+            start,
+            vectors,
+            end,
+        } = *curves;
         let [w1, ..] = vectors;
         let joint = Moment::new::<true>(start, vectors, &JOINT);
         let [u1, u2, u3] = joint.rates(&JOINT);
@@ -365,7 +349,11 @@ mod tests {
     }
 
     /// The segments of a curve.
-    fn fitted<F: KeyFit>(how: &F, start: Quat, vectors: [Vec3; 3]) -> [PolynomialSegment; 2] {
+    fn fitted<const PAIRS: usize>(
+        how: &impl KeyFit<PAIRS>,
+        start: Quat,
+        vectors: [Vec3; 3],
+    ) -> [PolynomialSegment; 2] {
         let end = value(start, vectors, 1.0).as_quat();
         let curves = BetweenKeys {
             start: start.to_array().map(Vec4::splat),
@@ -373,12 +361,17 @@ mod tests {
             end: end.to_array().map(Vec4::splat),
         };
         let mut segments = [PolynomialSegment::zeroed(); 2];
-        how.fit(&mut F::samples(), &curves, &[0; MOST], &mut segments);
+        let mut samples = Samples::all(Vec4::ZERO);
+        how.fit(&mut samples, &curves, &[0; MOST], &mut segments);
         segments
     }
 
     /// The largest error of a component, of curves in so many parts.
-    fn largest_error(how: &impl KeyFit, parts: usize, longest: f64) -> f64 {
+    fn largest_error<const PAIRS: usize>(
+        how: &impl KeyFit<PAIRS>,
+        parts: usize,
+        longest: f64,
+    ) -> f64 {
         let random = &mut Rng::with_seed(1);
         let mut largest = 0.0f64;
         for i in 0..4000 {
