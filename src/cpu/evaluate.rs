@@ -21,22 +21,31 @@ pub(crate) trait Evaluate {
     /// How many samples are worked out at once.
     fn samples<L: Lanes>() -> usize;
 
-    /// Their distances, or parameters, as [`Evaluate::evaluate`] takes them.
+    /// Their distances, as [`Evaluate::evaluate`] takes their parameters.
     fn load<L: Lanes>(distances: &[f32]) -> L;
 
-    /// What only the parameters say.
-    type Arguments<L: Lanes>: Copy;
+    /// What is known of samples before it is their turn.
+    type Begun<L: Lanes>: Copy;
 
-    fn arguments<L: Lanes>(parameters: L) -> Self::Arguments<L>;
+    /// Begins with the first samples; and, where that is `FAR`, with those of later turns.
+    fn begin<L: Lanes, const FAR: bool>(
+        constant: L,
+        parameters: &mut impl Parameters<L>,
+    ) -> Self::Begun<L>;
 
-    /// The rotations at some parameters of the segment; where these may have tiny components,
-    /// `FILTER` makes them [`canonical`].
-    fn evaluate<L: Lanes, const FILTER: bool>(
+    /// The rotations of the samples that are next, and what is known of those behind them.
+    /// Where there may be tiny components, `FILTER` makes them [`canonical`].
+    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         constant: L,
-        arguments: Self::Arguments<L>,
+        begun: Self::Begun<L>,
+        parameters: &mut impl Parameters<L>,
         rotations: &mut [[f32; 4]],
-    );
+    ) -> Self::Begun<L>;
+
+    /// In how many turns it pays to begin samples several turns before their own. Their
+    /// operations are long chains, and a processor looks ahead no farther than a turn or two.
+    const FAR_FROM: Option<usize> = None;
 
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
@@ -151,6 +160,25 @@ trait Distances<L> {
     fn next(&mut self) -> L;
 }
 
+/// The parameters of a run's samples, a vector at a time. Behind the last there are more, which
+/// mean nothing.
+pub(crate) trait Parameters<L> {
+    fn next(&mut self) -> L;
+}
+
+struct OfDistances<L, D> {
+    distances: D,
+    scale: L,
+    offset: L,
+}
+
+impl<L: Lanes, D: Distances<L>> Parameters<L> for OfDistances<L, D> {
+    #[inline(always)]
+    fn next(&mut self) -> L {
+        self.distances.next() * self.scale + self.offset
+    }
+}
+
 struct Frames<L> {
     next: L,
     step: L,
@@ -170,7 +198,7 @@ struct Listed<'a, S>(&'a [f32], PhantomData<S>);
 impl<L: Lanes, S: Evaluate> Distances<L> for Listed<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        // The last is asked for one more.
+        // The last is asked for more.
         let Some((own, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
             return L::all(0.0);
         };
@@ -187,38 +215,44 @@ fn run<L: Lanes, S: Evaluate>(
     distances: impl Distances<L>,
     output: &mut [[f32; 4]],
 ) {
-    if segment.is_canonical() {
-        vectors::<L, S, false>(segment, affine, count, distances, output);
+    let turns = count.div_ceil(S::samples::<L>());
+    let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
+    if !segment.is_canonical() {
+        vectors::<L, S, true, false>(segment, affine, count, distances, output);
+    } else if is_far {
+        vectors::<L, S, false, true>(segment, affine, count, distances, output);
     } else {
-        vectors::<L, S, true>(segment, affine, count, distances, output);
+        vectors::<L, S, false, false>(segment, affine, count, distances, output);
     }
 }
 
 /// A vector at a time.
 #[inline(always)]
-fn vectors<L: Lanes, S: Evaluate, const FILTER: bool>(
+fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
-    mut distances: impl Distances<L>,
+    distances: impl Distances<L>,
     output: &mut [[f32; 4]],
 ) {
     let constant = L::all(segment.constant());
-    let (scale, offset) = (L::all(affine.scale), L::all(affine.offset));
+    let mut parameters = OfDistances {
+        distances,
+        scale: L::all(affine.scale),
+        offset: L::all(affine.offset),
+    };
     let samples = S::samples::<L>();
     let whole = count.next_multiple_of(samples).min(output.len());
     let mut vectors = output[..whole].chunks_exact_mut(samples);
-    let mut next = S::arguments(distances.next() * scale + offset);
+    let mut begun = S::begin::<L, FAR>(constant, &mut parameters);
     for rotations in &mut vectors {
-        let own = next;
-        // A turn ahead: nothing waits for them.
-        next = S::arguments(distances.next() * scale + offset);
-        segment.evaluate::<L, FILTER>(constant, own, rotations);
+        begun = segment.evaluate::<L, FILTER, FAR>(constant, begun, &mut parameters, rotations);
     }
     let rest = vectors.into_remainder();
     if !rest.is_empty() {
         let mut rotations = Rotations([[0.0; 4]; STEPS.len()]);
-        segment.evaluate::<L, FILTER>(constant, next, &mut rotations.0[..samples]);
+        let own = &mut rotations.0[..samples];
+        segment.evaluate::<L, FILTER, FAR>(constant, begun, &mut parameters, own);
         rest.copy_from_slice(&rotations.0[..rest.len()]);
     }
 }

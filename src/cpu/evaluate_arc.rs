@@ -2,9 +2,9 @@
 
 use glam::Vec4;
 
-use super::evaluate::{COARSE, Evaluate, is_coarse};
+use super::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 use super::lanes::{Lanes, Number};
-use super::sine_cosine::short_sine_and_fall;
+use super::sine_cosine::{ShortHalves, short_halves, short_sine_and_fall};
 use crate::segment::ArcSegment;
 
 impl Evaluate for ArcSegment {
@@ -23,23 +23,37 @@ impl Evaluate for ArcSegment {
         L::load(distances)
     }
 
-    type Arguments<L: Lanes> = L;
+    const FAR_FROM: Option<usize> = Some(5);
+
+    type Begun<L: Lanes> = Begun<L>;
 
     #[inline(always)]
-    fn arguments<L: Lanes>(parameters: L) -> L {
-        parameters
+    fn begin<L: Lanes, const FAR: bool>(
+        square: L,
+        parameters: &mut impl Parameters<L>,
+    ) -> Begun<L> {
+        let mut begun = Begun::first(square, parameters);
+        if FAR {
+            // What lies before the first sample means nothing.
+            begun = begun.next(square, parameters).next(square, parameters);
+        }
+        begun
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         square: L,
-        parameter: L,
+        begun: Begun<L>,
+        parameters: &mut impl Parameters<L>,
         rotations: &mut [[f32; 4]],
-    ) {
+    ) -> Begun<L> {
         let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
-        let z = parameter * parameter * square;
-        let (sine, fall) = short_sine_and_fall(parameter, z);
+        let (sine, fall) = if FAR {
+            begun.turn
+        } else {
+            short_halves(begun.parameter, begun.z).sine_and_fall()
+        };
         let (s, f) = (sine.fourfold(), fall.fourfold());
         // Written out: closures are not always inlined.
         let mut quarters = [
@@ -58,6 +72,7 @@ impl Evaluate for ArcSegment {
             ];
         }
         rotations.copy_from_slice(L::joined(quarters).as_ref());
+        begun.next(square, parameters)
     }
 
     #[inline(always)]
@@ -80,6 +95,46 @@ impl ArcSegment {
     fn is_coarse_or_zero(&self) -> bool {
         let is_zero = |c: usize| self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
         (0..4).all(|c| self.middle[c].abs() >= COARSE || is_zero(c))
+    }
+}
+
+/// What is known of the samples of later turns: a third of them a turn, or the last of these
+/// alone.
+#[derive(Clone, Copy)]
+pub(crate) struct Begun<L> {
+    turn: (L, L),
+    halves: ShortHalves<L>,
+    parameter: L,
+    z: L,
+}
+
+impl<L: Lanes> Begun<L> {
+    #[inline(always)]
+    fn first(square: L, parameters: &mut impl Parameters<L>) -> Self {
+        let parameter = parameters.next();
+        let z = parameter * parameter * square;
+        let halves = short_halves(parameter, z);
+        let turn = halves.sine_and_fall();
+        Self {
+            turn,
+            halves,
+            parameter,
+            z,
+        }
+    }
+
+    #[inline(always)]
+    fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
+        let turn = self.halves.sine_and_fall();
+        let halves = short_halves(self.parameter, self.z);
+        let parameter = parameters.next();
+        let z = parameter * parameter * square;
+        Self {
+            turn,
+            halves,
+            parameter,
+            z,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use glam::Vec4;
 
-use super::evaluate::{COARSE, Evaluate, is_coarse};
+use super::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 use super::lanes::{Lanes, Number};
 use crate::segment::PolynomialSegment;
 
@@ -20,32 +20,35 @@ impl Evaluate for PolynomialSegment {
         L::fourfold_of(distances)
     }
 
-    type Arguments<L: Lanes> = [L; 3];
+    type Begun<L: Lanes> = [L; 3];
 
     /// `s`, `s²` and `s⁴`.
     #[inline(always)]
-    fn arguments<L: Lanes>(s: L) -> [L; 3] {
-        powers(s)
+    fn begin<L: Lanes, const FAR: bool>(_: L, parameters: &mut impl Parameters<L>) -> [L; 3] {
+        powers(parameters.next())
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         _: L,
-        powers: [L; 3],
+        own: [L; 3],
+        parameters: &mut impl Parameters<L>,
         rotations: &mut [[f32; 4]],
-    ) {
+    ) -> [L; 3] {
+        let next = powers(parameters.next());
         // Written out: closures are not always inlined.
         macro_rules! coefficients {
             ($($power:literal)+) => {
                 [$(L::repeated(self.coefficients[$power])),+]
             };
         }
-        let mut q = by_powers(coefficients!(0 1 2 3 4 5 6 7 8 9 10), powers);
+        let mut q = by_powers(coefficients!(0 1 2 3 4 5 6 7 8 9 10), own);
         if FILTER {
             q = q.canonical();
         }
         q.store_side_by_side(rotations);
+        next
     }
 
     #[inline(always)]

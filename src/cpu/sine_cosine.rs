@@ -28,14 +28,40 @@ pub(crate) fn sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
 /// The same for |a| <= pi/4.
 #[inline(always)]
 pub(crate) fn short_sine_and_fall<N: Number>(x: N, z: N) -> (N, N) {
+    short_halves(x, z).sine_and_fall()
+}
+
+/// Half of the way to [`short_sine_and_fall`].
+#[derive(Clone, Copy)]
+pub(super) struct ShortHalves<N> {
+    x: N,
+    z: N,
+    zx: N,
+    sine_tail: N,
+    cosine_tail: N,
+}
+
+#[inline(always)]
+pub(super) fn short_halves<N: Number>(x: N, z: N) -> ShortHalves<N> {
     let zz = z * z;
     let sine_low = N::all(SHORT_SINE_5) * z + N::all(SHORT_SINE_3);
-    let sine_tail = N::all(SHORT_SINE_7) * zz + sine_low;
-    let sine = sine_tail * (z * x) + x;
     let cosine_low = N::all(SHORT_COSINE_4) * z + N::all(SHORT_COSINE_2);
     let cosine_high = N::all(SHORT_COSINE_8) * z + N::all(SHORT_COSINE_6);
-    let fall = (cosine_high * zz + cosine_low) * z;
-    (sine, fall)
+    ShortHalves {
+        x,
+        z,
+        zx: z * x,
+        sine_tail: N::all(SHORT_SINE_7) * zz + sine_low,
+        cosine_tail: cosine_high * zz + cosine_low,
+    }
+}
+
+impl<N: Number> ShortHalves<N> {
+    #[inline(always)]
+    pub(super) fn sine_and_fall(self) -> (N, N) {
+        let sine = self.sine_tail * self.zx + self.x;
+        (sine, self.cosine_tail * self.z)
+    }
 }
 
 #[cfg(test)]
