@@ -22,11 +22,14 @@ pub(crate) struct ArcSegment {
     pub(crate) tangent: [f32; 4],
 }
 
+/// Powers of a segment, with the constant.
+pub(crate) const POWERS: usize = 11;
+
 /// `Segment` of `evaluate_polynomial.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct PolynomialSegment {
-    pub(crate) coefficients: [[f32; 4]; 11],
+    pub(crate) coefficients: [[f32; 4]; POWERS],
 }
 
 /// `Item` of `kernel.wgsl`.

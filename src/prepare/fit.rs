@@ -20,10 +20,7 @@ use super::sides::Sides;
 use crate::cpu::{Lanes, canonical};
 use crate::formula::{Numbers, Product};
 use crate::method::Quantity;
-use crate::segment::PolynomialSegment;
-
-/// Powers of a segment, with the constant.
-const POWERS: usize = 11;
+use crate::segment::{POWERS, PolynomialSegment};
 
 /// The most lanes that a vector has.
 pub(super) const MOST: usize = 16;

@@ -9,8 +9,8 @@ use super::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
 pub(super) const LONGEST_OF_FEW: f64 = 0.01;
 pub(super) const LONGEST_WHOLE: f64 = 0.16;
 
-/// A part of curves' parameter, from their start on or back from their end, and the nodes at which they are sampled
-/// there. What they do at its ends is known, and at its middle.
+/// A part of curves' parameter, from their start on or back from their end, and the nodes at
+/// which they are sampled there. What they do at its ends is known, and at its middle.
 pub(super) struct Part<const SAMPLED: usize, const PAIRS: usize> {
     pub(super) nodes: &'static Nodes<PAIRS>,
     pub(super) middle: Place,

@@ -10,12 +10,14 @@ use std::arch::x86_64::{
     _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
     _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
+use std::cell::Cell;
 
 use super::doubles::doubles;
 use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
 use crate::cpu::stage::Line;
 use crate::segment::shader::TINY_BITS;
+use crate::segment::{POWERS, PolynomialSegment};
 
 /// What only processors with AVX2 do.
 macro_rules! avx2 {
@@ -220,6 +222,21 @@ impl Lanes for Eight {
     #[inline(always)]
     fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+        let places: [usize; 8] = *places.first_chunk().expect("eight places");
+        let segments: &mut [[[f32; 4]; POWERS]] = bytemuck::cast_slice_mut(segments);
+        let segments = Cell::from_mut(segments).as_slice_of_cells();
+        // Each is looked up once, not for every power.
+        let own = places.map(|place| segments[place].as_array_of_cells());
+        for (power, &components) in powers.iter().enumerate() {
+            let rotations = Self::rotations(components);
+            for (segment, rotation) in own.iter().zip(rotations) {
+                segment[power].set(rotation);
+            }
+        }
     }
 
     #[inline(always)]
