@@ -288,6 +288,7 @@ pub(crate) mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
+    use crate::cpu::evaluate::tests::runs_are_samples;
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
@@ -382,5 +383,6 @@ pub(crate) mod tests {
     #[test]
     fn four_lanes_are_samples() {
         lanes_are_samples::<Vec4>();
+        runs_are_samples::<Vec4>();
     }
 }

@@ -290,6 +290,7 @@ mod tests {
     use super::*;
     use crate::cpu::VectorWidth;
     use crate::cpu::dispatch::doubles::tests::doubles_are_samples;
+    use crate::cpu::evaluate::tests::runs_are_samples;
     use crate::cpu::lanes::tests::lanes_are_samples;
 
     #[test]
@@ -297,6 +298,7 @@ mod tests {
         if VectorWidth::available().contains(&VectorWidth::Avx2) {
             lanes_are_samples::<Eight>();
             doubles_are_samples::<Eight>();
+            runs_are_samples::<Eight>();
         }
     }
 }

@@ -317,6 +317,7 @@ mod tests {
     use super::*;
     use crate::cpu::VectorWidth;
     use crate::cpu::dispatch::doubles::tests::doubles_are_samples;
+    use crate::cpu::evaluate::tests::runs_are_samples;
     use crate::cpu::lanes::tests::lanes_are_samples;
 
     #[test]
@@ -324,6 +325,7 @@ mod tests {
         if VectorWidth::available().contains(&VectorWidth::Avx512) {
             lanes_are_samples::<Sixteen>();
             doubles_are_samples::<Sixteen>();
+            runs_are_samples::<Sixteen>();
         }
     }
 }
