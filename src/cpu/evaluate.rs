@@ -24,6 +24,11 @@ pub(crate) trait Evaluate {
     /// Their distances, as [`Evaluate::evaluate`] takes their parameters.
     fn load<L: Lanes>(distances: &[f32]) -> L;
 
+    /// The fewest turns in which it pays to begin samples several turns before their own.
+    /// Their operations are long chains, and a processor looks ahead no farther than a turn or
+    /// two.
+    const FAR_FROM: Option<usize> = None;
+
     /// What is known of samples before it is their turn.
     type Begun<L: Lanes>: Copy;
 
@@ -42,10 +47,6 @@ pub(crate) trait Evaluate {
         parameters: &mut impl Parameters<L>,
         rotations: &mut [[f32; 4]],
     ) -> Self::Begun<L>;
-
-    /// In how many turns it pays to begin samples several turns before their own. Their
-    /// operations are long chains, and a processor looks ahead no farther than a turn or two.
-    const FAR_FROM: Option<usize> = None;
 
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;

@@ -32,7 +32,14 @@ impl Evaluate for ArcSegment {
         square: L,
         parameters: &mut impl Parameters<L>,
     ) -> Begun<L> {
-        let mut begun = Begun::first(square, parameters);
+        let (parameter, z) = parameter_and_square(square, parameters);
+        let halves = short_halves(parameter, z);
+        let mut begun = Begun {
+            turn: halves.sine_and_fall(),
+            halves,
+            parameter,
+            z,
+        };
         if FAR {
             // What lies before the first sample means nothing.
             begun = begun.next(square, parameters).next(square, parameters);
@@ -98,44 +105,37 @@ impl ArcSegment {
     }
 }
 
-/// What is known of the samples of later turns: a third of them a turn, or the last of these
-/// alone.
+/// The samples of the next three turns, each as far as they have come; or, where none are begun
+/// far before their own, the parameters of the next turn's.
 #[derive(Clone, Copy)]
 pub(crate) struct Begun<L> {
+    /// Sine and fall of those of the next turn.
     turn: (L, L),
+    /// Of those behind them.
     halves: ShortHalves<L>,
+    /// Of those behind these, and the angle's square.
     parameter: L,
     z: L,
 }
 
 impl<L: Lanes> Begun<L> {
-    #[inline(always)]
-    fn first(square: L, parameters: &mut impl Parameters<L>) -> Self {
-        let parameter = parameters.next();
-        let z = parameter * parameter * square;
-        let halves = short_halves(parameter, z);
-        let turn = halves.sine_and_fall();
-        Self {
-            turn,
-            halves,
-            parameter,
-            z,
-        }
-    }
-
+    /// A turn later.
     #[inline(always)]
     fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
-        let turn = self.halves.sine_and_fall();
-        let halves = short_halves(self.parameter, self.z);
-        let parameter = parameters.next();
-        let z = parameter * parameter * square;
+        let (parameter, z) = parameter_and_square(square, parameters);
         Self {
-            turn,
-            halves,
+            turn: self.halves.sine_and_fall(),
+            halves: short_halves(self.parameter, self.z),
             parameter,
             z,
         }
     }
+}
+
+#[inline(always)]
+fn parameter_and_square<L: Lanes>(square: L, parameters: &mut impl Parameters<L>) -> (L, L) {
+    let parameter = parameters.next();
+    (parameter, parameter * parameter * square)
 }
 
 /// The rotation at a parameter of an arc.

@@ -41,6 +41,7 @@ pub(super) struct ShortHalves<N> {
     cosine_tail: N,
 }
 
+/// Of the same `x` and `z`.
 #[inline(always)]
 pub(super) fn short_halves<N: Number>(x: N, z: N) -> ShortHalves<N> {
     let zz = z * z;
