@@ -189,10 +189,11 @@ impl Kernels {
     }
 
     /// Whether long results are better written past the caches. A core of Intel's waits for
-    /// each line that it overwrites; AMD's (Zen 3, Zen 5) write about as fast either way.
+    /// each line that it overwrites, one of AMD's Zen 5 often; Zen 3 writes as fast either way.
     pub(crate) fn gain_past_caches(&self) -> bool {
-        static IS_INTEL: OnceLock<bool> = OnceLock::new();
-        self.width > VectorWidth::Baseline && *IS_INTEL.get_or_init(is_intel)
+        static FROM: OnceLock<Option<VectorWidth>> = OnceLock::new();
+        let from = FROM.get_or_init(gains_past_caches_from);
+        from.is_some_and(|from| self.width >= from)
     }
 
     /// Does work over lanes with vectors of this width.
@@ -228,16 +229,26 @@ fn lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     unsafe { run(work) }
 }
 
+/// The narrowest vectors for which [`Kernels::gain_past_caches`] holds on this processor.
 #[cfg(target_arch = "x86_64")]
-fn is_intel() -> bool {
-    let vendor = std::arch::x86_64::__cpuid(0);
+fn gains_past_caches_from() -> Option<VectorWidth> {
+    use std::arch::x86_64::__cpuid;
+    const ZEN_5: u32 = 26;
+    let vendor = __cpuid(0);
     let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
-    name.as_flattened() == b"GenuineIntel"
+    // Above 15, it is told in two parts.
+    let signature = __cpuid(1).eax;
+    let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
+    match name.as_flattened() {
+        b"GenuineIntel" => Some(VectorWidth::Avx2),
+        b"AuthenticAMD" if family >= ZEN_5 => Some(VectorWidth::Avx512),
+        _ => None,
+    }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn is_intel() -> bool {
-    false
+fn gains_past_caches_from() -> Option<VectorWidth> {
+    None
 }
 
 /// Has memory brought into the cache, while what comes next is done.

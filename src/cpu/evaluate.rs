@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 
 use glam::Vec4;
 
+use super::destination::{Destination, Places, Turns};
 use super::lanes::{Lanes, Number as _};
 use crate::segment::shader::TINY_BITS;
 
@@ -32,21 +33,23 @@ pub(crate) trait Evaluate {
     /// What is known of samples before it is their turn.
     type Begun<L: Lanes>: Copy;
 
+    /// The rotations of a turn's samples, side by side: in so many vectors.
+    type Vectors<L: Lanes>: AsRef<[L]>;
+
     /// Begins with the first samples; and, where that is `FAR`, with those of later turns.
     fn begin<L: Lanes, const FAR: bool>(
         constant: L,
         parameters: &mut impl Parameters<L>,
     ) -> Self::Begun<L>;
 
-    /// The rotations of the samples that are next, and what is known of those behind them.
+    /// What is known of the samples behind those that are next, and the rotations of these.
     /// Where there may be tiny components, `FILTER` makes them [`canonical`].
     fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         constant: L,
         begun: Self::Begun<L>,
         parameters: &mut impl Parameters<L>,
-        rotations: &mut [[f32; 4]],
-    ) -> Self::Begun<L>;
+    ) -> (Self::Begun<L>, Self::Vectors<L>);
 
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
@@ -118,16 +121,33 @@ fn frames_alike<L: Lanes, S: Evaluate>(
         }
         return;
     }
-    let next = L::all(first) + S::load(&STEPS);
-    let step = L::all(S::samples::<L>() as f32);
-    let distances = Frames { next, step };
-    run(segment, affine, count, distances, output);
+    let distances = Frames::new::<S>(first);
+    run::<L, S>(segment, affine, count, distances, output);
 }
 
 /// The distances of a vector's samples from its first.
 const STEPS: [f32; 16] = [
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
 ];
+
+/// As [`frames`], to whole lines past the caches.
+#[inline(always)]
+pub(super) fn frames_past_caches<L: Lanes, S: Evaluate>(
+    segment: &S,
+    affine: Affine,
+    first: f32,
+    count: usize,
+    places: Places<'_>,
+) {
+    // From where the line begins.
+    let (first, count) = (first - places.begun.1 as f32, places.begun.1 + count);
+    let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
+    if all > narrow && count <= narrow {
+        run::<L::Narrow, S>(segment, affine, count, Frames::new::<S>(first), places);
+    } else {
+        run::<L, S>(segment, affine, count, Frames::new::<S>(first), places);
+    }
+}
 
 /// Evaluates the first `count` samples of those whose distances from the middle are given;
 /// behind `count` there are more, up to the end of a vector.
@@ -185,6 +205,16 @@ struct Frames<L> {
     step: L,
 }
 
+impl<L: Lanes> Frames<L> {
+    #[inline(always)]
+    fn new<S: Evaluate>(first: f32) -> Self {
+        Self {
+            next: L::all(first) + S::load(&STEPS),
+            step: L::all(S::samples::<L>() as f32),
+        }
+    }
+}
+
 impl<L: Lanes> Distances<L> for Frames<L> {
     #[inline(always)]
     fn next(&mut self) -> L {
@@ -214,7 +244,7 @@ fn run<L: Lanes, S: Evaluate>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: &mut [[f32; 4]],
+    output: impl Destination,
 ) {
     let turns = count.div_ceil(S::samples::<L>());
     let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
@@ -227,39 +257,30 @@ fn run<L: Lanes, S: Evaluate>(
     }
 }
 
-/// A vector at a time.
+/// A turn at a time.
 #[inline(always)]
 fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: &mut [[f32; 4]],
+    output: impl Destination,
 ) {
-    let constant = L::all(segment.constant());
     let mut parameters = OfDistances {
         distances,
         scale: L::all(affine.scale),
         offset: L::all(affine.offset),
     };
-    let samples = S::samples::<L>();
-    let whole = count.next_multiple_of(samples).min(output.len());
-    let mut vectors = output[..whole].chunks_exact_mut(samples);
-    let mut begun = S::begin::<L, FAR>(constant, &mut parameters);
-    for rotations in &mut vectors {
-        begun = segment.evaluate::<L, FILTER, FAR>(constant, begun, &mut parameters, rotations);
-    }
-    let rest = vectors.into_remainder();
-    if !rest.is_empty() {
-        let mut rotations = Rotations([[0.0; 4]; STEPS.len()]);
-        let own = &mut rotations.0[..samples];
-        segment.evaluate::<L, FILTER, FAR>(constant, begun, &mut parameters, own);
-        rest.copy_from_slice(&rotations.0[..rest.len()]);
-    }
+    let constant = L::all(segment.constant());
+    let begun = S::begin::<L, FAR>(constant, &mut parameters);
+    let turns = Turns::<_, _, _, FILTER, FAR> {
+        segment,
+        constant,
+        begun,
+        parameters,
+    };
+    output.take(count, turns);
 }
-
-#[repr(align(64))]
-struct Rotations([[f32; 4]; STEPS.len()]);
 
 /// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.
 #[inline(always)]
@@ -270,9 +291,11 @@ pub(super) fn canonical(q: f32) -> f32 {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use bytemuck::Zeroable as _;
     use fastrand::Rng;
 
     use super::*;
+    use crate::cpu::stage::Line;
     use crate::segment::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.
@@ -351,6 +374,31 @@ pub(crate) mod tests {
         }
     }
 
+    /// Frames past the caches, behind so many rotations of their first line.
+    fn in_lines<L: Lanes, S: Evaluate>(
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        count: usize,
+        filled: usize,
+    ) -> Vec<[f32; 4]> {
+        let there: Vec<[f32; 4]> = (0..4).map(|k| [9.0 + k as f32; 4]).collect();
+        let begun: [Line; 1] = bytemuck::cast([there[0], there[1], there[2], there[3]]);
+        let whole = (filled + count) / 4;
+        let mut lines = vec![Line::zeroed(); whole + 2];
+        let (own, behind) = lines.split_at_mut(whole);
+        let places = Places {
+            begun: (begun[0], filled),
+            whole: own,
+            rest: &mut behind[0],
+        };
+        frames_past_caches::<L, S>(segment, affine, first, count, places);
+        assert_eq!(bytemuck::bytes_of(&behind[1]), [0; size_of::<Line>()]);
+        let found: &[[f32; 4]] = bytemuck::cast_slice(&lines);
+        assert_eq!(found[..filled], there[..filled]);
+        found[filled..filled + count].to_vec()
+    }
+
     fn samples_of_a_run<L: Lanes, S: Evaluate>(segment: &S, count: usize) {
         let affine = Affine {
             scale: 0.9 / count as f32,
@@ -361,6 +409,11 @@ pub(crate) mod tests {
         let expected: Vec<_> = (all[..count].iter())
             .map(|&distance| one(segment, affine, distance).map(f32::to_bits))
             .collect();
+        for filled in 0..4 {
+            let found = in_lines::<L, S>(segment, affine, first, count, filled);
+            let found: Vec<_> = found.iter().map(|q| q.map(f32::to_bits)).collect();
+            assert_eq!(found, expected, "{count} frames behind {filled}");
+        }
         for room in [0, STEPS.len()] {
             let mut output = vec![[f32::NAN; 4]; count + room];
             frames::<L, S>(segment, affine, first, count, &mut output);

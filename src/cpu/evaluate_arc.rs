@@ -26,6 +26,7 @@ impl Evaluate for ArcSegment {
     const FAR_FROM: Option<usize> = Some(5);
 
     type Begun<L: Lanes> = Begun<L>;
+    type Vectors<L: Lanes> = [L; 4];
 
     #[inline(always)]
     fn begin<L: Lanes, const FAR: bool>(
@@ -53,8 +54,7 @@ impl Evaluate for ArcSegment {
         square: L,
         begun: Begun<L>,
         parameters: &mut impl Parameters<L>,
-        rotations: &mut [[f32; 4]],
-    ) -> Begun<L> {
+    ) -> (Begun<L>, [L; 4]) {
         let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
         let (sine, fall) = if FAR {
             begun.turn
@@ -78,8 +78,7 @@ impl Evaluate for ArcSegment {
                 quarters[3].canonical(),
             ];
         }
-        rotations.copy_from_slice(L::joined(quarters).as_ref());
-        begun.next(square, parameters)
+        (begun.next(square, parameters), quarters)
     }
 
     #[inline(always)]

@@ -21,6 +21,7 @@ impl Evaluate for PolynomialSegment {
     }
 
     type Begun<L: Lanes> = [L; 3];
+    type Vectors<L: Lanes> = [L; 1];
 
     /// `s`, `s²` and `s⁴`.
     #[inline(always)]
@@ -34,8 +35,7 @@ impl Evaluate for PolynomialSegment {
         _: L,
         own: [L; 3],
         parameters: &mut impl Parameters<L>,
-        rotations: &mut [[f32; 4]],
-    ) -> [L; 3] {
+    ) -> ([L; 3], [L; 1]) {
         let next = powers(parameters.next());
         // Written out: closures are not always inlined.
         macro_rules! coefficients {
@@ -47,8 +47,7 @@ impl Evaluate for PolynomialSegment {
         if FILTER {
             q = q.canonical();
         }
-        q.store_side_by_side(rotations);
-        next
+        (next, [q])
     }
 
     #[inline(always)]

@@ -2,10 +2,10 @@
 
 use std::ops::Neg;
 
+use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
 use super::dispatch::Four;
-use super::stage::Line;
 use crate::branchless::{Arithmetic, Real};
 use crate::segment::PolynomialSegment;
 use crate::segment::shader::TINY_BITS;
@@ -50,6 +50,9 @@ pub(crate) trait Lanes: Number {
 
     /// As many in f64.
     type Doubles: Doubles;
+
+    /// A vector in memory, at a multiple of its size.
+    type Block: Pod;
 
     /// Rounded to f32.
     fn rounded(numbers: Self::Doubles) -> Self;
@@ -116,12 +119,14 @@ pub(crate) trait Lanes: Number {
         }
     }
 
-    /// Stores a line past the caches, where that is faster; seen by other threads behind a
+    fn of_block(block: &Self::Block) -> Self;
+
+    /// With the first `count` of the rotations that lie side by side from a block.
+    fn behind(self, block: &Self::Block, count: usize) -> Self;
+
+    /// Stores past the caches, where there is such a thing; seen by other threads behind a
     /// [`fence`](super::dispatch::fence).
-    #[inline(always)]
-    fn store_past_caches(line: &Line, to: &mut Line) {
-        *to = *line;
-    }
+    fn store_past_caches(self, block: &mut Self::Block);
 
     /// -1 where a number is less than 0, else 1.
     fn sign(self) -> Self;
@@ -168,6 +173,7 @@ impl Lanes for Vec4 {
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];
     type Doubles = Four;
+    type Block = [f32; 4];
 
     #[inline(always)]
     fn rounded(numbers: Four) -> Self {
@@ -239,6 +245,25 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(&[self.to_array()]);
+    }
+
+    #[inline(always)]
+    fn of_block(block: &[f32; 4]) -> Self {
+        Self::from_array(*block)
+    }
+
+    #[inline(always)]
+    fn behind(self, block: &[f32; 4], count: usize) -> Self {
+        if count > 0 {
+            Self::of_block(block)
+        } else {
+            self
+        }
+    }
+
+    #[inline(always)]
+    fn store_past_caches(self, block: &mut [f32; 4]) {
+        *block = self.to_array();
     }
 
     #[inline(always)]

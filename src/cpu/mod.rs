@@ -5,6 +5,7 @@ mod arc;
 mod arc_tangent;
 pub(crate) mod canary;
 mod cubic_lanes;
+mod destination;
 mod dispatch;
 mod engine;
 mod evaluate;

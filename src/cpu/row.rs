@@ -99,13 +99,12 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         for j in block.occupied {
             let (source, key) = (sources[j], keys[j]);
             let (first, last) = (block.first[j], block.first[j + 1]);
-            let made = first - samples.start..last - samples.start;
-            let mut to = &mut output.samples()[made.start..];
-            let (mut count, mut distance) = (last - first, block.distance[j]);
+            let mut made = first - samples.start..last - samples.start;
+            let mut distance = block.distance[j];
             if key != NONE && block.is_held[j] == 1 {
-                to[0] = prepared.constants[key as usize];
-                to = &mut to[1..];
-                count -= 1;
+                output.samples()[made.start] = prepared.constants[key as usize];
+                output.made::<L>(made.start..made.start + 1);
+                made.start += 1;
                 distance += 1.0;
             }
             match source {
@@ -115,19 +114,21 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
                         offset: block.offset[j],
                     };
                     let segment = &segments[index as usize];
-                    frames::<L, S>(segment, affine, distance, count, to);
+                    output.frames::<L, S>(segment, affine, distance, made);
                 }
                 Source::Constant(index) => {
-                    to[..count].fill(prepared.constants[index as usize]);
+                    output.samples()[made.clone()].fill(prepared.constants[index as usize]);
+                    output.made::<L>(made);
                 }
                 Source::Exact(index) => {
                     let (parameter, track) = (block.parameter(j), part.track as usize);
-                    for (sample, rotation) in (last - count..last).zip(to) {
+                    let to = &mut output.samples()[made.clone()];
+                    for (sample, rotation) in (samples.start + made.start..).zip(to) {
                         *rotation = prepared.exact(index, parameter, timeline, track, sample);
                     }
+                    output.made::<L>(made);
                 }
             }
-            output.made::<L>(made);
         }
     }
     true

@@ -1,12 +1,14 @@
-//! Long results go to memory past the caches, where a processor gains by it: rows are made on
-//! a stage, memory that stays in the first cache, and each cache line is stored as soon as all
-//! of it is made. What computes goes on meanwhile.
+//! Long results go to memory past the caches, where a processor gains by it: whole cache lines
+//! as they are made. What is not whole yet, and what is not made in order, lies on a stage,
+//! memory that stays in the first cache.
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::destination::Places;
 use super::dispatch::{InLanes, Kernels, fence};
+use super::evaluate::{Affine, Evaluate, FEW, frames, frames_past_caches};
 use super::lanes::Lanes;
 
 /// Bytes of a result of which caches keep so little that its reader misses nothing.
@@ -114,10 +116,10 @@ impl<'o> Stage<'o> {
                 return make(0..count, &mut Output::Here(row));
             };
             let piece = (count - first).min(EACH * LINES - self.filled);
-            let stage: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut lines[..]);
             let mut output = Output::Staged(Staged {
-                stage: &mut stage[..self.filled + piece],
+                lines: &mut lines[..],
                 start: self.filled,
+                end: self.filled + piece,
                 made: self.filled,
                 place: &mut self.place,
             });
@@ -163,7 +165,7 @@ impl Drop for Stage<'_> {
     }
 }
 
-impl Place<'_> {
+impl<'o> Place<'o> {
     /// Stores the first lines of the stage, but for those that are stored.
     #[inline(always)]
     fn store<L: Lanes>(&mut self, lines: &[Line]) {
@@ -176,13 +178,20 @@ impl Place<'_> {
         }
         if lines.len() > self.stored {
             let lines = &lines[self.stored..];
-            let (places, others) = std::mem::take(&mut self.lines).split_at_mut(lines.len());
-            for (place, line) in places.iter_mut().zip(lines) {
-                L::store_past_caches(line, place);
+            let places = bytemuck::cast_slice_mut(self.next(lines.len()));
+            for (block, place) in bytemuck::cast_slice(lines).iter().zip(places) {
+                L::of_block(block).store_past_caches(place);
             }
-            self.lines = others;
-            self.stored += lines.len();
         }
+    }
+
+    /// The places of the next lines, which are stored there.
+    #[inline(always)]
+    fn next(&mut self, count: usize) -> &'o mut [Line] {
+        let (lines, others) = std::mem::take(&mut self.lines).split_at_mut(count);
+        self.lines = others;
+        self.stored += count;
+        lines
     }
 }
 
@@ -207,10 +216,11 @@ pub(super) enum Output<'s, 'o> {
 
 /// Samples on a stage.
 pub(super) struct Staged<'s, 'o> {
-    /// All that lies on it.
-    stage: &'s mut [[f32; 4]],
-    /// The first of the samples.
+    /// All of it.
+    lines: &'s mut [Line],
+    /// The first of the samples, and their end.
     start: usize,
+    end: usize,
     /// What of the stage is made, without a gap.
     made: usize,
     place: &'s mut Place<'o>,
@@ -229,6 +239,15 @@ impl Output<'_, '_> {
 pub(super) trait Samples {
     fn samples(&mut self) -> &mut [[f32; 4]];
 
+    /// Makes some samples, frames of a segment, the first at that distance from its middle.
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        samples: Range<usize>,
+    );
+
     /// Some of them are made, and do not change any more.
     fn made<L: Lanes>(&mut self, samples: Range<usize>);
 }
@@ -240,21 +259,62 @@ impl Samples for [[f32; 4]] {
     }
 
     #[inline(always)]
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        samples: Range<usize>,
+    ) {
+        let to = &mut self[samples.start..];
+        frames::<L, S>(segment, affine, first, samples.len(), to);
+    }
+
+    #[inline(always)]
     fn made<L: Lanes>(&mut self, _: Range<usize>) {}
 }
 
 impl Samples for Staged<'_, '_> {
     #[inline(always)]
     fn samples(&mut self) -> &mut [[f32; 4]] {
-        &mut self.stage[self.start..]
+        let stage: &mut [[f32; 4]] = bytemuck::cast_slice_mut(self.lines);
+        &mut stage[self.start..self.end]
+    }
+
+    #[inline(always)]
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        samples: Range<usize>,
+    ) {
+        let (start, count) = (self.start + samples.start, samples.len());
+        let (line, filled) = (start / EACH, start % EACH);
+        let end = start + count;
+        // All before them is made, and its whole lines are stored.
+        let is_next = self.made == start && self.place.stored == line;
+        if count <= FEW || !is_next || !self.place.before.is_empty() || end / EACH == LINES {
+            let to = &mut self.samples()[samples.start..];
+            frames::<L, S>(segment, affine, first, count, to);
+            self.made::<L>(samples);
+            return;
+        }
+        let places = Places {
+            begun: (self.lines[line], filled),
+            whole: self.place.next(end / EACH - line),
+            rest: &mut self.lines[end / EACH],
+        };
+        frames_past_caches::<L, S>(segment, affine, first, count, places);
+        self.made = end;
     }
 
     #[inline(always)]
     fn made<L: Lanes>(&mut self, samples: Range<usize>) {
         if self.start + samples.start <= self.made {
             self.made = self.made.max(self.start + samples.end);
-            let whole = self.made / EACH * EACH;
-            (self.place).store::<L>(bytemuck::cast_slice(&self.stage[..whole]));
+            let whole = self.made / EACH;
+            self.place.store::<L>(&self.lines[..whole]);
         }
     }
 }
@@ -270,7 +330,9 @@ pub(super) mod tests {
     use super::*;
     use crate::cpu::VectorWidth;
     use crate::generate::{Generate, Steps};
-    use crate::{Device, Engine, Frames, Interpolation, Layout, Outside, method};
+    use crate::{
+        Device, Engine, EngineOptions, Frames, Interpolation, Layout, Outside, method,
+    };
 
     thread_local! {
         /// Whether this thread makes all rows on a stage.
@@ -320,43 +382,61 @@ pub(super) mod tests {
         proptest!(|((rows, shift, width) in strategy)| run(rows, shift, width));
     }
 
-    /// Frames, times in any order, and copies of a track, by arcs and by polynomials.
+    /// Frames, times in any order, and copies of a track, by arcs and by polynomials, with
+    /// vectors of every width; from a clip and from keys.
     #[test]
     fn rows_on_a_stage_have_the_bits_of_others() {
-        let set = Generate {
-            steps: Steps::Random,
-            ..Generate::default()
-        };
-        let set = set.track_set().unwrap();
-        let engine = Engine::new(Device::Cpu).unwrap();
-        let times = (0..2500).map(|k| f64::from(k * 617 % 2500) * 0.01 - 2.0);
-        let frames = [
-            Frames::fps(60),
-            Frames::fps(120).between(-3.0, 25.0),
-            Frames::at(times.collect()),
-        ];
-        for (method, after) in [
-            (method::SLERP, Outside::Hold),
-            (method::BESSEL_OVERHAUSER, Outside::Loop),
-        ] {
-            let interpolation = Interpolation {
-                after,
-                ..method.into()
+        for (width, steps) in VectorWidth::available()
+            .into_iter()
+            .flat_map(|width| [(width, Steps::Random), (width, Steps::Uniform)])
+        {
+            let set = Generate {
+                steps,
+                ..Generate::default()
             };
-            let clip = engine.upload(&set, interpolation).unwrap();
-            for frames in &frames {
-                let expected = clip.evaluate(frames).unwrap();
-                let each = expected.as_quats().len() / 4;
-                // So few are evaluated on this thread.
-                assert!(4 * each <= 16 * 1024);
-                IS_STAGED.set(true);
-                let mut found = vec![Quat::IDENTITY; 4 * each + 1];
-                let layout = Layout::TrackMajor;
-                let done = clip.evaluate_into(frames, layout, &mut found[1..]);
-                IS_STAGED.set(false);
-                done.unwrap();
-                let bits = |rotations| bytemuck::cast_slice::<Quat, u32>(rotations);
-                assert_eq!(bits(expected.as_quats()), bits(&found[1..]));
+            let set = set.track_set().unwrap();
+            let options = EngineOptions {
+                vector_width: Some(width),
+                ..EngineOptions::default()
+            };
+            let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+            for (method, after) in [
+                (method::SLERP, Outside::Hold),
+                (method::BESSEL_OVERHAUSER, Outside::Hold),
+                (method::BESSEL_OVERHAUSER, Outside::Loop),
+            ] {
+                let interpolation = Interpolation {
+                    after,
+                    ..method.into()
+                };
+                let clip = engine.upload(&set, interpolation).unwrap();
+                let times = (0..2500).map(|k| f64::from(k * 617 % 2500) * 0.01 - 2.0);
+                for frames in [
+                    Frames::fps(60),
+                    Frames::fps(24).between(3.01, 17.0),
+                    Frames::fps(120).between(-3.0, 25.0),
+                    Frames::at(times.collect()),
+                ] {
+                    let expected = clip.evaluate(&frames).unwrap();
+                    let expected = bytemuck::cast_slice::<Quat, u32>(expected.as_quats());
+                    let count = expected.len() / 4;
+                    // So few are evaluated on this thread.
+                    assert!(count <= 16 * 1024);
+                    for shift in 0..4 {
+                        let mut found = vec![Quat::IDENTITY; count + 3];
+                        let found = &mut found[shift..][..count];
+                        let layout = Layout::TrackMajor;
+                        IS_STAGED.set(true);
+                        let done = if shift % 2 == 0 {
+                            clip.evaluate_into(&frames, layout, found)
+                        } else {
+                            engine.evaluate_into(&set, interpolation, &frames, layout, found)
+                        };
+                        IS_STAGED.set(false);
+                        done.unwrap();
+                        assert_eq!(expected, bytemuck::cast_slice::<Quat, u32>(found));
+                    }
+                }
             }
         }
     }

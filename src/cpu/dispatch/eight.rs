@@ -12,10 +12,11 @@ use std::arch::x86_64::{
 };
 use std::cell::Cell;
 
+use bytemuck::{Pod, Zeroable};
+
 use super::doubles::doubles;
 use super::operators::operators;
 use crate::cpu::lanes::{Lanes, Number};
-use crate::cpu::stage::Line;
 use crate::segment::shader::TINY_BITS;
 use crate::segment::{POWERS, PolynomialSegment};
 
@@ -32,6 +33,11 @@ macro_rules! avx2 {
 /// when each half has been transposed, and the halves need not be exchanged.
 #[derive(Clone, Copy)]
 pub(super) struct Eight(__m256);
+
+/// Two rotations, half of a cache line.
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(C, align(32))]
+pub(crate) struct HalfLine([[f32; 4]; 2]);
 
 operators!(Eight: avx2, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_xor_ps);
 
@@ -96,6 +102,7 @@ impl Lanes for Eight {
     type Narrow = Self;
     type Rotations = [[f32; 4]; 8];
     type Doubles = EightDoubles;
+    type Block = HalfLine;
 
     #[inline(always)]
     fn rounded(EightDoubles([a, b]): EightDoubles) -> Self {
@@ -240,14 +247,24 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn store_past_caches(line: &Line, to: &mut Line) {
-        let [low, high]: [__m256; 2] = bytemuck::cast(*line);
-        let [to_low, to_high]: &mut [__m256; 2] = bytemuck::cast_mut(to);
-        // The place is aligned as a line is.
-        avx2! {
-            _mm256_stream_ps(std::ptr::from_mut(to_low).cast(), low);
-            _mm256_stream_ps(std::ptr::from_mut(to_high).cast(), high);
-        }
+    fn of_block(half: &HalfLine) -> Self {
+        Self(bytemuck::cast(*half))
+    }
+
+    #[inline(always)]
+    fn behind(self, half: &HalfLine, count: usize) -> Self {
+        let places = Self(bytemuck::cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
+        let (half, end) = (Self::of_block(half), Self::all((4 * count) as f32));
+        Self(avx2! {
+            let is_first = _mm256_cmp_ps::<_CMP_LT_OQ>(places.0, end.0);
+            _mm256_blendv_ps(self.0, half.0, is_first)
+        })
+    }
+
+    #[inline(always)]
+    fn store_past_caches(self, half: &mut HalfLine) {
+        // The place is aligned as half of a line is.
+        avx2!(_mm256_stream_ps(std::ptr::from_mut(half).cast(), self.0));
     }
 
     #[inline(always)]

@@ -126,6 +126,7 @@ impl Lanes for Sixteen {
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
     type Doubles = SixteenDoubles;
+    type Block = Line;
 
     #[inline(always)]
     fn rounded(SixteenDoubles([a, b]): SixteenDoubles) -> Self {
@@ -273,12 +274,21 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn store_past_caches(line: &Line, to: &mut Line) {
+    fn of_block(line: &Line) -> Self {
+        Self(bytemuck::cast(*line))
+    }
+
+    #[inline(always)]
+    fn behind(self, line: &Line, count: usize) -> Self {
+        let first = (1u32 << (4 * count)) - 1;
+        let line = Self::of_block(line);
+        Self(avx512!(_mm512_mask_blend_ps(first as u16, self.0, line.0)))
+    }
+
+    #[inline(always)]
+    fn store_past_caches(self, line: &mut Line) {
         // The place is aligned as a line is.
-        avx512!(_mm512_stream_ps(
-            std::ptr::from_mut(to).cast(),
-            bytemuck::cast(*line)
-        ));
+        avx512!(_mm512_stream_ps(std::ptr::from_mut(line).cast(), self.0));
     }
 
     #[inline(always)]

@@ -1,0 +1,144 @@
+//! Where the samples of a run go: to their places, or in whole lines past the caches.
+
+use std::slice;
+
+use super::evaluate::{Evaluate, Parameters};
+use super::lanes::Lanes;
+use super::stage::Line;
+
+/// Samples of a turn at most.
+const MOST: usize = 16;
+
+/// The samples of a run, a turn at a time.
+pub(super) struct Turns<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const FAR: bool> {
+    pub(super) segment: &'a S,
+    pub(super) constant: L,
+    pub(super) begun: S::Begun<L>,
+    pub(super) parameters: P,
+}
+
+impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>
+    Turns<'_, L, S, P, FILTER, FAR>
+{
+    #[inline(always)]
+    fn next(&mut self) -> S::Vectors<L> {
+        let (own, parameters) = (self.begun, &mut self.parameters);
+        let (begun, vectors) =
+            (self.segment).evaluate::<L, FILTER, FAR>(self.constant, own, parameters);
+        self.begun = begun;
+        vectors
+    }
+}
+
+pub(super) trait Destination {
+    /// Takes the first `count` samples.
+    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
+        self,
+        count: usize,
+        turns: Turns<'_, L, S, P, FILTER, FAR>,
+    );
+}
+
+/// What lies behind `count` may be overwritten up to the end of a turn.
+impl Destination for &mut [[f32; 4]] {
+    #[inline(always)]
+    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
+        self,
+        count: usize,
+        mut turns: Turns<'_, L, S, P, FILTER, FAR>,
+    ) {
+        let samples = S::samples::<L>();
+        let whole = count.next_multiple_of(samples).min(self.len());
+        let mut all = self[..whole].chunks_exact_mut(samples);
+        for rotations in &mut all {
+            store(&turns.next(), rotations);
+        }
+        let rest = all.into_remainder();
+        if !rest.is_empty() {
+            let mut rotations = Rotations([[0.0; 4]; MOST]);
+            store(&turns.next(), &mut rotations.0[..samples]);
+            rest.copy_from_slice(&rotations.0[..rest.len()]);
+        }
+    }
+}
+
+#[repr(align(64))]
+struct Rotations([[f32; 4]; MOST]);
+
+#[inline(always)]
+fn store<L: Lanes>(vectors: &impl AsRef<[L]>, rotations: &mut [[f32; 4]]) {
+    let places = rotations.chunks_exact_mut(L::COUNT / 4);
+    for (vector, place) in vectors.as_ref().iter().zip(places) {
+        vector.store_side_by_side(place);
+    }
+}
+
+/// Whole lines that lie past the caches, and what is not whole yet. Samples begin where a line
+/// does.
+pub(super) struct Places<'a> {
+    /// The first line, whose first so many rotations are there already: they stay.
+    pub(super) begun: (Line, usize),
+    pub(super) whole: &'a mut [Line],
+    /// The line behind them.
+    pub(super) rest: &'a mut Line,
+}
+
+impl Destination for Places<'_> {
+    #[inline(always)]
+    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
+        self,
+        count: usize,
+        mut turns: Turns<'_, L, S, P, FILTER, FAR>,
+    ) {
+        let rotations = L::COUNT / 4;
+        let of_turn = S::samples::<L>() / rotations;
+        let (begun, there) = (blocks::<L>(&self.begun.0), self.begun.1);
+        let whole: &mut [L::Block] = bytemuck::cast_slice_mut(self.whole);
+        let rest = bytemuck::cast_slice_mut(slice::from_mut(self.rest));
+        // In vectors.
+        let (count, mut made) = (count.div_ceil(rotations), 0);
+        while made < begun.len() {
+            for (i, vector) in (made..).zip(turns.next().as_ref()) {
+                let vector = match begun.get(i) {
+                    Some(own) => {
+                        let there = there.saturating_sub(i * rotations).min(rotations);
+                        vector.behind(own, there)
+                    }
+                    None => *vector,
+                };
+                put(vector, i, whole, rest);
+            }
+            made += of_turn;
+        }
+        let first = made.min(whole.len());
+        let mut all = whole[first..].chunks_exact_mut(of_turn);
+        for places in &mut all {
+            for (vector, place) in turns.next().as_ref().iter().zip(places) {
+                vector.store_past_caches(place);
+            }
+            made += of_turn;
+        }
+        let whole = all.into_remainder();
+        let left = count.saturating_sub(made);
+        for first in (0..left).step_by(of_turn) {
+            for (i, vector) in (first..).zip(turns.next().as_ref()) {
+                put(*vector, i, whole, rest);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn blocks<L: Lanes>(line: &Line) -> &[L::Block] {
+    bytemuck::cast_slice(slice::from_ref(line))
+}
+
+/// The `i`th vector, in a whole line or behind them.
+#[inline(always)]
+fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Block]) {
+    if let Some(place) = whole.get_mut(i) {
+        vector.store_past_caches(place);
+    } else if let Some(place) = rest.get_mut(i - whole.len()) {
+        vector.store_side_by_side(bytemuck::cast_slice_mut(slice::from_mut(place)));
+    }
+}
