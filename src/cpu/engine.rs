@@ -176,7 +176,8 @@ impl CpuEngine {
         }
         match window.layout {
             Layout::TrackMajor => {
-                let mut stage = Stage::new(&self.kernels, rotations, samples, output);
+                let of_a_run = || clip.samples_of_a_run(timeline);
+                let mut stage = Stage::new(&self.kernels, rotations, samples, of_a_run, output);
                 for track in window.tracks.clone() {
                     stage.row(samples, |samples, output| {
                         let first = window.samples.start + samples.start;
@@ -296,7 +297,8 @@ impl CpuEngine {
         let rotations = output.len();
         let task = |first: usize, rows: &mut [_]| -> Result<(), Error> {
             let tracks = first..first + rows.len() / samples;
-            let mut stage = Stage::new(&self.kernels, rotations, samples, rows);
+            let of_a_run = || samples / keys_each;
+            let mut stage = Stage::new(&self.kernels, rotations, samples, of_a_run, rows);
             let mut memory = self.memories.take(interpolation, timeline, set);
             let Memory {
                 prepared,

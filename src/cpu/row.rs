@@ -99,12 +99,12 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         for j in block.occupied {
             let (source, key) = (sources[j], keys[j]);
             let (first, last) = (block.first[j], block.first[j + 1]);
-            let mut made = first - samples.start..last - samples.start;
+            let (mut start, mut count) = (first - samples.start, last - first);
             let mut distance = block.distance[j];
             if key != NONE && block.is_held[j] == 1 {
-                output.samples()[made.start] = prepared.constants[key as usize];
-                output.made::<L>(made.start..made.start + 1);
-                made.start += 1;
+                output.samples()[start] = prepared.constants[key as usize];
+                output.made(start..start + 1);
+                (start, count) = (start + 1, count - 1);
                 distance += 1.0;
             }
             match source {
@@ -114,19 +114,19 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
                         offset: block.offset[j],
                     };
                     let segment = &segments[index as usize];
-                    output.frames::<L, S>(segment, affine, distance, made);
+                    output.frames::<L, S>(segment, affine, distance, start, count);
                 }
                 Source::Constant(index) => {
-                    output.samples()[made.clone()].fill(prepared.constants[index as usize]);
-                    output.made::<L>(made);
+                    output.samples()[start..][..count].fill(prepared.constants[index as usize]);
+                    output.made(start..start + count);
                 }
                 Source::Exact(index) => {
                     let (parameter, track) = (block.parameter(j), part.track as usize);
-                    let to = &mut output.samples()[made.clone()];
-                    for (sample, rotation) in (samples.start + made.start..).zip(to) {
+                    let to = &mut output.samples()[start..];
+                    for (sample, rotation) in (last - count..last).zip(to) {
                         *rotation = prepared.exact(index, parameter, timeline, track, sample);
                     }
-                    output.made::<L>(made);
+                    output.made(start..start + count);
                 }
             }
         }

@@ -50,19 +50,24 @@ struct Place<'o> {
 }
 
 impl<'o> Stage<'o> {
-    /// For `output`, rows of so many `samples`, a part of a result of so many `rotations`.
+    /// For `output`, rows of so many `samples`, a part of a result of so many `rotations`. How
+    /// many samples a run has on average is only asked where all else is long enough.
     pub(super) fn new(
         kernels: &'o Kernels,
         rotations: usize,
         samples: usize,
+        samples_of_a_run: impl FnOnce() -> usize,
         output: &'o mut [[f32; 4]],
     ) -> Self {
-        let is_long = rotations >= LONG / size_of::<[f32; 4]>() && samples >= ROW;
         #[cfg(test)]
         if tests::IS_STAGED.get() {
             return Self::with(kernels, true, output);
         }
-        Self::with(kernels, is_long && kernels.gain_past_caches(), output)
+        let is_staged = rotations >= LONG / size_of::<[f32; 4]>()
+            && samples >= ROW
+            && kernels.gain_past_caches()
+            && samples_of_a_run() > FEW;
+        Self::with(kernels, is_staged, output)
     }
 
     fn with(kernels: &'o Kernels, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
@@ -239,17 +244,19 @@ impl Output<'_, '_> {
 pub(super) trait Samples {
     fn samples(&mut self) -> &mut [[f32; 4]];
 
-    /// Makes some samples, frames of a segment, the first at that distance from its middle.
+    /// Makes `count` samples from `start` on, frames of a segment, the first at that distance
+    /// from its middle.
     fn frames<L: Lanes, S: Evaluate>(
         &mut self,
         segment: &S,
         affine: Affine,
         first: f32,
-        samples: Range<usize>,
+        start: usize,
+        count: usize,
     );
 
     /// Some of them are made, and do not change any more.
-    fn made<L: Lanes>(&mut self, samples: Range<usize>);
+    fn made(&mut self, samples: Range<usize>);
 }
 
 impl Samples for [[f32; 4]] {
@@ -264,14 +271,14 @@ impl Samples for [[f32; 4]] {
         segment: &S,
         affine: Affine,
         first: f32,
-        samples: Range<usize>,
+        start: usize,
+        count: usize,
     ) {
-        let to = &mut self[samples.start..];
-        frames::<L, S>(segment, affine, first, samples.len(), to);
+        frames::<L, S>(segment, affine, first, count, &mut self[start..]);
     }
 
     #[inline(always)]
-    fn made<L: Lanes>(&mut self, _: Range<usize>) {}
+    fn made(&mut self, _: Range<usize>) {}
 }
 
 impl Samples for Staged<'_, '_> {
@@ -287,34 +294,36 @@ impl Samples for Staged<'_, '_> {
         segment: &S,
         affine: Affine,
         first: f32,
-        samples: Range<usize>,
+        start: usize,
+        count: usize,
     ) {
-        let (start, count) = (self.start + samples.start, samples.len());
-        let (line, filled) = (start / EACH, start % EACH);
-        let end = start + count;
-        // All before them is made, and its whole lines are stored.
-        let is_next = self.made == start && self.place.stored == line;
-        if count <= FEW || !is_next || !self.place.before.is_empty() || end / EACH == LINES {
-            let to = &mut self.samples()[samples.start..];
-            frames::<L, S>(segment, affine, first, count, to);
-            self.made::<L>(samples);
-            return;
+        let own = self.start + start;
+        let (line, end) = (own / EACH, own + count);
+        let is_next = self.made == own;
+        if is_next && count > FEW && end / EACH < LINES {
+            // What lies before them and waits.
+            self.place.store::<L>(&self.lines[..line]);
+            if self.place.before.is_empty() {
+                let places = Places {
+                    begun: (self.lines[line], own % EACH),
+                    whole: self.place.next(end / EACH - line),
+                    rest: &mut self.lines[end / EACH],
+                };
+                frames_past_caches::<L, S>(segment, affine, first, count, places);
+                self.made = end;
+                return;
+            }
         }
-        let places = Places {
-            begun: (self.lines[line], filled),
-            whole: self.place.next(end / EACH - line),
-            rest: &mut self.lines[end / EACH],
-        };
-        frames_past_caches::<L, S>(segment, affine, first, count, places);
-        self.made = end;
+        frames::<L, S>(segment, affine, first, count, &mut self.samples()[start..]);
+        if is_next {
+            self.made = end;
+        }
     }
 
     #[inline(always)]
-    fn made<L: Lanes>(&mut self, samples: Range<usize>) {
+    fn made(&mut self, samples: Range<usize>) {
         if self.start + samples.start <= self.made {
             self.made = self.made.max(self.start + samples.end);
-            let whole = self.made / EACH;
-            self.place.store::<L>(&self.lines[..whole]);
         }
     }
 }
@@ -324,15 +333,13 @@ pub(super) mod tests {
     use std::cell::Cell;
     use std::convert::Infallible;
 
-    use glam::{Quat, Vec4};
+    use glam::Quat;
     use proptest::prelude::*;
 
     use super::*;
     use crate::cpu::VectorWidth;
     use crate::generate::{Generate, Steps};
-    use crate::{
-        Device, Engine, EngineOptions, Frames, Interpolation, Layout, Outside, method,
-    };
+    use crate::{Device, Engine, EngineOptions, Frames, Interpolation, Layout, Outside, method};
 
     thread_local! {
         /// Whether this thread makes all rows on a stage.
@@ -363,7 +370,7 @@ pub(super) mod tests {
                         if let Output::Staged(staged) = output
                             && from % 3 != 1
                         {
-                            staged.made::<Vec4>(from..to);
+                            staged.made(from..to);
                         }
                     }
                     Ok::<(), Infallible>(())

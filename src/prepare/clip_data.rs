@@ -149,6 +149,12 @@ impl ClipData {
         }
     }
 
+    /// How many samples of a timeline one segment gives, on average.
+    pub(crate) fn samples_of_a_run(&self, timeline: &Timeline) -> usize {
+        let spans = self.groups.iter().map(|group| group.spans.starts.len());
+        timeline.len() * self.track_count() / spans.sum::<usize>().max(1)
+    }
+
     pub(crate) fn track_count(&self) -> usize {
         self.tracks.len() - 1
     }
