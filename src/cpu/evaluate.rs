@@ -291,11 +291,10 @@ pub(super) fn canonical(q: f32) -> f32 {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use bytemuck::Zeroable as _;
     use fastrand::Rng;
 
     use super::*;
-    use crate::cpu::stage::Line;
+    use crate::cpu::destination::tests::in_lines;
     use crate::segment::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.
@@ -372,31 +371,6 @@ pub(crate) mod tests {
             samples_of_a_run::<L, _>(&tiny, count);
             samples_of_a_run::<L, _>(&polynomial, count);
         }
-    }
-
-    /// Frames past the caches, behind so many rotations of their first line.
-    fn in_lines<L: Lanes, S: Evaluate>(
-        segment: &S,
-        affine: Affine,
-        first: f32,
-        count: usize,
-        filled: usize,
-    ) -> Vec<[f32; 4]> {
-        let there: Vec<[f32; 4]> = (0..4).map(|k| [9.0 + k as f32; 4]).collect();
-        let begun: [Line; 1] = bytemuck::cast([there[0], there[1], there[2], there[3]]);
-        let whole = (filled + count) / 4;
-        let mut lines = vec![Line::zeroed(); whole + 2];
-        let (own, behind) = lines.split_at_mut(whole);
-        let places = Places {
-            begun: (begun[0], filled),
-            whole: own,
-            rest: &mut behind[0],
-        };
-        frames_past_caches::<L, S>(segment, affine, first, count, places);
-        assert_eq!(bytemuck::bytes_of(&behind[1]), [0; size_of::<Line>()]);
-        let found: &[[f32; 4]] = bytemuck::cast_slice(&lines);
-        assert_eq!(found[..filled], there[..filled]);
-        found[filled..filled + count].to_vec()
     }
 
     fn samples_of_a_run<L: Lanes, S: Evaluate>(segment: &S, count: usize) {

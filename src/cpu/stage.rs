@@ -23,7 +23,7 @@ const ROW: usize = 64;
 pub(crate) struct Line([[f32; 4]; EACH]);
 
 /// Rotations of a line.
-const EACH: usize = 4;
+pub(super) const EACH: usize = 4;
 
 /// Lines of a stage.
 const LINES: usize = 512;
