@@ -202,15 +202,20 @@ impl<L: Lanes, D: Distances<L>> Parameters<L> for OfDistances<L, D> {
 
 struct Frames<L> {
     next: L,
+    /// Those of the turn behind, so that none waits for them.
+    after: L,
     step: L,
 }
 
 impl<L: Lanes> Frames<L> {
     #[inline(always)]
     fn new<S: Evaluate>(first: f32) -> Self {
+        let next = L::all(first) + S::load(&STEPS);
+        let step = L::all(S::samples::<L>() as f32);
         Self {
-            next: L::all(first) + S::load(&STEPS),
-            step: L::all(S::samples::<L>() as f32),
+            next,
+            after: next + step,
+            step,
         }
     }
 }
@@ -219,7 +224,8 @@ impl<L: Lanes> Distances<L> for Frames<L> {
     #[inline(always)]
     fn next(&mut self) -> L {
         let own = self.next;
-        self.next = own + self.step;
+        self.next = self.after;
+        self.after = self.after + self.step;
         own
     }
 }
