@@ -97,32 +97,13 @@ pub(super) fn frames<L: Lanes, S: Evaluate>(
     count: usize,
     output: &mut [[f32; 4]],
 ) {
-    // What is left of a longer run goes into one more wide vector.
-    let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
-    if all > narrow && count <= narrow {
-        frames_alike::<L::Narrow, S>(segment, affine, first, count, output);
-    } else {
-        frames_alike::<L, S>(segment, affine, first, count, output);
-    }
-}
-
-/// In vectors of one width.
-#[inline(always)]
-fn frames_alike<L: Lanes, S: Evaluate>(
-    segment: &S,
-    affine: Affine,
-    first: f32,
-    count: usize,
-    output: &mut [[f32; 4]],
-) {
     if count <= FEW {
         for (j, rotation) in output[..count].iter_mut().enumerate() {
             *rotation = one(segment, affine, first + j as f32);
         }
         return;
     }
-    let distances = Frames::new::<S>(first);
-    run::<L, S>(segment, affine, count, distances, output);
+    frames_in_vectors::<L, S>(segment, affine, first, count, output);
 }
 
 /// The distances of a vector's samples from its first.
@@ -140,12 +121,25 @@ pub(super) fn frames_past_caches<L: Lanes, S: Evaluate>(
     places: Places<'_>,
 ) {
     // From where the line begins.
-    let (first, count) = (first - places.begun.1 as f32, places.begun.1 + count);
+    let (_, there) = places.begun;
+    let (first, count) = (first - there as f32, there + count);
+    frames_in_vectors::<L, S>(segment, affine, first, count, places);
+}
+
+#[inline(always)]
+fn frames_in_vectors<L: Lanes, S: Evaluate>(
+    segment: &S,
+    affine: Affine,
+    first: f32,
+    count: usize,
+    output: impl Destination,
+) {
+    // What is left of a longer run goes into one more wide vector.
     let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
     if all > narrow && count <= narrow {
-        run::<L::Narrow, S>(segment, affine, count, Frames::new::<S>(first), places);
+        run::<L::Narrow, S>(segment, affine, count, Frames::new::<S>(first), output);
     } else {
-        run::<L, S>(segment, affine, count, Frames::new::<S>(first), places);
+        run::<L, S>(segment, affine, count, Frames::new::<S>(first), output);
     }
 }
 
