@@ -12,6 +12,7 @@ mod dat_fixtures;
 mod encoding;
 mod external_vectors;
 mod faults;
+mod golden;
 mod motion;
 mod original;
 mod outside;
