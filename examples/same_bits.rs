@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release --example same_bits`
 
-use tumble::generate::{Generate, Steps};
 use tumble::{Device, Engine, Frames, METHODS};
+use tumble_formats::generate::{Generate, Steps};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let set = Generate {

@@ -35,7 +35,7 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
-# Peers to compare with, in an environment of their own (tests/peers).
+# Peers to compare with, in an environment of their own (cli/tests/peers).
 peers=target/peers
 if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
     if ! python3 -c 'import venv, ensurepip' 2>/dev/null && command -v apt-get >/dev/null; then
@@ -48,7 +48,7 @@ if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
     echo "installing SciPy and splines into $peers" >&2
     rm -rf "$peers"
     if ! { python3 -m venv "$peers" &&
-        "$peers/bin/pip" install --quiet --requirement tests/peers/requirements.txt; }; then
+        "$peers/bin/pip" install --quiet --requirement cli/tests/peers/requirements.txt; }; then
         rm -rf "$peers"
         echo "the peers' test wants python3 with venv, and SciPy and splines from PyPI; without" >&2
         echo "them it says so and compares nothing (where CI is set it fails)" >&2
@@ -59,7 +59,7 @@ fi
 oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 if ! rustc --version | grep -q "^rustc $oldest\b" &&
     command -v rustup >/dev/null && rustup run "$oldest" rustc --version >/dev/null 2>&1; then
-    CARGO_TARGET_DIR=target/oldest rustup run "$oldest" cargo check --all-targets --quiet
+    CARGO_TARGET_DIR=target/oldest rustup run "$oldest" cargo check --workspace --all-targets --quiet
 fi
 
 # What the dependencies may be (deny.toml), where the tool is installed.
@@ -69,13 +69,13 @@ fi
 
 if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
 if cargo clippy --version >/dev/null 2>&1; then
-    cargo clippy --all-targets --quiet -- -D warnings
+    cargo clippy --workspace --all-targets --quiet -- -D warnings
 fi
-RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --quiet
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
 # As releases are built, but with the tests' dependencies: those are built once.
 own=profile.dev.package.tumble
-CARGO_INCREMENTAL=0 cargo test --test cost --config "$own.opt-level=3" \
+CARGO_INCREMENTAL=0 cargo test -p tumble-cli --test cost --config "$own.opt-level=3" \
     --config "$own.codegen-units=16" --config "$own.overflow-checks=false" \
     --config "$own.debug-assertions=false"
 # Twenty seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
-FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test
+FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test --workspace

@@ -12,8 +12,8 @@ mod vectors;
 
 use std::ops::Range;
 
-pub use check::NORM_TOLERANCE;
-pub(crate) use check::{LATEST, ROUNDING};
+pub(crate) use check::LATEST;
+pub use check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 use check::{any_turns, check_times, unit_key};
 pub use error::TrackError;
 use glam::{DVec3, Quat};
@@ -41,7 +41,6 @@ pub struct TrackSet {
     times: Vec<f64>,
     tracks: Vec<TrackRange>,
     names: Vec<String>,
-    box_length: Option<f64>,
     velocities: KeyData<DVec3>,
     tangents: KeyData<[Quat; 2]>,
     tcb: KeyData<Tcb>,
@@ -136,14 +135,14 @@ impl TrackSet {
     /// # Errors
     /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
     pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
-        Self::of_shared_times(times.to_vec(), keys.to_vec())
+        Self::from_shared_times(times.to_vec(), keys.to_vec())
     }
 
     /// As [`TrackSet::with_shared_times`], without a copy.
-    pub(crate) fn of_shared_times(
-        times: Vec<f64>,
-        mut keys: Vec<Quat>,
-    ) -> Result<Self, TrackError> {
+    ///
+    /// # Errors
+    /// As there.
+    pub fn from_shared_times(times: Vec<f64>, mut keys: Vec<Quat>) -> Result<Self, TrackError> {
         let len = times.len();
         if len == 0 || !keys.len().is_multiple_of(len) {
             return Err(TrackError::LengthMismatch {
@@ -171,19 +170,6 @@ impl TrackSet {
             turns,
             ..Self::default()
         })
-    }
-
-    /// Records the length of the boxes (a length, not a duration).
-    #[must_use]
-    pub fn with_box_length(mut self, length: f64) -> Self {
-        self.box_length = Some(length);
-        self
-    }
-
-    /// The length of the boxes, when the input gave one.
-    #[must_use]
-    pub fn box_length(&self) -> Option<f64> {
-        self.box_length
     }
 
     /// Number of tracks.
@@ -294,10 +280,7 @@ impl TrackSet {
     /// When the range passes [`TrackSet::track_count`].
     #[must_use]
     pub fn select(&self, range: Range<usize>) -> Self {
-        let mut set = Self {
-            box_length: self.box_length,
-            ..Self::default()
-        };
+        let mut set = Self::default();
         for index in range {
             let track = self.track(index);
             let first_time = set.share_or_append(track.times);
@@ -338,6 +321,25 @@ impl TrackSet {
         self.times.extend_from_slice(times);
         first
     }
+}
+
+/// Tracks for tests, which swing about axes of their own for 20 s.
+#[cfg(test)]
+pub(crate) fn swinging(tracks: usize, keys: usize, uneven: bool) -> TrackSet {
+    let last = (keys - 1).max(1) as f64;
+    let times: Vec<f64> = (0..keys)
+        .map(|k| 20.0 * (k as f64 + if uneven { 0.4 * (k as f64).sin() } else { 0.0 }) / last)
+        .collect();
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let key = |&time: &f64| {
+            let turn = (time * (0.9 + 0.2 * track as f64)).sin() as f32;
+            Quat::from_rotation_y(1.1 * turn) * Quat::from_rotation_x(0.4 * time as f32)
+        };
+        let keys: Vec<Quat> = times.iter().map(key).collect();
+        set.push("", &times, &keys).expect("unit keys in order");
+    }
+    set
 }
 
 #[cfg(test)]

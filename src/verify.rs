@@ -9,7 +9,6 @@ mod outputs;
 use glam::{DQuat, Quat};
 pub use outputs::OutputVerification;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::clock::{Frames, Timeline};
 use crate::device::Device;
@@ -32,7 +31,8 @@ pub fn error_bound(form: Form) -> f64 {
 }
 
 /// What [`verify`] found for one set and one method.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Verification {
     /// The method's name.
@@ -63,7 +63,8 @@ pub struct Verification {
 }
 
 /// One rotation of a result.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Place {
     /// The track's place in the set, from 0.
     pub track: usize,

@@ -3,10 +3,10 @@
 //! the last segments frozen. Its inner segments must be ours, within 2e-6.
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::formats::dat::{DatOptions, open_dat};
-use tumble::generate::{Generate, Steps};
 use tumble::reference::angle_between;
 use tumble::{Device, Engine, Frames, Interpolation, METHODS, Method, Path, TrackSet};
+use tumble_formats::dat::{DatOptions, open_dat};
+use tumble_formats::generate::{Generate, Steps};
 
 const FRAME_RATE: f64 = 25.0;
 

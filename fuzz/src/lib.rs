@@ -1,8 +1,5 @@
-//! Fuzz targets, for `cargo fuzz` (`fuzz_targets/`) and for `cargo test` (`tests/fuzz.rs`).
+//! Fuzz targets, for `cargo fuzz` (`fuzz_targets/`) and for `cargo test` (`cli/tests/fuzz.rs`).
 
-#[path = "../../src/cli/mod.rs"]
-#[allow(dead_code, unused_imports)]
-mod cli;
 mod targets;
 
 /// Each target, by the name of what it fuzzes.

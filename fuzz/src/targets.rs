@@ -5,15 +5,16 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use clap::Parser;
 use glam::Quat;
-use tumble::formats::csv::CsvWriter;
-use tumble::formats::dat::{DatOptions, Limits, read_dat, write_dat};
-use tumble::formats::npy::{ComponentOrder, NpyWriter};
-use tumble::formats::times::read_times;
 use tumble::spirv::{FloatControls, float_controls, no_contraction, without_decorations};
 use tumble::{
     Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS,
     Outside, Path, Speed, TrackSet,
 };
+use tumble_formats::Limits;
+use tumble_formats::csv::CsvWriter;
+use tumble_formats::dat::{DatOptions, read_dat, write_dat};
+use tumble_formats::npy::{ComponentOrder, NpyWriter};
+use tumble_formats::times::read_times;
 
 /// What a target is given, and what it gives back.
 pub(crate) type Target = fn(&[u8]) -> u64;
@@ -105,7 +106,8 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
                 }
             }
             let mut written = Vec::new();
-            write_dat(&mut written, &loaded.set).expect("memory takes everything");
+            write_dat(&mut written, &loaded.set, loaded.box_length)
+                .expect("memory takes everything");
             let again = read_dat("fuzz", &*written, &DatOptions::default()).expect("our own");
             assert_eq!(bits(&again.set), bits(&loaded.set));
             let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
@@ -212,7 +214,7 @@ pub(crate) fn outputs(bytes: &[u8]) -> u64 {
 pub(crate) fn arguments(bytes: &[u8]) -> u64 {
     let text = String::from_utf8_lossy(bytes);
     let words = std::iter::once("tumble").chain(text.split('\n'));
-    match crate::cli::Arguments::try_parse_from(words) {
+    match tumble_cli::Arguments::try_parse_from(words) {
         Ok(parsed) => signature(
             format!("{parsed:?}")
                 .split_once(' ')

@@ -56,13 +56,13 @@ impl Memories {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generate::Generate;
+    use crate::tracks::swinging;
     use crate::{Device, Engine, Frames, method};
 
     /// Catches what is made anew where two methods take turns, and memory without end.
     #[test]
     fn each_way_to_interpolate_finds_its_memory_again() {
-        let set = Generate::default().track_set().unwrap();
+        let set = swinging(4, 26, false);
         let clip = (Engine::new(Device::Cpu).unwrap())
             .upload(&set, method::SLERP)
             .unwrap();

@@ -338,7 +338,7 @@ pub(super) mod tests {
 
     use super::*;
     use crate::cpu::VectorWidth;
-    use crate::generate::{Generate, Steps};
+    use crate::tracks::swinging;
     use crate::{Device, Engine, EngineOptions, Frames, Interpolation, Layout, Outside, method};
 
     thread_local! {
@@ -393,15 +393,9 @@ pub(super) mod tests {
     /// vectors of every width; from a clip and from keys.
     #[test]
     fn rows_on_a_stage_have_the_bits_of_others() {
-        for (width, steps) in VectorWidth::available()
-            .into_iter()
-            .flat_map(|width| [(width, Steps::Random), (width, Steps::Uniform)])
-        {
-            let set = Generate {
-                steps,
-                ..Generate::default()
-            };
-            let set = set.track_set().unwrap();
+        let widths = VectorWidth::available().into_iter();
+        for (width, uneven) in widths.flat_map(|width| [(width, true), (width, false)]) {
+            let set = swinging(4, 26, uneven);
             let options = EngineOptions {
                 vector_width: Some(width),
                 ..EngineOptions::default()

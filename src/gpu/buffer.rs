@@ -102,7 +102,9 @@ impl Buffer {
         let memory_type = device
             .physical
             .memory_type(needs.memory_type_bits, required, preferred)
-            .ok_or(VulkanError::NoMemoryType { wanted: required })?;
+            .ok_or(VulkanError::NoMemoryType {
+                wanted: required.as_raw(),
+            })?;
         let allocate = vk::MemoryAllocateInfo::default()
             .allocation_size(needs.size)
             .memory_type_index(memory_type);

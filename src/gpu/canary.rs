@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Quat};
-use serde::Serialize;
 
 use super::buffer::{Buffer, Residence};
 use super::device::LogicalDevice;
@@ -27,7 +26,8 @@ use crate::tracks::TrackSet;
 use crate::window::Window;
 
 /// How a device did on one canary.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CanaryReport {
     /// What it looks for.
     pub name: &'static str,

@@ -37,10 +37,12 @@ pub enum VulkanError {
     )]
     NoValidation,
     /// No memory type has what a buffer needs.
-    #[error("the device offers no memory that is {wanted:?}")]
+    #[error(
+        "the device offers no memory with the properties {wanted:#x} (VkMemoryPropertyFlagBits)"
+    )]
     NoMemoryType {
-        /// The properties needed.
-        wanted: vk::MemoryPropertyFlags,
+        /// The properties needed, as `VkMemoryPropertyFlagBits`.
+        wanted: u32,
     },
     /// The device did not finish in time.
     #[error("the device did not finish a dispatch within {seconds} s")]

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ash::{ext, khr, vk};
-use serde::Serialize;
 
 use super::error::{Named, VulkanError};
 use super::instance::Instance;
@@ -12,7 +11,8 @@ use crate::device::Reads;
 use crate::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct DeviceInfo {
     /// Name, as the driver gives it.
@@ -49,8 +49,9 @@ pub struct DeviceInfo {
 const TEXEL_BYTES: u64 = 16;
 
 /// Kinds of Vulkan devices, fastest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum DeviceKind {
     /// A card with memory of its own.
     Discrete,

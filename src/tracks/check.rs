@@ -50,9 +50,9 @@ pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
     }
 }
 
-/// f32 rounding moves a unit quaternion's squared norm by at most 4 × 2^-24 or
-/// so; below this the key is kept as it is, so that loading is idempotent.
-pub(crate) const ROUNDING: f64 = 4.0e-7;
+/// A key whose norm is this near to 1 is kept bit for bit, so that loading what was written
+/// changes nothing: f32 rounding moves a unit quaternion's norm by at most 2 × 2^-24 or so.
+pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
 pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = to_f64(quat);
@@ -60,7 +60,7 @@ pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, Tra
     if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
         return Err(TrackError::NotUnit { track, key, norm });
     }
-    if (norm - 1.0).abs() <= ROUNDING {
+    if (norm - 1.0).abs() <= UNIT_TOLERANCE {
         return Ok(Quat::from_array(quat.to_array().map(canonical)));
     }
     Ok(unit_f32(exact))

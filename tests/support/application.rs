@@ -1,5 +1,6 @@
 //! A device as an application makes it.
 #![allow(unsafe_code)] // creating a device is the application's part
+#![allow(dead_code)] // each test program uses some of it
 
 use ash::vk;
 use tumble::{Engine, EngineOptions, VulkanHandles};

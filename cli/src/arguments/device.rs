@@ -1,0 +1,344 @@
+//! `--device`: which device evaluates, and what to say when it is not there.
+
+use std::convert::Infallible;
+use std::str::FromStr;
+
+use ash::vk;
+use clap::Args;
+use glam::Quat;
+use tumble::{
+    Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, TrackSet, VulkanError,
+};
+
+use crate::batch::output::{Ended, Sink};
+use crate::commands::probe;
+use crate::messages::exit::{DEVICE, Failure, NO_VULKAN};
+use crate::messages::words;
+
+/// Rotations evaluated at once: 16 MB.
+const CHUNK: usize = 1 << 20;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DeviceArguments {
+    /// first (Vulkan device, else the CPU), auto (the fastest for the job), cpu, vulkan, or
+    /// a device by its index or part of its name (`tumble devices`)
+    #[arg(long, value_name = "DEVICE", default_value = "first")]
+    device: Choice,
+    /// Use a device although its canaries fail: its bits may differ from the CPU's
+    #[arg(long)]
+    allow_inexact: bool,
+    /// Device memory to use besides results, such as 256MiB
+    #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
+    memory: Option<u64>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Choice {
+    /// The first Vulkan device that is exact, else the CPU.
+    First,
+    /// The one that is fastest for each job.
+    Auto,
+    Cpu,
+    /// The first Vulkan device that is exact.
+    Vulkan,
+    /// An index in the list of devices, or part of a name.
+    Named(String),
+}
+
+impl FromStr for Choice {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text.to_lowercase().as_str() {
+            "first" => Self::First,
+            "auto" => Self::Auto,
+            "cpu" => Self::Cpu,
+            "vulkan" | "gpu" => Self::Vulkan,
+            _ => Self::Named(text.to_owned()),
+        })
+    }
+}
+
+/// An engine, and how to call its device.
+pub(crate) struct Opened {
+    pub(crate) engine: Engine,
+    pub(crate) label: String,
+    /// Another device may stand in: the bits are the same.
+    automatic: bool,
+    /// Each job goes to the device that is fastest for it.
+    by_cost: bool,
+}
+
+impl DeviceArguments {
+    pub(crate) fn open(&self) -> Result<Opened, Failure> {
+        match &self.device {
+            Choice::Cpu => self.cpu("CPU".to_owned()),
+            Choice::Auto => Ok(Opened {
+                // Opened in this process when a job is large enough.
+                by_cost: probe::drivers().is_ok(),
+                ..self.cpu("CPU".to_owned())?
+            }),
+            Choice::First => match self.first_exact() {
+                Ok(engine) => Ok(Opened {
+                    automatic: true,
+                    ..Opened::new(engine)
+                }),
+                Err(error) => self.cpu(format!("CPU ({})", short_reason(&error))),
+            },
+            Choice::Vulkan => self.first_exact().map(Opened::new).map_err(|e| refused(&e)),
+            Choice::Named(name) => {
+                let devices = probe::devices().map_err(|error| refused(&error.into()))?;
+                let device = named(name, &devices)?;
+                self.engine(device)
+                    .map(Opened::new)
+                    .map_err(|error| refused(&error))
+            }
+        }
+    }
+
+    fn options(&self) -> EngineOptions {
+        let mut options = EngineOptions::default();
+        options.memory = self.memory;
+        options.allow_inexact = self.allow_inexact;
+        options
+    }
+
+    fn engine(&self, device: Device) -> Result<Engine, Error> {
+        Engine::with_options(device, &self.options())
+    }
+
+    fn cpu(&self, label: String) -> Result<Opened, Failure> {
+        let engine = self.engine(Device::Cpu).map_err(|error| refused(&error))?;
+        Ok(Opened {
+            engine,
+            label,
+            automatic: false,
+            by_cost: false,
+        })
+    }
+
+    /// The first device that opens and is exact; else why the first one is not.
+    fn first_exact(&self) -> Result<Engine, Error> {
+        let mut reason = Error::Vulkan(VulkanError::NoDevice);
+        for (index, device) in probe::devices()?.into_iter().enumerate() {
+            match self.engine(device) {
+                Ok(engine) => return Ok(engine),
+                Err(error) if index == 0 => reason = error,
+                Err(_) => {}
+            }
+        }
+        Err(reason)
+    }
+}
+
+impl Opened {
+    fn new(engine: Engine) -> Self {
+        let label = engine.device_name().to_owned();
+        Self {
+            engine,
+            label,
+            automatic: false,
+            by_cost: false,
+        }
+    }
+
+    /// Whether results come from Vulkan.
+    pub(crate) fn is_vulkan(&self) -> bool {
+        self.engine.device_info().is_some()
+    }
+
+    /// Chooses the device for so many rotations, where cost decides.
+    pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
+        if self.by_cost {
+            self.engine = Engine::auto(rotations)?;
+            self.label = self.engine.device_name().to_owned();
+            self.automatic = self.is_vulkan();
+        }
+        Ok(())
+    }
+
+    /// Evaluates into `sink`, chunk by chunk. A device that nobody named may fail: the
+    /// CPU gives the same bits, and goes on where it stopped.
+    pub(crate) fn stream(
+        &mut self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), Ended> {
+        let row = match layout {
+            Layout::TrackMajor => 1,
+            Layout::FrameMajor => set.track_count(),
+        };
+        let timeline = frames.resolve(set.track_count(), set.time_span());
+        let samples = timeline.map_err(Error::from)?.len();
+        self.choose(set.track_count() * samples)?;
+        let chunk = CHUNK.max(row);
+        let mut done = 0;
+        let result = self
+            .engine
+            .stream(set, interpolation, frames, layout, chunk, |chunk| {
+                done = chunk.start + chunk.rotations.len();
+                sink(chunk)
+            });
+        match result {
+            Err(Ended::Evaluating(Error::Vulkan(error))) if self.automatic => {
+                self.fall_back(&error)?;
+                self.engine
+                    .stream(set, interpolation, frames, layout, chunk, |chunk| {
+                        if chunk.start < done {
+                            Ok(())
+                        } else {
+                            sink(chunk)
+                        }
+                    })
+            }
+            result => result,
+        }
+    }
+
+    /// Does some work on the device. One that nobody named may fail: then the CPU does it.
+    pub(crate) fn work<T>(
+        &mut self,
+        mut work: impl FnMut(&Engine) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        match work(&self.engine) {
+            Err(Error::Vulkan(error)) if self.automatic => {
+                self.fall_back(&error)?;
+                work(&self.engine)
+            }
+            done => done,
+        }
+    }
+
+    /// From now on the CPU.
+    fn fall_back(&mut self, error: &VulkanError) -> Result<(), Error> {
+        words::warning(&format!("{}: {error}; going on with the CPU", self.label));
+        self.engine = Engine::new(Device::Cpu)?;
+        self.label = format!("CPU ({} failed)", self.label);
+        self.automatic = false;
+        Ok(())
+    }
+
+    /// As [`Opened::stream`], all of it.
+    pub(crate) fn collect(
+        &mut self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vec<Quat>, Error> {
+        let mut rotations = Vec::new();
+        let collected = self.stream(set, interpolation, frames, layout, &mut |chunk| {
+            rotations.extend_from_slice(chunk.rotations);
+            Ok(())
+        });
+        match collected {
+            Ok(()) | Err(Ended::Writing(_)) => Ok(rotations), // nothing was written
+            Err(Ended::Evaluating(error)) => Err(error),
+        }
+    }
+}
+
+/// The device meant, of those that `tumble devices` lists: by index, by its whole
+/// name, by part of its name, in this order (a card may be called by a number).
+fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> {
+    if devices.is_empty() {
+        return Err(no_vulkan(&VulkanError::NoDevice));
+    }
+    if let Some(device) = given
+        .parse()
+        .ok()
+        .and_then(|index: usize| devices.get(index))
+    {
+        return Ok(device.clone());
+    }
+    let part = given.to_lowercase();
+    let matching = |matches: &dyn Fn(&str) -> bool| -> Vec<&Device> {
+        devices
+            .iter()
+            .filter(|device| matches(&device.name().to_lowercase()))
+            .collect()
+    };
+    let whole = matching(&|name| name == part);
+    let found = if whole.is_empty() {
+        matching(&|name| name.contains(&part))
+    } else {
+        whole
+    };
+    let list = listing(devices);
+    match *found {
+        [one] => Ok(one.clone()),
+        [] => {
+            let known = devices
+                .iter()
+                .map(Device::name)
+                .chain(["first", "auto", "cpu", "vulkan"]);
+            let hint = words::nearest(given, known)
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_default();
+            Err(Failure::usage(format!(
+                "there is no device `{given}`{hint}\n{list}"
+            )))
+        }
+        _ => Err(Failure::usage(format!(
+            "`{given}` could be several devices; give more of the name, or the index\n{list}"
+        ))),
+    }
+}
+
+fn listing(devices: &[Device]) -> String {
+    let lines: Vec<String> = devices
+        .iter()
+        .enumerate()
+        .map(|(index, device)| format!("  {index}  {}", device.name()))
+        .collect();
+    format!(
+        "  there are: first, auto, cpu, vulkan, and\n{}",
+        lines.join("\n")
+    )
+}
+
+fn no_vulkan(error: &VulkanError) -> Failure {
+    Failure::new(NO_VULKAN, format!("no Vulkan device: {error}"))
+}
+
+/// A demanded device could not be opened.
+pub(crate) fn refused(error: &Error) -> Failure {
+    match error {
+        Error::Vulkan(error) if is_absence(error) => no_vulkan(error),
+        Error::Vulkan(error @ VulkanError::Inexact { .. }) => {
+            Failure::new(DEVICE, format!("{error} (--allow-inexact)"))
+        }
+        _ => Failure::new(DEVICE, error.to_string()),
+    }
+}
+
+/// Whether there is no Vulkan, rather than one that fails.
+pub(crate) fn is_absence(error: &VulkanError) -> bool {
+    match error {
+        VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::Driver { .. } => true,
+        // So say loaders that find no driver, or none that works.
+        VulkanError::Call { result, .. } => [
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER,
+            vk::Result::ERROR_INITIALIZATION_FAILED,
+        ]
+        .contains(result),
+        _ => false,
+    }
+}
+
+/// Why the CPU was taken, in a few words.
+fn short_reason(error: &Error) -> String {
+    match error {
+        Error::Vulkan(VulkanError::NoLoader { .. }) => "no Vulkan: no loader library".to_owned(),
+        Error::Vulkan(VulkanError::NoDevice) => "no Vulkan: no device".to_owned(),
+        Error::Vulkan(VulkanError::Call {
+            result: vk::Result::ERROR_INCOMPATIBLE_DRIVER,
+            ..
+        }) => "no Vulkan: no driver is installed".to_owned(),
+        Error::Vulkan(error) if is_absence(error) => format!("no Vulkan: {error}"),
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,149 @@
+//! Which files a command works on: those named, those in directories, those that a
+//! pattern matches, and those in a list.
+
+use std::collections::HashSet;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use walkdir::WalkDir;
+
+use crate::arguments::input::{self, is_standard};
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Files to work on, in order, each once.
+pub(crate) struct Gathered {
+    pub(crate) files: Vec<Found>,
+    /// A directory, a pattern or a list was given: there may be any number of files.
+    pub(crate) many: bool,
+}
+
+/// One file, and its place in a directory of results.
+pub(crate) struct Found {
+    pub(crate) path: PathBuf,
+    /// Its name; below a directory that was given, the way to it.
+    pub(crate) below: PathBuf,
+}
+
+impl Gathered {
+    /// Files named on the command line come first, then those of the list.
+    pub(crate) fn new(paths: &[PathBuf], list: Option<&Path>) -> Result<Self, Failure> {
+        let mut gathered = Self {
+            files: Vec::new(),
+            many: list.is_some(),
+        };
+        let listed = list.map_or_else(|| Ok(Vec::new()), read_list)?;
+        let mut seen = HashSet::new();
+        for path in paths.iter().chain(&listed) {
+            for found in gathered.expand(path) {
+                // A missing file is told about when it is opened.
+                let identity = found.path.canonicalize();
+                if seen.insert(identity.unwrap_or_else(|_| found.path.clone())) {
+                    gathered.files.push(found);
+                } else {
+                    let name = input::name(&found.path);
+                    words::warning(&format!("{name}: given twice, done once"));
+                }
+            }
+        }
+        if gathered.files.is_empty() {
+            let list = list.map(input::name).unwrap_or_default();
+            return Err(Failure::usage(format!("{list}: lists no files")));
+        }
+        Ok(gathered)
+    }
+
+    pub(crate) fn paths(&self) -> Vec<PathBuf> {
+        self.files.iter().map(|found| found.path.clone()).collect()
+    }
+
+    fn expand(&mut self, path: &Path) -> Vec<Found> {
+        let alone = || Found {
+            path: path.to_owned(),
+            below: path.file_name().unwrap_or(path.as_os_str()).into(),
+        };
+        if is_standard(path) || path.is_file() {
+            return vec![alone()];
+        }
+        let found = if path.is_dir() {
+            below(path)
+        } else {
+            matches(path)
+        };
+        if found.is_empty() {
+            // Opening it says what is wrong with it.
+            return vec![alone()];
+        }
+        self.many = true;
+        found
+    }
+}
+
+/// Every `.dat` file below a directory, by name. What cannot be looked into is an input
+/// too, which fails when it is opened.
+fn below(directory: &Path) -> Vec<Found> {
+    let walk = WalkDir::new(directory).follow_links(true);
+    let mut found = Vec::new();
+    for entry in walk.sort_by_file_name() {
+        let path = match entry {
+            Ok(entry) if entry.file_type().is_dir() => continue,
+            Ok(entry) if is_dat(entry.path()) => entry.into_path(),
+            Ok(_) => continue,
+            Err(error) => match error.path() {
+                Some(path) => path.to_owned(),
+                None => continue,
+            },
+        };
+        let below = path.strip_prefix(directory).unwrap_or(&path).to_owned();
+        found.push(Found { path, below });
+    }
+    found
+}
+
+fn is_dat(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("dat"))
+}
+
+/// The files that a pattern matches: shells expand patterns, but not in lists, not in
+/// quotes, and not on every system.
+fn matches(pattern: &Path) -> Vec<Found> {
+    let Some(text) = pattern
+        .to_str()
+        .filter(|text| text.contains(['*', '?', '[']))
+    else {
+        return Vec::new();
+    };
+    let Ok(paths) = glob::glob(text) else {
+        return Vec::new();
+    };
+    let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
+    files
+        .map(|path| Found {
+            below: path.file_name().unwrap_or(path.as_os_str()).into(),
+            path,
+        })
+        .collect()
+}
+
+/// A path on each line; blank lines and lines that begin with `#` are none.
+fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let read = if is_standard(list) {
+        let mut text = String::new();
+        io::stdin().read_to_string(&mut text).map(|_| text)
+    } else {
+        std::fs::read_to_string(list)
+    };
+    let text = read.map_err(|error| {
+        let name = input::name(list);
+        Failure::new(
+            crate::messages::exit::ALL_INPUTS,
+            format!("{name}: the list cannot be read: {error}"),
+        )
+    })?;
+    let paths = text
+        .lines()
+        .map(str::trim_end)
+        .filter(|line| !line.is_empty() && !line.starts_with('#'));
+    Ok(paths.map(PathBuf::from).collect())
+}

@@ -1,0 +1,130 @@
+//! Inputs: keyframe files and lists of times, opened, read, and their warnings
+//! passed on.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tumble_formats::Code;
+use tumble_formats::Limits;
+use tumble_formats::dat::{DatOptions, Loaded, open_dat};
+use tumble_formats::times::open_times;
+
+use crate::arguments::gather::Gathered;
+use crate::messages::exit::Failure;
+use crate::messages::progress::busy;
+use crate::messages::words;
+
+/// The inputs of a command, and what they may be.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Inputs {
+    /// Keyframe files, directories of them, or patterns such as 'walks/*.dat' (`-`: standard input)
+    #[arg(required_unless_present = "files_from", value_name = "INPUT")]
+    paths: Vec<PathBuf>,
+    /// Also the inputs in a text file, one a line (`-`: standard input)
+    #[arg(long, value_name = "LIST")]
+    files_from: Option<PathBuf>,
+    /// Read named pipes too
+    #[arg(long)]
+    pipes: bool,
+    /// The largest input to read
+    #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
+    max_size: u64,
+}
+
+/// `-` is standard input.
+pub(crate) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// How messages call an input.
+pub(crate) fn name(path: &Path) -> String {
+    if is_standard(path) {
+        "standard input".to_owned()
+    } else {
+        path.display().to_string()
+    }
+}
+
+/// `folder/walk.dat` is `walk.dat` in titles.
+pub(crate) fn file_name(path: &Path) -> String {
+    match path.file_name() {
+        Some(name) if !is_standard(path) => name.to_string_lossy().into_owned(),
+        _ => name(path),
+    }
+}
+
+/// `folder/walk.dat` is `walk` in the names of pictures.
+pub(crate) fn stem(path: &Path) -> String {
+    match path.file_stem() {
+        Some(stem) if !is_standard(path) => stem.to_string_lossy().into_owned(),
+        _ => "stdin".to_owned(),
+    }
+}
+
+impl Inputs {
+    /// The inputs without repetitions, each of which earns a warning. Standard
+    /// input can be taken only once.
+    pub(crate) fn gather(&self, standard_input_taken: bool) -> Result<Gathered, Failure> {
+        let taken = [
+            (standard_input_taken, "the times"),
+            (
+                self.files_from.as_deref().is_some_and(is_standard),
+                "the list of inputs",
+            ),
+        ];
+        let taken: Vec<&str> = taken.iter().filter(|t| t.0).map(|t| t.1).collect();
+        let keys = self.paths.iter().any(|path| is_standard(path));
+        if taken.len() + usize::from(keys) > 1 {
+            let all = taken.iter().copied().chain(keys.then_some("the keys"));
+            let all = all.collect::<Vec<_>>().join(" and ");
+            return Err(Failure::usage(format!(
+                "standard input cannot be both {all}; put one in a file"
+            )));
+        }
+        Gathered::new(&self.paths, self.files_from.as_deref())
+    }
+
+    /// As [`Inputs::gather`], the paths alone.
+    pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
+        Ok(self.gather(standard_input_taken)?.paths())
+    }
+
+    /// Reads a keyframe file; its warnings go to standard error.
+    pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
+        let loaded = self.load_quietly(path)?;
+        for warning in &loaded.warnings {
+            words::note(&warning.to_string());
+        }
+        Ok(loaded)
+    }
+
+    /// As [`Inputs::load`], without a word of its warnings.
+    pub(crate) fn load_quietly(&self, path: &Path) -> Result<Loaded, Failure> {
+        busy(&format!("reading {}", name(path)), || self.read(path))
+    }
+
+    /// As [`Inputs::load_quietly`], without a word of how far it is.
+    pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
+        let limits = Limits {
+            file: self.max_size,
+            ..Limits::default()
+        };
+        let options = DatOptions {
+            limits,
+            pipes: self.pipes,
+        };
+        open_dat(path, &options).map_err(|diagnostic| {
+            let hint = match diagnostic.code {
+                Code::FileTooLong => " (--max-size)",
+                Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",
+                _ => "",
+            };
+            Failure::input(&diagnostic, hint)
+        })
+    }
+}
+
+/// Reads a list of times.
+pub(crate) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
+    open_times(path).map_err(|diagnostic| Failure::input(&diagnostic, ""))
+}

@@ -1,0 +1,8 @@
+//! Arguments that several commands share, parsed into what they mean.
+
+pub(crate) mod device;
+pub(crate) mod gather;
+pub(crate) mod input;
+pub(crate) mod interpolation;
+pub(crate) mod time;
+pub(crate) mod what;

@@ -1,0 +1,164 @@
+//! `--fps`, `--times`, `--start`, `--end`: which samples to evaluate.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use tumble::{FrameRate, Frames, TrackSet};
+
+use crate::arguments::input;
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Broadcast rates are n × 1000/1001; written as decimals they drift by a frame in
+/// some hours.
+const BROADCAST: [u64; 5] = [24, 30, 48, 60, 120];
+
+/// A decimal rate this close to a broadcast rate (relative) was probably meant to
+/// be it: 23.98 is, 24 is not.
+const MEANT: f64 = 2e-4;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Sampling {
+    /// Frames per second, from the first key to the last: a number or a ratio, such as 30000/1001
+    #[arg(
+        long,
+        value_name = "FPS",
+        default_value = "25",
+        allow_hyphen_values = true
+    )]
+    fps: FrameRate,
+    /// Evaluate at the times in a text file instead: seconds, one per line (`-`: standard input)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "start", "end"])]
+    times: Option<PathBuf>,
+    /// Where to start, seconds [default: the first key]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    start: Option<f64>,
+    /// Where to end, seconds [default: the last key]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    end: Option<f64>,
+}
+
+/// The samples asked for, before the tracks are known.
+pub(crate) enum Samples {
+    Rate {
+        rate: FrameRate,
+        start: Option<f64>,
+        end: Option<f64>,
+    },
+    Times(Vec<f64>),
+}
+
+impl Sampling {
+    /// Whether the list of times comes from standard input.
+    pub(crate) fn reads_standard_input(&self) -> bool {
+        self.times.as_deref().is_some_and(input::is_standard)
+    }
+
+    /// Checks what can be checked without the tracks, and reads the list of times.
+    pub(crate) fn samples(&self) -> Result<Samples, Failure> {
+        if let Some(path) = &self.times {
+            return Ok(Samples::Times(input::times(path)?));
+        }
+        if let (Some(start), Some(end)) = (self.start, self.end)
+            && end < start
+        {
+            return Err(Failure::usage(format!(
+                "the range ends at {end} s, before it starts at {start} s; swap --start and --end"
+            )));
+        }
+        if let Some(meant) = broadcast_rate(self.fps) {
+            words::warning(&format!(
+                "{} frames per second is taken as written; the broadcast rate is {meant}",
+                self.fps.per_second()
+            ));
+        }
+        Ok(Samples::Rate {
+            rate: self.fps,
+            start: self.start,
+            end: self.end,
+        })
+    }
+}
+
+impl Samples {
+    /// The samples for one set; says when they pass its keys.
+    pub(crate) fn of(&self, set: &TrackSet, name: &str) -> Frames {
+        match self {
+            Self::Rate { rate, start, end } => in_frames(*rate, *start, *end, set, name),
+            Self::Times(times) => {
+                let start = times.iter().copied().fold(f64::INFINITY, f64::min);
+                let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                warn_beyond(start, end, set, name);
+                Frames::at(times.clone())
+            }
+        }
+    }
+}
+
+/// Frames from a time to a time, else from the first key to the last; says when they pass
+/// the keys.
+pub(crate) fn in_frames(
+    rate: FrameRate,
+    start: Option<f64>,
+    end: Option<f64>,
+    set: &TrackSet,
+    name: &str,
+) -> Frames {
+    if (start, end) == (None, None) {
+        return Frames::rate(rate);
+    }
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
+    warn_beyond(start, end, set, name);
+    Frames::rate(rate).between(start, end)
+}
+
+fn warn_beyond(start: f64, end: f64, set: &TrackSet, name: &str) {
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    if start < first || end > last {
+        words::warning(&format!(
+            "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
+             beyond them tracks are held, or as --before and --after say"
+        ));
+    }
+}
+
+/// The broadcast rate that a decimal stands for.
+fn broadcast_rate(rate: FrameRate) -> Option<FrameRate> {
+    BROADCAST
+        .into_iter()
+        .filter_map(|frames| FrameRate::new(frames * 1000, 1001).ok())
+        .filter(|&exact| exact != rate)
+        .find(|exact| (rate.per_second() / exact.per_second() - 1.0).abs() < MEANT)
+}
+
+/// Parses a time.
+pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(time) if time.is_finite() => Ok(time),
+        _ => Err(format!(
+            "`{text}` is no time; give a finite number of seconds"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_of_broadcast_rates_are_noticed() {
+        let meant = |text: &str| broadcast_rate(text.parse().unwrap()).map(|r| r.to_string());
+        for (text, exact) in [
+            ("29.97", "30000/1001"),
+            ("23.976", "24000/1001"),
+            ("23.98", "24000/1001"),
+            ("59.94", "60000/1001"),
+        ] {
+            assert_eq!(meant(text).as_deref(), Some(exact), "{text}");
+        }
+        for text in ["25", "24", "30", "60", "30000/1001", "12.5"] {
+            assert_eq!(meant(text), None, "{text}");
+        }
+    }
+}

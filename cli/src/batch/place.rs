@@ -1,0 +1,145 @@
+//! Where a file goes: checked before any work, written whole or not at all.
+
+use std::fmt;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tumble_formats::output::{Output, check_target};
+
+use crate::arguments::input;
+use crate::batch::digest::Digest;
+use crate::batch::stream::{Ended, Measured, Stream};
+use crate::messages::exit::{BROKEN_PIPE, Failure, OUTPUT};
+use crate::messages::signals::{self, Writing};
+
+/// Where one file goes.
+#[derive(Debug)]
+pub(crate) struct Place {
+    path: PathBuf,
+    overwrite: bool,
+    /// Files that it must not be.
+    inputs: Vec<PathBuf>,
+    /// Its bytes are hashed as they are written.
+    hashed: bool,
+}
+
+/// A file that is whole, and has not got its name yet. Dropped before
+/// [`Written::commit`], it leaves nothing behind.
+pub(crate) struct Written {
+    output: Output,
+    pub(crate) digest: Option<Digest>,
+    _writing: Option<Writing>,
+}
+
+impl Written {
+    pub(crate) fn commit(self) -> Result<(), Failure> {
+        self.output
+            .commit()
+            .map_err(|error| Failure::output(&error))
+    }
+}
+
+impl Place {
+    /// Checks everything that can be checked without writing.
+    pub(crate) fn new(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
+        if !input::is_standard(path) {
+            check_target(path, overwrite, inputs).map_err(|error| Failure::output(&error))?;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            overwrite,
+            inputs: inputs.to_vec(),
+            hashed: false,
+        })
+    }
+
+    /// The same place, its bytes hashed on their way.
+    pub(crate) fn hashed(self) -> Self {
+        Self {
+            hashed: true,
+            ..self
+        }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn is_standard(&self) -> bool {
+        input::is_standard(&self.path)
+    }
+
+    /// Opens and drops the file: its directory may be read-only.
+    pub(crate) fn try_out(&self) -> Result<(), Failure> {
+        let _writing = Writing::begin();
+        self.open().map(drop)
+    }
+
+    fn open(&self) -> Result<Output, Failure> {
+        Output::create(&self.path, self.overwrite, &self.inputs)
+            .map_err(|error| Failure::output(&error))
+    }
+
+    /// Runs `write`; a file appears under its name once it is whole.
+    pub(crate) fn write(
+        &self,
+        progress: Option<Measured>,
+        write: impl FnOnce(&mut Stream) -> io::Result<()>,
+    ) -> Result<(), Failure> {
+        self.prepare(progress, write)?.commit()
+    }
+
+    /// As [`Place::write`], up to where the file gets its name.
+    pub(crate) fn prepare(
+        &self,
+        progress: Option<Measured>,
+        write: impl FnOnce(&mut Stream) -> io::Result<()>,
+    ) -> Result<Written, Failure> {
+        // Standard output has nothing to clean up: a signal may end it at once.
+        let writing = (!self.is_standard()).then(Writing::begin);
+        let digest = self.hashed.then(Digest::default);
+        let mut stream = Stream::new(self.open()?, progress, digest);
+        // What a buffer still holds can fail too.
+        let result = write(&mut stream).and_then(|()| stream.flush());
+        let Ended {
+            output,
+            digest,
+            broken_pipe,
+        } = stream.end();
+        if let Some(stopped) = signals::stopped() {
+            return Err(stopped);
+        }
+        match result {
+            Ok(()) => Ok(Written {
+                output,
+                digest,
+                _writing: writing,
+            }),
+            Err(_) if broken_pipe => Err(Failure::quiet(BROKEN_PIPE)),
+            Err(error) => Err(Failure::writing(&self.to_string(), &error)),
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_standard() {
+            return f.write_str("standard output");
+        }
+        write!(f, "{}", self.path.display())
+    }
+}
+
+/// Makes a directory for results where there is none.
+pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
+    let made = if path.is_dir() {
+        Ok(())
+    } else {
+        std::fs::create_dir(path)
+    };
+    made.map_err(|error| {
+        let path = path.display();
+        let message = format!("{path}: the directory could not be made: {error}");
+        Failure::new(OUTPUT, message)
+    })
+}

@@ -1,0 +1,86 @@
+//! Is there room for a result? Asked before any work, so that a mistyped frame
+//! rate is refused and does not fill memory or disk first.
+
+use std::path::Path;
+
+use glam::Quat;
+use tumble::{Frames, Timeline, TrackSet};
+
+use crate::messages::exit::{Failure, USAGE};
+use crate::messages::words;
+
+/// The samples that `frames` means for a set, if `copies` results of that size fit
+/// into the memory that is free.
+pub(crate) fn in_memory(
+    name: &str,
+    set: &TrackSet,
+    frames: &Frames,
+    copies: usize,
+) -> Result<Timeline, Failure> {
+    let tracks = set.track_count();
+    let timeline = frames
+        .resolve(tracks, set.time_span())
+        .map_err(|error| Failure::evaluating(name, &error.into()))?;
+    let needed = (tracks * timeline.len() * size_of::<Quat>()) as f64 * copies as f64;
+    match available_memory() {
+        Some(free) if needed > free => Err(too_large(
+            name,
+            tracks,
+            timeline.len(),
+            needed,
+            &format!("{} of memory", words::bytes(free)),
+        )),
+        _ => Ok(timeline),
+    }
+}
+
+/// Whether `bytes` more fit on the disk that holds `folder`.
+pub(crate) fn on_disk(
+    name: &str,
+    (tracks, samples): (usize, usize),
+    bytes: f64,
+    folder: &Path,
+) -> Result<(), Failure> {
+    match available_disk(folder) {
+        Some(free) if bytes > free => {
+            let limit = format!("{} on the disk of {}", words::bytes(free), folder.display());
+            Err(too_large(name, tracks, samples, bytes, &limit))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn too_large(name: &str, tracks: usize, samples: usize, bytes: f64, limit: &str) -> Failure {
+    Failure::new(
+        USAGE,
+        format!(
+            "{name}: {} × {} are {} ({bytes} bytes), more than the {limit} that are free; ask for \
+             fewer frames (--fps, --start, --end)",
+            words::count(tracks, "track"),
+            words::count(samples, "frame"),
+            words::bytes(bytes),
+        ),
+    )
+}
+
+/// What Linux says programs can still take; unknown elsewhere, and then only the
+/// library's own limits hold.
+fn available_memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024.0)
+}
+
+#[cfg(unix)]
+fn available_disk(folder: &Path) -> Option<f64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_bavail as f64 * disk.f_frsize as f64)
+}
+
+#[cfg(not(unix))]
+fn available_disk(_: &Path) -> Option<f64> {
+    None
+}

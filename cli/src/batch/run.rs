@@ -1,0 +1,128 @@
+//! Many inputs into a directory of results: the next one is read while one is evaluated,
+//! and the manifest is kept.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use tumble_formats::dat::Loaded;
+
+use crate::arguments::input;
+use crate::arguments::input::Inputs;
+use crate::batch::digest;
+use crate::batch::manifest::{Entry, Manifest, Previous, kernels_sha256};
+use crate::batch::output::Target;
+use crate::batch::place::Written;
+use crate::messages::exit::{Failure, for_each};
+use crate::messages::{signals, words};
+
+/// How a batch is done.
+pub(crate) struct Batch<'a> {
+    pub(crate) inputs: &'a Inputs,
+    /// All that decides over a result besides its input.
+    pub(crate) options: String,
+    /// Results that are done are skipped.
+    pub(crate) resume: bool,
+}
+
+/// An input that was read; nothing where its result is there, and whole.
+type Input = Option<Read>;
+
+struct Read {
+    sha256: Option<String>,
+    loaded: Result<Loaded, Failure>,
+}
+
+/// A result that has yet to get its name, who computed it, and what to say of it.
+pub(crate) struct Evaluated {
+    pub(crate) written: Written,
+    pub(crate) device: String,
+    pub(crate) told: String,
+}
+
+impl Batch<'_> {
+    pub(crate) fn run(
+        &self,
+        jobs: &[(PathBuf, Target)],
+        mut manifest: Manifest,
+        mut evaluate: impl FnMut(&Path, &Loaded, &Target) -> Result<Evaluated, Failure>,
+    ) -> Result<(), Failure> {
+        let previous = manifest.previous();
+        let mut skipped = 0;
+        let outcome = thread::scope(|scope| {
+            // One is waiting at most: two sets are in memory.
+            let (hand_over, inputs) = sync_channel(0);
+            scope.spawn(move || self.read_all(jobs, &previous, &hand_over));
+            for_each(jobs, |(path, target)| {
+                if let Some(stop) = signals::stopped() {
+                    return Err(stop);
+                }
+                let Some((sha256, loaded)) = taken(&inputs)? else {
+                    skipped += 1;
+                    return Ok(());
+                };
+                let mut evaluated = evaluate(path, &loaded, target)?;
+                let digest = evaluated.written.digest.take().unwrap_or_default();
+                manifest.add(Entry {
+                    output: target.name().to_owned(),
+                    output_bytes: digest.bytes(),
+                    output_sha256: digest.finish(),
+                    input: input::name(path),
+                    input_sha256: sha256,
+                    options: self.options.clone(),
+                    kernels_sha256: kernels_sha256().to_owned(),
+                    tumble: env!("CARGO_PKG_VERSION").to_owned(),
+                    device: evaluated.device,
+                })?;
+                evaluated.written.commit()?;
+                words::note(&evaluated.told);
+                Ok(())
+            })
+        });
+        if skipped > 0 {
+            let results = words::count(skipped, "result");
+            words::note(&format!("{results} skipped: done before, and whole"));
+        }
+        manifest.finish()?;
+        outcome
+    }
+
+    /// Reads the inputs one by one; stops when nobody takes them any more.
+    fn read_all(
+        &self,
+        jobs: &[(PathBuf, Target)],
+        previous: &Previous,
+        hand_over: &SyncSender<Input>,
+    ) {
+        for (path, target) in jobs {
+            // What cannot be read is told about when it is opened.
+            let sha256 = if input::is_standard(path) {
+                None
+            } else {
+                digest::of_file(path).ok()
+            };
+            let is_done = |hash: &String| previous.is_done(target.name(), hash, &self.options);
+            let done = self.resume && sha256.as_ref().is_some_and(is_done);
+            let input = (!done).then(|| Read {
+                loaded: self.inputs.read(path),
+                sha256,
+            });
+            if hand_over.send(input).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// The next input and its hash, when it has to be evaluated; says its warnings.
+fn taken(inputs: &Receiver<Input>) -> Result<Option<(Option<String>, Loaded)>, Failure> {
+    let input = inputs.recv().expect("the reader hands over every input");
+    let Some(Read { sha256, loaded }) = input else {
+        return Ok(None);
+    };
+    let loaded = loaded?;
+    for warning in &loaded.warnings {
+        words::note(&warning.to_string());
+    }
+    Ok(Some((sha256, loaded)))
+}

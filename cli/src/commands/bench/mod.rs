@@ -1,0 +1,257 @@
+//! `tumble bench`: how fast this machine is, against itself and against what a user
+//! would write. Everything is measured in one run, in turns, because machines are
+//! shared and their clocks drift; what counts are the ratios.
+
+pub(crate) mod naive;
+pub(crate) mod report;
+pub(crate) mod stream;
+pub(crate) mod workload;
+
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use glam::Quat;
+use rayon::prelude::*;
+use tumble::{
+    Clip, Device, Engine, EngineOptions, Layout, Method, OutputBuffer, VectorWidth, method,
+};
+
+use crate::commands::bench::report::{Report, Row, Section};
+use crate::commands::bench::workload::{Kind, Workload};
+use crate::commands::probe;
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Measure speed on this machine, as ratios taken in one run
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// What to measure
+    #[arg(value_enum, default_values = ["sparse", "small"])]
+    workloads: Vec<Kind>,
+    /// Times that each is measured, after one that does not count; the median is told
+    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// Make every workload smaller by this factor, to try it out
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    shrink: u32,
+    /// Leave Vulkan devices out
+    #[arg(long)]
+    cpu_only: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let devices = if arguments.cpu_only {
+        Vec::new()
+    } else {
+        probe::devices().unwrap_or_default()
+    };
+    let mut sections = Vec::new();
+    for &kind in &arguments.workloads {
+        let workload = kind.workload(arguments.shrink as usize);
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
+            // A short call is repeated, so that the clock can see it.
+            let calls = match kind {
+                Kind::Small => (10_000 / arguments.rounds / arguments.shrink).max(1),
+                _ => 1,
+            };
+            let turns = Turns {
+                rounds: arguments.rounds,
+                calls,
+            };
+            let section = if kind == Kind::Stream {
+                stream::measure(&workload, method, turns)?
+            } else {
+                measure(kind, &workload, method, &devices, turns)
+                    .map_err(|error| crate::arguments::device::refused(&error))?
+            };
+            sections.push(section);
+        }
+    }
+    let report = Report::new(arguments.rounds, sections);
+    if arguments.json {
+        words::json(&report)
+    } else {
+        words::listing(&report.text())
+    }
+}
+
+/// One way to do the work; what it returns are times besides that of the whole.
+type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a>;
+
+/// How often each is measured, and how many calls one measurement takes.
+#[derive(Clone, Copy)]
+pub(crate) struct Turns {
+    rounds: u32,
+    calls: u32,
+}
+
+/// A share of an action's time.
+struct Part {
+    name: &'static str,
+    time: Duration,
+}
+
+struct Contestant<'a, E> {
+    name: String,
+    action: Action<'a, E>,
+}
+
+impl<'a, E> Contestant<'a, E> {
+    fn new(
+        name: impl Into<String>,
+        action: impl FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            action: Box::new(action),
+        }
+    }
+}
+
+fn measure(
+    kind: Kind,
+    workload: &Workload,
+    method: Method,
+    devices: &[Device],
+    turns: Turns,
+) -> Result<Section, tumble::Error> {
+    let engine = Engine::new(Device::Cpu)?;
+    let clip = engine.upload(&workload.set, method)?;
+    let count = clip.track_count() * clip.timeline(&workload.frames)?.len();
+    let mut output = OutputBuffer::new(count);
+    output.fill(Quat::IDENTITY);
+
+    let mut contestants = vec![
+        Contestant::new("memory write rate", |output: &mut [Quat]| {
+            let value = std::hint::black_box(Quat::IDENTITY);
+            let chunk = output.len().div_ceil(rayon::current_num_threads());
+            let fill = |part: &mut [Quat]| part.fill(value);
+            output.par_chunks_mut(chunk).for_each(fill);
+            Ok(Vec::new())
+        }),
+        Contestant::new("naive (glam, rayon)", |output: &mut [Quat]| {
+            if method == method::BESSEL_OVERHAUSER {
+                naive::cubic(workload, output);
+            } else {
+                naive::slerp(workload, output);
+            }
+            Ok(Vec::new())
+        }),
+    ];
+    let cpu_clip = |change: &dyn Fn(&mut EngineOptions)| -> Result<Clip, tumble::Error> {
+        let mut options = EngineOptions::default();
+        change(&mut options);
+        Engine::with_options(Device::Cpu, &options)?.upload(&workload.set, method)
+    };
+    let evaluate = |name: String, clip: Clip| {
+        Contestant::new(name, move |output: &mut [Quat]| {
+            clip.evaluate_into(&workload.frames, Layout::TrackMajor, output)?;
+            Ok(Vec::new())
+        })
+    };
+    contestants.push(evaluate("CPU, evaluation alone".into(), clip));
+    // Segments of dense keys take gigabytes: there is room for them once.
+    if kind != Kind::Dense {
+        let one = cpu_clip(&|options| options.threads = Some(1))?;
+        contestants.push(evaluate("CPU, one thread".into(), one));
+        for width in VectorWidth::available() {
+            let narrow = cpu_clip(&|options| options.vector_width = Some(width))?;
+            contestants.push(evaluate(format!("CPU, {width:?}"), narrow));
+        }
+    }
+    contestants.push(Contestant::new(
+        "CPU, from keys",
+        |output: &mut [Quat]| {
+            let (set, frames) = (&workload.set, &workload.frames);
+            engine.evaluate_into(set, method, frames, Layout::TrackMajor, output)?;
+            Ok(Vec::new())
+        },
+    ));
+    for device in devices {
+        let Ok(engine) = Engine::new(device.clone()) else {
+            continue; // `tumble devices` says why
+        };
+        let name = engine.device_name().to_owned();
+        if kind != Kind::Dense {
+            let clip = engine.upload(&workload.set, method)?;
+            contestants.push(Contestant::new(&name, on_device(clip, workload)));
+        }
+        contestants.push(Contestant::new(
+            format!("{name}, from keys"),
+            move |output: &mut [Quat]| {
+                let (set, frames) = (&workload.set, &workload.frames);
+                engine.evaluate_into(set, method, frames, Layout::TrackMajor, output)?;
+                let _ = engine.take_timings();
+                Ok(Vec::new())
+            },
+        ));
+    }
+    let rows = race(contestants, &mut output, turns)?;
+    Ok(Section::new(kind, method, count, rows))
+}
+
+/// Into memory of the device's choice, as a caller gets it fastest.
+fn on_device<'a>(
+    clip: Clip,
+    workload: &'a Workload,
+) -> impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a {
+    move |_| {
+        std::hint::black_box(clip.evaluate(&workload.frames)?);
+        let timings = clip.engine().take_timings();
+        let parts = [
+            ("work lists", timings.work_lists),
+            ("submit to fence", timings.submit_to_fence),
+            ("device clock", timings.on_device),
+            ("read back", timings.read_back),
+        ];
+        Ok(parts
+            .map(|(name, time)| Part { name, time })
+            .into_iter()
+            .collect())
+    }
+}
+
+/// Every contestant in turn, round after round; the first round does not count.
+fn race<E>(
+    mut contestants: Vec<Contestant<'_, E>>,
+    output: &mut [Quat],
+    Turns { rounds, calls }: Turns,
+) -> Result<Vec<Row>, E> {
+    let mut times = vec![Vec::new(); contestants.len()];
+    let mut parts: Vec<Vec<(&str, Vec<Duration>)>> = vec![Vec::new(); contestants.len()];
+    for round in 0..=rounds {
+        for (i, contestant) in contestants.iter_mut().enumerate() {
+            let mut own = Vec::new();
+            let started = Instant::now();
+            for _ in 0..calls {
+                own = (contestant.action)(output)?;
+            }
+            let time = started.elapsed() / calls;
+            std::hint::black_box(&mut *output);
+            if round == 0 {
+                parts[i] = own.iter().map(|part| (part.name, Vec::new())).collect();
+                continue;
+            }
+            times[i].push(time);
+            for (of_part, part) in parts[i].iter_mut().zip(own) {
+                of_part.1.push(part.time);
+            }
+        }
+    }
+    let rows = contestants.into_iter().zip(times).zip(parts);
+    Ok(rows
+        .map(|((contestant, times), parts)| {
+            let parts = parts.into_iter().map(|(name, times)| (name, median(times)));
+            Row::new(contestant.name, median(times), parts.collect())
+        })
+        .collect())
+}
+
+fn median(mut times: Vec<Duration>) -> Duration {
+    times.sort();
+    times[times.len() / 2]
+}

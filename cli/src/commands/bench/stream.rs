@@ -1,0 +1,96 @@
+//! Results larger than memory: does evaluating hide behind writing?
+
+use std::fs::File;
+use std::io::{Seek, Write};
+
+use glam::Quat;
+use tumble::{Device, Engine, Error, Layout, Method};
+
+use crate::commands::bench::report::Section;
+use crate::commands::bench::workload::{Kind, Workload};
+use crate::commands::bench::{Contestant, Turns, race};
+use crate::messages::exit::{Failure, OUTPUT};
+
+/// Rotations of a chunk: 16 MB.
+const CHUNK: usize = 1 << 20;
+
+/// What a stream can end with.
+#[derive(Debug)]
+enum Ended {
+    Writing(std::io::Error),
+    Evaluating(Error),
+}
+
+impl From<Error> for Ended {
+    fn from(error: Error) -> Self {
+        Self::Evaluating(error)
+    }
+}
+
+/// A file on the disk, written anew each time.
+struct Sink(File);
+
+impl Sink {
+    fn write(&mut self, rotations: &[Quat]) -> Result<(), Ended> {
+        let written = self.0.write_all(bytemuck::cast_slice(rotations));
+        written.map_err(Ended::Writing)
+    }
+
+    /// Waits until all of it is on the disk, and forgets it.
+    fn finish(&mut self) -> Result<(), Ended> {
+        let mut finish = || {
+            self.0.sync_data()?;
+            self.0.rewind()?;
+            self.0.set_len(0)
+        };
+        finish().map_err(Ended::Writing)
+    }
+}
+
+pub(crate) fn measure(
+    workload: &Workload,
+    method: Method,
+    turns: Turns,
+) -> Result<Section, Failure> {
+    let (set, frames) = (&workload.set, &workload.frames);
+    let count = set.track_count() * workload.times.len();
+    let engine =
+        Engine::new(Device::Cpu).map_err(|error| crate::arguments::device::refused(&error))?;
+    let sink = || -> Result<Sink, Failure> {
+        let file = tempfile::tempfile().map_err(|error| Failure::writing("a file", &error))?;
+        Ok(Sink(file))
+    };
+    let stream = |take: &mut dyn FnMut(&[Quat]) -> Result<(), Ended>| {
+        engine.stream(set, method, frames, Layout::TrackMajor, CHUNK, |chunk| {
+            take(chunk.rotations)
+        })
+    };
+    let (mut alone, mut with) = (sink()?, sink()?);
+    let chunk = vec![Quat::IDENTITY; CHUNK];
+    let contestants = vec![
+        Contestant::new("writing alone", |_: &mut [Quat]| {
+            for start in (0..count).step_by(CHUNK) {
+                alone.write(&chunk[..CHUNK.min(count - start)])?;
+            }
+            alone.finish()?;
+            Ok(Vec::new())
+        }),
+        Contestant::new("CPU, evaluation alone", |_: &mut [Quat]| {
+            stream(&mut |rotations| {
+                std::hint::black_box(rotations);
+                Ok(())
+            })?;
+            Ok(Vec::new())
+        }),
+        Contestant::new("CPU, streamed", |_: &mut [Quat]| {
+            stream(&mut |rotations| with.write(rotations))?;
+            with.finish()?;
+            Ok(Vec::new())
+        }),
+    ];
+    let rows = race(contestants, &mut [], turns).map_err(|ended| match ended {
+        Ended::Writing(error) => Failure::new(OUTPUT, format!("a temporary file: {error}")),
+        Ended::Evaluating(error) => crate::arguments::device::refused(&error),
+    })?;
+    Ok(Section::new(Kind::Stream, method, count, rows))
+}

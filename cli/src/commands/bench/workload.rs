@@ -1,0 +1,136 @@
+//! What is measured: sets of keys and the samples asked of them, the same in every
+//! run.
+
+use fastrand::Rng;
+use glam::{DQuat, DVec3, Quat};
+use tumble::{Frames, TrackSet};
+
+/// A set, and the samples to evaluate.
+pub(crate) struct Workload {
+    pub(crate) set: TrackSet,
+    pub(crate) frames: Frames,
+    /// The time of each sample, seconds; of each track's only sample where
+    /// `per_track`.
+    pub(crate) times: Vec<f64>,
+    pub(crate) per_track: bool,
+}
+
+/// The workloads that there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Kind {
+    /// 4096 tracks of 26 uneven keys, 1200 frames
+    Sparse,
+    /// 4096 tracks of 2400 keys at 120 Hz, 1200 frames between them
+    Dense,
+    /// 4 tracks of 26 keys, 500 frames: the time of one call
+    Small,
+    /// 1 000 000 tracks of 2 keys, one sample each
+    Crowd,
+    /// 1 track of 10 000 000 keys at 120 Hz, 60 frames a second
+    Long,
+    /// 8 GiB of rotations, written to a file in chunks
+    Stream,
+}
+
+/// Frames per second, in every workload.
+const RATE: f64 = 60.0;
+
+impl Kind {
+    /// Makes the workload with one `shrink`th of its tracks, or of its keys where
+    /// there is one track.
+    pub(crate) fn workload(self, shrink: usize) -> Workload {
+        let few = |count: usize| (count / shrink).max(1);
+        match self {
+            Self::Sparse => frames(uneven(few(4096), 26, 1200.0 / RATE), 0.0, 1200),
+            Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
+            // Half way between keys: on them there would be nothing to evaluate.
+            Self::Dense => frames(even(few(4096), 2400), 1.0 / 240.0, 1199),
+            Self::Long => {
+                let keys = few(10_000_000).max(4);
+                frames(even(1, keys), 1.0 / 240.0, keys / 2 - 1)
+            }
+            Self::Stream => {
+                let count = few(1 << 17);
+                frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
+            }
+            Self::Crowd => crowd(few(1_000_000)),
+        }
+    }
+}
+
+fn frames(set: TrackSet, start: f64, count: usize) -> Workload {
+    let end = start + (count - 1) as f64 / RATE;
+    Workload {
+        set,
+        frames: Frames::fps(RATE as u32).between(start, end),
+        times: (0..count).map(|k| start + k as f64 / RATE).collect(),
+        per_track: false,
+    }
+}
+
+/// Keys at steps of 1/4 to 7/4 of the mean, each up to a radian from the last.
+fn uneven(tracks: usize, keys: usize, seconds: f64) -> TrackSet {
+    let mut random = Rng::with_seed(1);
+    let mut set = TrackSet::new();
+    for _ in 0..tracks {
+        let mut times = vec![0.0];
+        for key in 1..keys {
+            times.push(times[key - 1] + between(&mut random, 0.25, 1.75));
+        }
+        let scale = seconds / times[keys - 1];
+        times.iter_mut().for_each(|time| *time *= scale);
+        push(&mut set, &times, walk(&mut random, keys, 1.0));
+    }
+    set
+}
+
+/// Keys at 120 Hz, as motion capture gives them: up to 3 degrees a step.
+fn even(tracks: usize, keys: usize) -> TrackSet {
+    let mut random = Rng::with_seed(2);
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..keys).map(|k| k as f64 / 120.0).collect();
+    for _ in 0..tracks {
+        push(&mut set, &times, walk(&mut random, keys, 0.05));
+    }
+    set
+}
+
+/// Two poses and one moment for each track.
+fn crowd(tracks: usize) -> Workload {
+    let mut random = Rng::with_seed(3);
+    let mut set = TrackSet::new();
+    for _ in 0..tracks {
+        push(&mut set, &[0.0, 1.0], walk(&mut random, 2, 1.0));
+    }
+    let times: Vec<f64> = (0..tracks)
+        .map(|_| between(&mut random, 0.0, 1.0))
+        .collect();
+    Workload {
+        set,
+        frames: Frames::at_each(times.clone()),
+        times,
+        per_track: true,
+    }
+}
+
+fn push(set: &mut TrackSet, times: &[f64], keys: Vec<Quat>) {
+    set.push("", times, &keys).expect("unit keys in order");
+}
+
+/// Rotations, each up to `step` radians from the one before.
+fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
+    let mut rotation = DQuat::IDENTITY;
+    let mut next = || {
+        let axis = DVec3::from_array([(); 3].map(|()| between(random, -1.0, 1.0)));
+        let angle = between(random, 0.0, step);
+        rotation *= DQuat::from_axis_angle(axis.normalize_or(DVec3::X), angle);
+        rotation = rotation.normalize();
+        rotation.as_quat()
+    };
+    (0..keys).map(|_| next()).collect()
+}
+
+fn between(random: &mut Rng, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.f64()
+}

@@ -1,0 +1,92 @@
+//! `tumble check`: are the results of a batch still what they were?
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use rayon::prelude::*;
+
+use crate::batch::digest;
+use crate::batch::manifest::{Entry, Lines, NAME};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::progress::busy;
+use crate::messages::words;
+
+/// Check results against the manifest of their directory, bit for bit
+#[derive(Debug, Args)]
+#[command(after_help = "\
+`tumble eval` writes a manifest into every directory of results: for each result a line of
+JSON with the SHA-256 of the result and of its input, the options, the kernels, the program's
+version and the device.
+
+Examples:
+  tumble check results/manifest.jsonl
+  tumble check results")]
+pub(crate) struct Arguments {
+    /// The manifest, or its directory
+    manifest: PathBuf,
+}
+
+/// What is wrong with one result.
+enum Fault {
+    Damaged,
+    Unreadable(io::Error),
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let given = &arguments.manifest;
+    let path = if given.is_dir() {
+        given.join(NAME)
+    } else {
+        given.clone()
+    };
+    let shown = path.display();
+    let bytes = std::fs::read(&path).map_err(|error| {
+        Failure::new(
+            ALL_INPUTS,
+            format!("{shown}: the manifest cannot be read: {error}"),
+        )
+    })?;
+    let Lines { entries, damaged } = Lines::parse(&bytes);
+    if entries.is_empty() {
+        let message = format!("{shown}: is no manifest; `tumble eval` writes one, {NAME}");
+        return Err(Failure::new(ALL_INPUTS, message));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let entries: Vec<Entry> = entries.into_values().collect();
+    let faults: Vec<(&Entry, Fault)> = busy("checking", || {
+        let faulty = |entry| fault(folder, entry).map(|fault| (entry, fault));
+        entries.par_iter().filter_map(faulty).collect()
+    });
+    for (entry, fault) in &faults {
+        let output = folder.join(&entry.output);
+        let output = output.display();
+        words::error(&match fault {
+            Fault::Damaged => format!("{output}: other bits than when it was written"),
+            Fault::Unreadable(error) => format!("{output}: cannot be read: {error}"),
+        });
+    }
+    if damaged > 0 {
+        words::error(&format!(
+            "{shown}: {} damaged",
+            words::count(damaged, "line")
+        ));
+    }
+    let total = words::count(entries.len(), "result");
+    if faults.len() + damaged > 0 {
+        let message = format!(
+            "{} of {total} differ; `tumble eval … --resume` makes them again",
+            faults.len()
+        );
+        return Err(Failure::new(DIFFERENCE, message));
+    }
+    words::listing(&format!("{total}, every bit as written\n"))
+}
+
+fn fault(folder: &Path, entry: &Entry) -> Option<Fault> {
+    match digest::of_file(&folder.join(&entry.output)) {
+        Ok(hash) if hash == entry.output_sha256 => None,
+        Ok(_) => Some(Fault::Damaged),
+        Err(error) => Some(Fault::Unreadable(error)),
+    }
+}

@@ -1,0 +1,61 @@
+//! The commands: a file or a folder each, with its arguments and what it does with them.
+
+pub(crate) mod bench;
+pub(crate) mod check;
+pub(crate) mod completions;
+pub(crate) mod devices;
+pub(crate) mod eval;
+pub(crate) mod explain;
+pub(crate) mod generate;
+pub(crate) mod info;
+pub(crate) mod methods;
+pub(crate) mod picture;
+pub(crate) mod plot;
+pub(crate) mod probe;
+pub(crate) mod render;
+pub(crate) mod verify;
+pub(crate) mod view;
+
+use clap::Subcommand;
+
+use crate::messages::exit::Failure;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Eval(Box<eval::Arguments>),
+    Verify(verify::Arguments),
+    Devices(devices::Arguments),
+    Info(info::Arguments),
+    Generate(generate::Arguments),
+    Methods(methods::Arguments),
+    Plot(Box<plot::Arguments>),
+    View(Box<view::Arguments>),
+    Render(Box<render::Arguments>),
+    Bench(bench::Arguments),
+    Check(check::Arguments),
+    Explain(explain::Arguments),
+    Completions(completions::Arguments),
+    #[command(hide = true)]
+    ProbeDrivers(probe::Arguments),
+}
+
+impl Command {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self {
+            Self::Eval(arguments) => eval::run(&arguments),
+            Self::Verify(arguments) => verify::run(&arguments),
+            Self::Devices(arguments) => devices::run(&arguments),
+            Self::Info(arguments) => info::run(&arguments),
+            Self::Generate(arguments) => generate::run(&arguments),
+            Self::Methods(arguments) => methods::run(&arguments),
+            Self::Plot(arguments) => plot::run(&arguments),
+            Self::View(arguments) => view::run(&arguments),
+            Self::Render(arguments) => render::run(&arguments),
+            Self::Bench(arguments) => bench::run(&arguments),
+            Self::Check(arguments) => check::run(&arguments),
+            Self::Explain(arguments) => explain::run(&arguments),
+            Self::Completions(arguments) => completions::run(&arguments),
+            Self::ProbeDrivers(arguments) => probe::run(&arguments),
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! What is drawn of a set: components, speeds, errors, paths on the sphere.
+
+use glam::{DVec3, Quat, Vec3};
+use tumble::reference::{Curve as Reference, angle_between};
+use tumble::verify::error_bound;
+use tumble::{Axes as OwnAxes, Interpolation, Quantity};
+
+use crate::arguments::device::Opened;
+use crate::commands::plot::figure::{
+    Axes, Axis, Curve, Dots, Entry, Figure, Mark, Panel, range_of, thinned,
+};
+use crate::commands::plot::source::Source;
+use crate::commands::plot::sphere::{graticule, seen, side};
+use crate::messages::colours::{self, COMPONENTS, INK};
+use crate::messages::exit::Failure;
+
+/// Components of a quaternion in the order of dimensions.
+pub(crate) const NAMES: [&str; 4] = ["w", "x", "y", "z"];
+
+/// Errors below this are none: the sample is exact.
+const EXACT: f64 = 1e-12;
+
+/// What a figure shows. Boxes and dimensions count from 0 here.
+#[derive(Debug, Clone)]
+pub(crate) enum Subject {
+    /// All four components of boxes.
+    Components(Vec<usize>),
+    /// Single components: w x y z of the first box, then of the second …
+    Dimensions(Vec<usize>),
+    /// Angular speeds of boxes.
+    Speed(Vec<usize>),
+    /// Errors against the f64 reference.
+    Error(Vec<usize>),
+    /// Where an axis of a box points, seen from its parent.
+    Sphere(Vec<usize>, Vec3),
+}
+
+impl Source<'_> {
+    pub(crate) fn figure(&self, device: &mut Opened, subject: &Subject) -> Result<Figure, Failure> {
+        let (what, panels): (_, Result<Vec<Panel>, Failure>) = match subject {
+            Subject::Components(boxes) if self.interpolations.len() == 1 => {
+                let panel = |&index: &usize| self.components(device, index, &[0, 1, 2, 3]);
+                ("components", boxes.iter().map(panel).collect())
+            }
+            Subject::Components(boxes) => {
+                let places = boxes.iter().flat_map(|index| index * 4..index * 4 + 4);
+                let panel = |place| self.components(device, place / 4, &[place % 4]);
+                ("components", places.map(panel).collect())
+            }
+            Subject::Dimensions(places) => {
+                let panel = |place| self.components(device, place / 4, &[place % 4]);
+                ("components", places.iter().copied().map(panel).collect())
+            }
+            Subject::Speed(boxes) => {
+                let panel = |&index| self.speed(device, index);
+                ("angular speed", boxes.iter().map(panel).collect())
+            }
+            Subject::Error(boxes) => {
+                let panel = |&index| self.error(device, index);
+                let panels = boxes.iter().map(panel).collect();
+                ("error against the f64 reference", panels)
+            }
+            Subject::Sphere(boxes, axis) => {
+                let panel = |&index| self.sphere(device, index, *axis);
+                let panels = boxes.iter().map(panel).collect();
+                (
+                    "where an axis of each box points, seen from its parent",
+                    panels,
+                )
+            }
+        };
+        let panels = panels?;
+        let columns = match (subject, panels.len()) {
+            (Subject::Components(_), _) if self.interpolations.len() > 1 => 4,
+            (Subject::Sphere(..), 2) => 2,
+            (_, 0..3) => 1,
+            _ => 2,
+        };
+        let by_component = match (subject, self.interpolations) {
+            (Subject::Components(_), [one]) => Some(one.method),
+            _ => None,
+        };
+        let method = by_component.map_or(String::new(), |method| format!("{method}; "));
+        Ok(Figure {
+            title: format!("{}: {what}", self.name),
+            subtitle: format!("{method}{}; evaluated on {}", self.about, device.label),
+            legend: self.legend(subject, by_component.is_some()),
+            columns,
+            panels,
+        })
+    }
+
+    fn legend(&self, subject: &Subject, by_component: bool) -> Vec<Entry> {
+        let line = |label: String, colour| Entry {
+            label,
+            colour,
+            mark: Mark::Line,
+        };
+        let mut legend: Vec<Entry> = if by_component {
+            let of = |(name, colour): (&str, colours::Colour)| line(name.to_owned(), colour);
+            NAMES.into_iter().zip(COMPONENTS).map(of).collect()
+        } else {
+            let of = |one: &Interpolation| {
+                line(one.method.name.to_owned(), colours::of_method(one.method))
+            };
+            self.interpolations.iter().map(of).collect()
+        };
+        let (label, mark) = match subject {
+            Subject::Speed(_) => return legend,
+            Subject::Error(_) => ("bound", Mark::Dashes),
+            _ => ("key", Mark::Dot),
+        };
+        legend.push(Entry {
+            label: label.to_owned(),
+            colour: INK,
+            mark,
+        });
+        legend
+    }
+
+    /// Components of one box: one colour each where they share a panel, else the methods'.
+    fn components(
+        &self,
+        device: &mut Opened,
+        index: usize,
+        components: &[usize],
+    ) -> Result<Panel, Failure> {
+        let mut curves = Vec::new();
+        let mut dots = Vec::new();
+        let together = components.len() > 1;
+        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+            let rotations = self.rotations(device, index, interpolation)?;
+            let keys = self.keys(index, &rotations);
+            for &component in components {
+                let (colour, ink) = match together {
+                    true => (COMPONENTS[component], COMPONENTS[component]),
+                    false => (colours::of_method(interpolation.method), INK),
+                };
+                let values = rotations.iter().map(|q| value(q, component));
+                curves.push(Curve {
+                    colour,
+                    width: self.width(order),
+                    opacity: 1.0,
+                    pieces: vec![thinned(&self.points(values), 2000)],
+                });
+                if order == 0 {
+                    let of = |&(x, key): &(f64, Quat)| (x, value(&key, component));
+                    dots.push(Dots {
+                        colour: ink,
+                        opacity: 1.0,
+                        points: keys.iter().map(of).collect(),
+                    });
+                }
+            }
+        }
+        let shown = curves
+            .iter()
+            .flat_map(|curve| curve.pieces.iter().flatten());
+        let shown = shown.chain(dots.iter().flat_map(|dots| &dots.points));
+        let range = range_of(shown.map(|point| point.1));
+        let (title, label) = match components {
+            [one] => {
+                let place = index * 4 + one + 1;
+                let name = NAMES[*one];
+                (
+                    format!("dimension {place}: {name} of box {}", index + 1),
+                    name,
+                )
+            }
+            _ => {
+                let (first, last) = (index * 4 + 1, index * 4 + 4);
+                let title = format!("box {}: dimensions {first} to {last}", index + 1);
+                (title, "component")
+            }
+        };
+        Ok(self.panel(title, label, range, curves, dots))
+    }
+
+    /// Where curves may lie on each other, those drawn first are broader.
+    fn width(&self, order: usize) -> f64 {
+        let above = self.interpolations.len() - 1 - order;
+        1.6 + 1.8 * above.min(3) as f64
+    }
+
+    fn panel(
+        &self,
+        title: String,
+        label: &str,
+        range: std::ops::Range<f64>,
+        curves: Vec<Curve>,
+        dots: Vec<Dots>,
+    ) -> Panel {
+        Panel {
+            title,
+            axes: Axes::Plane {
+                x: self.x.clone(),
+                y: Axis {
+                    label: label.to_owned(),
+                    range,
+                    powers: false,
+                },
+            },
+            curves,
+            dots,
+            uprights: Vec::new(),
+            level: None,
+        }
+    }
+
+    /// Angular speed in rad/s; keys as upright lines.
+    fn speed(&self, device: &mut Opened, index: usize) -> Result<Panel, Failure> {
+        let mut curves = Vec::new();
+        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+            let velocity = Interpolation {
+                quantity: Quantity::Velocity(OwnAxes::Body),
+                ..interpolation
+            };
+            let velocities = self.evaluate(device, index, velocity)?;
+            let speeds = velocities.iter().map(|v| f64::from(v.xyz().length()));
+            curves.push(Curve {
+                colour: colours::of_method(interpolation.method),
+                width: self.width(order).min(2.5),
+                opacity: 1.0,
+                pieces: vec![thinned(&self.points(speeds), 2000)],
+            });
+        }
+        let all = curves
+            .iter()
+            .flat_map(|curve| curve.pieces.iter().flatten());
+        let high = range_of(all.map(|point| point.1).chain([0.0])).end;
+        let title = format!("box {}", index + 1);
+        let mut panel = self.panel(title, "angular speed, rad/s", 0.0..high, curves, vec![]);
+        panel.uprights = self.key_places(index);
+        Ok(panel)
+    }
+
+    /// Angle to the reference, radians, as powers of ten; where there is none, a gap.
+    fn error(&self, device: &mut Opened, index: usize) -> Result<Panel, Failure> {
+        let mut curves = Vec::new();
+        let mut level = f64::NEG_INFINITY;
+        for &interpolation in self.interpolations {
+            let rotations = self.evaluate(device, index, interpolation)?;
+            let reference = Reference::of(&interpolation, self.set.track(index));
+            let errors = rotations.iter().enumerate().map(|(place, rotation)| {
+                let time = self.timeline.time(0, place);
+                angle_between(rotation.as_dquat(), reference.rotation(time))
+            });
+            let points = self.points(errors);
+            let pieces = points
+                .split(|point| point.1 < EXACT)
+                .filter(|piece| !piece.is_empty())
+                .map(|piece| {
+                    let powers = piece.iter().map(|&(x, error)| (x, error.log10()));
+                    thinned(&powers.collect::<Vec<_>>(), 2000)
+                });
+            curves.push(Curve {
+                colour: colours::of_method(interpolation.method),
+                width: 1.2,
+                opacity: 1.0,
+                pieces: pieces.collect(),
+            });
+            level = level.max(error_bound(interpolation.form()).log10());
+        }
+        let all = curves
+            .iter()
+            .flat_map(|curve| curve.pieces.iter().flatten());
+        let range = range_of(all.map(|point| point.1).chain([level, level - 3.0]));
+        let title = format!("box {}", index + 1);
+        let mut panel = self.panel(title, "error, rad", range, curves, vec![]);
+        if let Axes::Plane { y, .. } = &mut panel.axes {
+            y.range = y.range.start.floor()..(y.range.end + 0.3);
+            y.powers = true;
+        }
+        panel.uprights = self.key_places(index);
+        panel.level = Some(level);
+        Ok(panel)
+    }
+
+    /// The path of the end of an axis on the unit sphere; what lies behind is faint.
+    fn sphere(&self, device: &mut Opened, index: usize, axis: Vec3) -> Result<Panel, Failure> {
+        let mut curves = graticule();
+        let mut dots = Vec::new();
+        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+            let rotations = self.evaluate(device, index, interpolation)?;
+            let path: Vec<DVec3> = rotations.iter().map(|&q| seen(q, axis)).collect();
+            let colour = colours::of_method(interpolation.method);
+            for (front, opacity) in [(false, 0.3), (true, 1.0)] {
+                curves.push(Curve {
+                    colour,
+                    width: self.width(order).min(3.0),
+                    opacity,
+                    pieces: side(&path, front),
+                });
+            }
+        }
+        let track = self.set.track(index);
+        let keys: Vec<DVec3> = track.keys.iter().map(|&key| seen(key, axis)).collect();
+        for (front, opacity) in [(false, 0.3), (true, 1.0)] {
+            let points = keys.iter().filter(|key| (key.z >= 0.0) == front);
+            dots.push(Dots {
+                colour: INK,
+                opacity,
+                points: points.map(|key| (key.x, key.y)).collect(),
+            });
+        }
+        Ok(Panel {
+            title: format!("box {}", index + 1),
+            axes: Axes::Sphere,
+            curves,
+            dots,
+            uprights: Vec::new(),
+            level: None,
+        })
+    }
+}
+
+fn value(rotation: &Quat, component: usize) -> f64 {
+    let [x, y, z, w] = rotation.to_array();
+    [w, x, y, z][component].into()
+}

@@ -1,0 +1,328 @@
+//! Draws a figure as SVG or PNG.
+
+use std::io;
+
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use resvg::{tiny_skia, usvg};
+
+use crate::commands::picture;
+use crate::commands::plot::figure::{Axes, Axis, Entry, Figure, Mark, Panel};
+use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};
+
+type Area<'a, DB> = DrawingArea<DB, Shift>;
+type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// The name that people's own fonts go by in SVG; in PNG it is `DejaVu` Sans.
+const FONT: &str = "sans-serif";
+/// Pixels of PNG for one of SVG.
+const PIXELS: u32 = 2;
+/// Units of an SVG's drawing for one of its pixels: plotters knows whole ones only.
+const FINER: u32 = 10;
+const MARGIN: f64 = 16.0;
+
+/// A figure as the text of an SVG file.
+pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
+    let styles = [
+        (FontStyle::Normal, dejavu::sans::regular()),
+        (FontStyle::Bold, dejavu::sans::bold()),
+    ];
+    // Registered once; more often does no harm.
+    for (style, font) in styles {
+        plotters::style::register_font(FONT, style, font)
+            .map_err(|_| io::Error::other("the font built in cannot be read"))?;
+    }
+    let (width, height) = size(figure);
+    let (fine_width, fine_height) = (width * FINER, height * FINER);
+    let mut text = String::new();
+    let canvas = SVGBackend::with_string(&mut text, (fine_width, fine_height)).into_drawing_area();
+    let brush = Brush {
+        scale: FINER.into(),
+    };
+    brush
+        .figure(&canvas, figure)
+        .and_then(|()| canvas.present())
+        .map_err(|error| io::Error::other(error.to_string()))?;
+    drop(canvas);
+    let fine = format!("<svg width=\"{fine_width}\" height=\"{fine_height}\"");
+    Ok(text.replacen(
+        &fine,
+        &format!("<svg width=\"{width}\" height=\"{height}\""),
+        1,
+    ))
+}
+
+/// A figure as the bytes of a PNG file.
+pub(crate) fn png(figure: &Figure) -> io::Result<Vec<u8>> {
+    let tree =
+        usvg::Tree::from_str(&svg(figure)?, &picture::svg_options()).map_err(io::Error::other)?;
+    let (width, height) = size(figure);
+    let (width, height) = (width * PIXELS, height * PIXELS);
+    let mut canvas = tiny_skia::Pixmap::new(width, height)
+        .ok_or_else(|| io::Error::other("too large a picture"))?;
+    let scale = tiny_skia::Transform::from_scale(PIXELS as f32, PIXELS as f32);
+    resvg::render(&tree, scale, &mut canvas.as_mut());
+    // The ground is white, so that nothing is transparent.
+    let opaque = canvas.data().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+    let pixels: Vec<u8> = opaque.copied().collect();
+    let mut bytes = Vec::new();
+    picture::png(&mut bytes, width, height, &pixels)?;
+    Ok(bytes)
+}
+
+/// Width and height in the pixels of SVG.
+fn size(figure: &Figure) -> (u32, u32) {
+    let (columns, rows) = grid(figure);
+    let sphere = figure
+        .panels
+        .iter()
+        .any(|panel| matches!(panel.axes, Axes::Sphere));
+    let (width, height) = match (columns, sphere) {
+        (1, false) => (800, if rows == 1 { 380 } else { 240 }),
+        (1, true) => (640, 600),
+        (_, true) => (400, 400),
+        (2, false) => (560, 260),
+        _ => (400, 220),
+    };
+    let width = columns * width;
+    let lines = legend_lines(figure, width as f64);
+    (
+        width as u32,
+        (header(lines) as usize + rows * height + 8) as u32,
+    )
+}
+
+fn grid(figure: &Figure) -> (usize, usize) {
+    let columns = figure.columns.max(1);
+    (columns, figure.panels.len().div_ceil(columns).max(1))
+}
+
+/// Height of title, subtitle and legend.
+fn header(legend_lines: usize) -> f64 {
+    62.0 + 22.0 * legend_lines as f64
+}
+
+const LEGEND_MARK: f64 = 26.0;
+const LEGEND_TEXT: f64 = 13.0;
+const LEGEND_GAP: f64 = 22.0;
+
+/// How wide an entry of the legend is, with the gap after it.
+fn entry_width(entry: &Entry) -> f64 {
+    let font = FontDesc::new(FontFamily::SansSerif, 100.0, FontStyle::Normal);
+    let text = font
+        .box_size(&entry.label)
+        .map_or(0.0, |(width, _)| f64::from(width) / 100.0);
+    LEGEND_MARK + 6.0 + text * LEGEND_TEXT + LEGEND_GAP
+}
+
+fn legend_lines(figure: &Figure, width: f64) -> usize {
+    places(figure, width)
+        .last()
+        .map_or(0, |&(_, line)| line + 1)
+}
+
+/// Where each entry of the legend lies: from the left, and in which line.
+fn places(figure: &Figure, width: f64) -> Vec<(f64, usize)> {
+    let (mut left, mut line) = (MARGIN, 0);
+    let place = |entry: &Entry| {
+        let own = entry_width(entry);
+        if left + own > width && left > MARGIN {
+            (left, line) = (MARGIN, line + 1);
+        }
+        let place = (left, line);
+        left += own;
+        place
+    };
+    figure.legend.iter().map(place).collect()
+}
+
+fn rgb([r, g, b]: Colour) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+/// Draws at a scale: lines and letters grow with the picture.
+struct Brush {
+    scale: f64,
+}
+
+impl Brush {
+    fn px(&self, length: f64) -> i32 {
+        (length * self.scale).round() as i32
+    }
+
+    fn line(&self, colour: Colour, width: f64) -> ShapeStyle {
+        ShapeStyle {
+            color: rgb(colour).to_rgba(),
+            filled: false,
+            stroke_width: self.px(width).max(1) as u32,
+        }
+    }
+
+    fn text(&self, size: f64, style: FontStyle, colour: Colour) -> TextStyle<'static> {
+        let font = FontDesc::new(FontFamily::SansSerif, size * self.scale, style);
+        font.color(&rgb(colour))
+    }
+
+    fn figure<DB: DrawingBackend>(
+        &self,
+        canvas: &Area<'_, DB>,
+        figure: &Figure,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        canvas.fill(&WHITE)?;
+        let left = self.px(MARGIN);
+        let title = self.text(18.0, FontStyle::Bold, INK);
+        canvas.draw_text(&figure.title, &title, (left, self.px(12.0)))?;
+        let subtitle = self.text(12.0, FontStyle::Normal, PALE);
+        canvas.draw_text(&figure.subtitle, &subtitle, (left, self.px(34.0)))?;
+        let (width, height) = canvas.dim_in_pixel();
+        let nominal = f64::from(width) / self.scale;
+        for (entry, (left, line)) in figure.legend.iter().zip(places(figure, nominal)) {
+            self.entry(canvas, entry, left, 70.0 + 22.0 * line as f64)?;
+        }
+        let top = self.px(header(legend_lines(figure, nominal)));
+        let body = canvas
+            .clone()
+            .shrink((0, top), (width as i32, height as i32 - top - self.px(8.0)));
+        let (columns, rows) = grid(figure);
+        let areas = body.split_evenly((rows, columns));
+        for (panel, area) in figure.panels.iter().zip(&areas) {
+            match &panel.axes {
+                Axes::Plane { x, y } => self.plane(area, panel, x, y)?,
+                Axes::Sphere => self.sphere(area, panel)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// One entry of the legend, its middle at that height.
+    fn entry<DB: DrawingBackend>(
+        &self,
+        canvas: &Area<'_, DB>,
+        entry: &Entry,
+        left: f64,
+        height: f64,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let at = |x: f64| (self.px(left + x), self.px(height));
+        match entry.mark {
+            Mark::Line => {
+                let line = vec![at(0.0), at(LEGEND_MARK)];
+                canvas.draw(&PathElement::new(line, self.line(entry.colour, 2.5)))?;
+            }
+            Mark::Dashes => {
+                for start in [0.0, 10.0, 20.0] {
+                    let dash = vec![at(start), at(start + 6.0)];
+                    canvas.draw(&PathElement::new(dash, self.line(entry.colour, 1.5)))?;
+                }
+            }
+            Mark::Dot => {
+                let dot = rgb(entry.colour).filled();
+                canvas.draw(&Circle::new(at(LEGEND_MARK / 2.0), self.px(3.5), dot))?;
+            }
+        }
+        let style = self
+            .text(LEGEND_TEXT, FontStyle::Normal, INK)
+            .pos(Pos::new(HPos::Left, VPos::Center));
+        canvas.draw_text(&entry.label, &style, at(LEGEND_MARK + 6.0))
+    }
+
+    fn plane<DB: DrawingBackend>(
+        &self,
+        area: &Area<'_, DB>,
+        panel: &Panel,
+        x: &Axis,
+        y: &Axis,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let mut chart = ChartBuilder::on(area)
+            .caption(&panel.title, self.text(13.0, FontStyle::Bold, INK))
+            .margin(self.px(6.0))
+            .margin_right(self.px(14.0))
+            .x_label_area_size(self.px(34.0))
+            .y_label_area_size(self.px(52.0))
+            .build_cartesian_2d(x.range.clone(), y.range.clone())?;
+        let (width, height) = chart.plotting_area().dim_in_pixel();
+        let ticks = match y.powers {
+            true => (y.range.end - y.range.start) as usize + 1,
+            false => 0,
+        };
+        let fitting = |pixels: u32, each: f64| (f64::from(pixels) / self.scale / each) as usize;
+        chart
+            .configure_mesh()
+            .axis_style(self.line(AXIS, 1.0))
+            .bold_line_style(self.line(GRID, 1.0))
+            .light_line_style(TRANSPARENT)
+            .label_style(self.text(11.0, FontStyle::Normal, PALE))
+            .axis_desc_style(self.text(12.0, FontStyle::Normal, PALE))
+            .x_labels(fitting(width, 60.0).max(2))
+            .y_labels(ticks.max(fitting(height, 28.0).max(3)))
+            .x_label_formatter(&|value| label(x, *value))
+            .y_label_formatter(&|value| label(y, *value))
+            .x_desc(&*x.label)
+            .y_desc(&*y.label)
+            .draw()?;
+        for &place in &panel.uprights {
+            let line = vec![(place, y.range.start), (place, y.range.end)];
+            chart.draw_series([PathElement::new(line, self.line(AXIS, 0.5))])?;
+        }
+        if let Some(level) = panel.level {
+            let line = [(x.range.start, level), (x.range.end, level)];
+            let dashes = (self.px(6.0), self.px(4.0));
+            let style = self.line(INK, 1.5);
+            chart.draw_series(DashedLineSeries::new(line, dashes.0, dashes.1, style))?;
+        }
+        self.contents(&mut chart, panel)
+    }
+
+    /// Curves, and dots over them.
+    fn contents<DB: DrawingBackend>(
+        &self,
+        chart: &mut Chart<'_, DB>,
+        panel: &Panel,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        for curve in &panel.curves {
+            let mut style = self.line(curve.colour, curve.width);
+            style.color = style.color.mix(curve.opacity);
+            for piece in &curve.pieces {
+                chart.draw_series([PathElement::new(piece.clone(), style)])?;
+            }
+        }
+        for dots in &panel.dots {
+            let style = rgb(dots.colour).mix(dots.opacity).filled();
+            let dot = |&point: &(f64, f64)| Circle::new(point, self.px(3.0), style);
+            chart.draw_series(dots.points.iter().map(dot))?;
+        }
+        Ok(())
+    }
+
+    fn sphere<DB: DrawingBackend>(
+        &self,
+        area: &Area<'_, DB>,
+        panel: &Panel,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let (width, height) = area.dim_in_pixel();
+        // The title takes some of the height.
+        let room = f64::from(self.px(24.0));
+        let aspect = f64::from(width) / (f64::from(height) - room).max(1.0);
+        let (x, y) = (1.1 * aspect.max(1.0), 1.1 * (1.0 / aspect).max(1.0));
+        let mut chart = ChartBuilder::on(area)
+            .caption(&panel.title, self.text(13.0, FontStyle::Bold, INK))
+            .build_cartesian_2d(-x..x, -y..y)?;
+        self.contents(&mut chart, panel)
+    }
+}
+
+/// A tick's label: no more digits than it has; of powers of ten, whole ones only.
+fn label(axis: &Axis, value: f64) -> String {
+    if axis.powers {
+        let whole = (value - value.round()).abs() < 1e-6;
+        return if whole {
+            format!("1e{value:.0}")
+        } else {
+            String::new()
+        };
+    }
+    let text = format!("{value:.4}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0" } else { text }.to_owned()
+}

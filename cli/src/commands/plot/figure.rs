@@ -1,0 +1,148 @@
+//! What a picture shows, before anything is drawn.
+
+use std::ops::Range;
+
+use crate::messages::colours::Colour;
+
+/// A grid of panels under a title and one legend.
+#[derive(Debug, Clone)]
+pub(crate) struct Figure {
+    pub(crate) title: String,
+    pub(crate) subtitle: String,
+    pub(crate) legend: Vec<Entry>,
+    pub(crate) columns: usize,
+    pub(crate) panels: Vec<Panel>,
+}
+
+/// A line of the legend.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    pub(crate) label: String,
+    pub(crate) colour: Colour,
+    pub(crate) mark: Mark,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mark {
+    Line,
+    Dot,
+    Dashes,
+}
+
+/// One pair of axes and what is drawn between them.
+#[derive(Debug, Clone)]
+pub(crate) struct Panel {
+    pub(crate) title: String,
+    pub(crate) axes: Axes,
+    pub(crate) curves: Vec<Curve>,
+    pub(crate) dots: Vec<Dots>,
+    /// Where upright lines stand: keys.
+    pub(crate) uprights: Vec<f64>,
+    /// Where a dashed level line lies: a bound.
+    pub(crate) level: Option<f64>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Axes {
+    Plane {
+        x: Axis,
+        y: Axis,
+    },
+    /// A ball seen from afar, of radius 1 about the origin; depth is left out.
+    Sphere,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Axis {
+    pub(crate) label: String,
+    pub(crate) range: Range<f64>,
+    /// The values are powers of ten.
+    pub(crate) powers: bool,
+}
+
+/// A line through points, in pieces where it is interrupted.
+#[derive(Debug, Clone)]
+pub(crate) struct Curve {
+    pub(crate) colour: Colour,
+    pub(crate) width: f64,
+    /// From 0, not there, to 1.
+    pub(crate) opacity: f64,
+    pub(crate) pieces: Vec<Vec<(f64, f64)>>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Dots {
+    pub(crate) colour: Colour,
+    pub(crate) opacity: f64,
+    pub(crate) points: Vec<(f64, f64)>,
+}
+
+/// The range of an axis that shows all values, with a little room.
+pub(crate) fn range_of(values: impl IntoIterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values
+        .into_iter()
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+    if low > high {
+        return 0.0..1.0;
+    }
+    // Of something constant, its surroundings.
+    let room = ((high - low) * 0.05).max(high.abs().max(1e-3) * 1e-3);
+    low - room..high + room
+}
+
+/// At most four points for each of `columns` columns, which look the same: the first, the
+/// lowest, the highest and the last of each column.
+pub(crate) fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
+    if points.len() <= 4 * columns {
+        return points.to_vec();
+    }
+    let mut kept = Vec::with_capacity(4 * columns);
+    for column in points.chunks(points.len().div_ceil(columns)) {
+        let lowest = (0..column.len()).min_by(|&a, &b| column[a].1.total_cmp(&column[b].1));
+        let highest = (0..column.len()).max_by(|&a, &b| column[a].1.total_cmp(&column[b].1));
+        let mut places = vec![
+            0,
+            lowest.unwrap_or(0),
+            highest.unwrap_or(0),
+            column.len() - 1,
+        ];
+        places.sort_unstable();
+        places.dedup();
+        kept.extend(places.into_iter().map(|place| column[place]));
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_ends_and_extremes() {
+        let mut points: Vec<(f64, f64)> = (0..10_000).map(|i| (f64::from(i), 0.0)).collect();
+        points[1234].1 = 5.0;
+        points[8765].1 = -5.0;
+        let kept = thinned(&points, 100);
+        assert!(kept.len() <= 400);
+        assert!(
+            [points[0], points[1234], points[8765], points[9999]]
+                .iter()
+                .all(|point| kept.contains(point))
+        );
+        assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        assert_eq!(thinned(&points[..50], 100), points[..50]);
+    }
+
+    #[test]
+    fn a_range_shows_every_value_and_is_never_empty() {
+        for values in [vec![], vec![0.0], vec![3.0, 3.0], vec![f64::NAN, -1.0, 2.0]] {
+            let range = range_of(values.iter().copied());
+            assert!(range.start < range.end, "{values:?}: {range:?}");
+            let finite = values.iter().filter(|value| value.is_finite());
+            assert!(finite.into_iter().all(|value| range.contains(value)));
+        }
+    }
+}

@@ -1,0 +1,405 @@
+//! `tumble plot`: pictures of what interpolation makes of keys.
+
+pub(crate) mod curves;
+pub(crate) mod draw;
+pub(crate) mod figure;
+pub(crate) mod report;
+pub(crate) mod source;
+pub(crate) mod sphere;
+
+use std::io::Write;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use glam::Vec3;
+use tumble::{Interpolation, Method, TrackSet, method};
+
+use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::input::{self, Inputs};
+use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::time::Sampling;
+use crate::batch::place::{self, Place};
+use crate::commands::plot::curves::Subject;
+use crate::commands::plot::figure::Figure;
+use crate::commands::plot::source::Source;
+use crate::messages::exit::{Failure, for_each};
+use crate::messages::progress::Progress;
+use crate::messages::words;
+
+/// A picture with more panels than this cannot be read.
+const PANELS: usize = 64;
+
+/// Draw components, speeds, errors and paths of rotations as SVG or PNG
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A set of N boxes has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so on,
+counted from 1. Keys are drawn as dots, or as upright lines where a curve has no value
+at a key.
+
+Examples:
+  tumble plot data/pendulum.dat -o pendulum.svg
+  tumble plot data/pendulum.dat --dimension 2 --dimension 16 -m slerp,c2 -o two.png
+  tumble plot data/pendulum.dat --show speed -m slerp,catmull-rom,c2 -o speed.svg
+  tumble plot data/pendulum.dat --show error --box 4 -m all -o error.svg
+  tumble plot data/*.dat -o pictures           a picture for each box of each input
+  tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Where to draw: FILE.svg, FILE.png, or a directory for several pictures
+    #[arg(short, long = "out", value_name = "OUT")]
+    out: PathBuf,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
+    /// How to interpolate: one method or several, or all [default: bessel-overhauser; for a
+    /// report slerp,catmull-rom,bessel-overhauser]
+    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = methods())]
+    methods: Vec<Selection>,
+    /// What to draw
+    #[arg(long, value_enum, default_value = "components", value_name = "WHAT")]
+    show: Show,
+    /// Only this dimension, counted from 1 (may be repeated)
+    #[arg(
+        long = "dimension",
+        value_name = "D",
+        value_delimiter = ',',
+        conflicts_with = "boxes"
+    )]
+    dimensions: Vec<usize>,
+    /// Only this box, counted from 1 (may be repeated)
+    #[arg(long = "box", value_name = "N", value_delimiter = ',')]
+    boxes: Vec<usize>,
+    /// sphere: which axis of a box is followed; -y points along it
+    #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
+    axis: AxisArgument,
+    /// Every figure of a report, and a page that shows them, in a directory
+    #[arg(long, conflicts_with_all = ["show", "dimensions", "boxes"])]
+    report: bool,
+    /// svg or png [default: by the name of the output, else svg]
+    #[arg(long, value_enum)]
+    format: Option<PictureFormat>,
+    #[command(flatten)]
+    sampling: Sampling,
+    #[command(flatten)]
+    manner: Manner,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Show {
+    /// w x y z over frames
+    Components,
+    /// angular speed over frames, rad/s
+    Speed,
+    /// the angle to the f64 reference over frames, radians
+    Error,
+    /// the path of an axis of a box on the sphere
+    Sphere,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AxisArgument {
+    X,
+    Y,
+    Z,
+    #[value(name = "-x")]
+    MinusX,
+    #[value(name = "-y")]
+    MinusY,
+    #[value(name = "-z")]
+    MinusZ,
+}
+
+impl From<AxisArgument> for Vec3 {
+    fn from(axis: AxisArgument) -> Self {
+        match axis {
+            AxisArgument::X => Self::X,
+            AxisArgument::Y => Self::Y,
+            AxisArgument::Z => Self::Z,
+            AxisArgument::MinusX => Self::NEG_X,
+            AxisArgument::MinusY => Self::NEG_Y,
+            AxisArgument::MinusZ => Self::NEG_Z,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PictureFormat {
+    /// drawn with lines and letters
+    Svg,
+    /// drawn with pixels, two for each of SVG's
+    Png,
+}
+
+impl PictureFormat {
+    fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_lowercase().as_str() {
+            "svg" => Some(Self::Svg),
+            "png" => Some(Self::Png),
+            _ => None,
+        }
+    }
+
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+        }
+    }
+}
+
+/// Where pictures go.
+enum Out {
+    One(PathBuf),
+    Folder(PathBuf),
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let inputs = arguments
+        .inputs
+        .distinct(arguments.sampling.reads_standard_input())?;
+    let samples = arguments.sampling.samples()?;
+    refuse_shared_names(&inputs)?;
+    let out = arguments.place(&inputs)?;
+    let methods = arguments.methods();
+    let interpolations: Vec<Interpolation> = methods
+        .iter()
+        .map(|&method| arguments.manner.with(method))
+        .collect();
+    let mut studio = Studio {
+        device: arguments.device.open()?,
+        format: arguments.format(),
+        overwrite: arguments.overwrite,
+        inputs: inputs.clone(),
+        drawn: 0,
+    };
+    if let (true, Out::Folder(folder)) = (arguments.report, &out) {
+        return report::write(arguments, &mut studio, &interpolations, &samples, folder);
+    }
+    let outcome = for_each(&inputs, |path| {
+        let name = input::name(path);
+        let set = arguments.inputs.load(path)?.set;
+        let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
+        let subjects = arguments.subjects(&set, &name)?;
+        let pictures = match &out {
+            Out::One(file) => vec![(
+                file.clone(),
+                together(&subjects, interpolations.len(), &name)?,
+            )],
+            Out::Folder(folder) => {
+                let stem = input::stem(path);
+                let file = |(label, subject): (String, Subject)| {
+                    let name = format!("{stem}-{label}.{}", studio.format.extension());
+                    (folder.join(name), subject)
+                };
+                subjects.each().into_iter().map(file).collect()
+            }
+        };
+        let mut progress = Progress::new("drawing", pictures.len() as u64);
+        for (file, subject) in pictures {
+            let figure = source.figure(&mut studio.device, &subject)?;
+            studio.draw(&figure, &file)?;
+            progress.advance(1);
+        }
+        Ok(())
+    });
+    if studio.drawn == 0 {
+        return outcome;
+    }
+    words::note(&format!(
+        "{} of {}, on {} → {}",
+        words::count(studio.drawn, "picture"),
+        words::count(inputs.len(), "input"),
+        studio.device.label,
+        arguments.out.display()
+    ));
+    outcome
+}
+
+/// What is drawn of one set, and how it is shared out where there are several pictures.
+struct Subjects {
+    boxes: Vec<usize>,
+    dimensions: Vec<usize>,
+    show: Show,
+    axis: Vec3,
+}
+
+impl Subjects {
+    fn of(&self, boxes: Vec<usize>) -> Subject {
+        match self.show {
+            Show::Components => Subject::Components(boxes),
+            Show::Speed => Subject::Speed(boxes),
+            Show::Error => Subject::Error(boxes),
+            Show::Sphere => Subject::Sphere(boxes, self.axis),
+        }
+    }
+
+    fn panels(&self, methods: usize) -> usize {
+        match (self.dimensions.len(), self.show) {
+            (0, Show::Components) if methods > 1 => 4 * self.boxes.len(),
+            (0, _) => self.boxes.len(),
+            (dimensions, _) => dimensions,
+        }
+    }
+
+    fn one(&self) -> Subject {
+        if self.dimensions.is_empty() {
+            self.of(self.boxes.clone())
+        } else {
+            Subject::Dimensions(self.dimensions.clone())
+        }
+    }
+
+    /// A picture for each dimension, or for each box; and what its file is called.
+    fn each(&self) -> Vec<(String, Subject)> {
+        let dimension = |&place: &usize| {
+            let name = format!("dimension-{}", place + 1);
+            (name, Subject::Dimensions(vec![place]))
+        };
+        let show = self.show.to_possible_value();
+        let show = show.as_ref().map_or("", |value| value.get_name());
+        let one = |&index: &usize| (format!("{show}-box-{}", index + 1), self.of(vec![index]));
+        if self.dimensions.is_empty() {
+            self.boxes.iter().map(one).collect()
+        } else {
+            self.dimensions.iter().map(dimension).collect()
+        }
+    }
+}
+
+impl Arguments {
+    fn methods(&self) -> Vec<Method> {
+        let methods = chosen(&self.methods);
+        match (methods.is_empty(), self.report) {
+            (false, _) => methods,
+            (true, false) => vec![method::BESSEL_OVERHAUSER],
+            (true, true) => vec![
+                method::SLERP,
+                method::CATMULL_ROM,
+                method::BESSEL_OVERHAUSER,
+            ],
+        }
+    }
+
+    fn format(&self) -> PictureFormat {
+        let named = PictureFormat::of(&self.out);
+        self.format.or(named).unwrap_or(PictureFormat::Svg)
+    }
+
+    /// Checks the output before any work; makes the directory.
+    fn place(&self, inputs: &[PathBuf]) -> Result<Out, Failure> {
+        let out = &self.out;
+        let shown = out.display();
+        let is_file =
+            !out.is_dir() && (PictureFormat::of(out).is_some() || input::is_standard(out));
+        if !is_file {
+            if out.extension().is_some() && !out.is_dir() {
+                return Err(Failure::usage(format!(
+                    "{shown}: end the picture in .svg or .png, or give a directory"
+                )));
+            }
+            place::folder(out)?;
+            return Ok(Out::Folder(out.clone()));
+        }
+        if self.report {
+            return Err(Failure::usage(format!(
+                "{shown}: a report has many pictures; give a directory"
+            )));
+        }
+        if inputs.len() > 1 {
+            return Err(Failure::usage(format!(
+                "{shown}: several inputs need a directory for their pictures, not one file"
+            )));
+        }
+        Place::new(out, self.overwrite, inputs)?.try_out()?;
+        Ok(Out::One(out.clone()))
+    }
+
+    /// What to draw of a set; refuses what is not there.
+    fn subjects(&self, set: &TrackSet, name: &str) -> Result<Subjects, Failure> {
+        let boxes = set.track_count();
+        if !self.dimensions.is_empty() && self.show != Show::Components {
+            return Err(Failure::usage(
+                "--dimension is for components; the others have boxes (--box)",
+            ));
+        }
+        let there = format!(
+            "{name} has {}, dimensions 1 to {} (w x y z of box 1, then of box 2 …)",
+            words::boxes(boxes),
+            4 * boxes
+        );
+        let chosen = |what: &str, given: &[usize], all: Range<usize>| {
+            let wrong = given.iter().find(|&&place| place == 0 || place > all.end);
+            match wrong {
+                Some(place) => Err(Failure::usage(format!(
+                    "there is no {what} {place}: {there}"
+                ))),
+                None => Ok(given.iter().map(|place| place - 1).collect::<Vec<_>>()),
+            }
+        };
+        let dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
+        let mut own = chosen("box", &self.boxes, 0..boxes)?;
+        if own.is_empty() {
+            own = (0..boxes).collect();
+        }
+        Ok(Subjects {
+            boxes: own,
+            dimensions,
+            show: self.show,
+            axis: self.axis.into(),
+        })
+    }
+}
+
+/// Pictures are named after their inputs, so no two of those may have the same name.
+fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
+    for (place, path) in inputs.iter().enumerate() {
+        let same = |other: &&PathBuf| input::stem(other) == input::stem(path);
+        if let Some(other) = inputs[..place].iter().find(same) {
+            return Err(Failure::usage(format!(
+                "{} and {} would share the pictures' names; draw them into different directories",
+                input::name(other),
+                input::name(path)
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Everything in one picture, if that can be read.
+fn together(subjects: &Subjects, methods: usize, name: &str) -> Result<Subject, Failure> {
+    let panels = subjects.panels(methods);
+    if panels > PANELS {
+        return Err(Failure::usage(format!(
+            "{name}: {panels} panels in one picture cannot be read, at most {PANELS}; choose \
+             some (--box, --dimension), or give a directory, for a picture each"
+        )));
+    }
+    Ok(subjects.one())
+}
+
+/// Draws figures into files.
+pub(crate) struct Studio {
+    device: Opened,
+    format: PictureFormat,
+    overwrite: bool,
+    inputs: Vec<PathBuf>,
+    drawn: usize,
+}
+
+impl Studio {
+    fn draw(&mut self, figure: &Figure, file: &Path) -> Result<(), Failure> {
+        let drawn = match self.format {
+            PictureFormat::Svg => draw::svg(figure).map(String::into_bytes),
+            PictureFormat::Png => draw::png(figure),
+        };
+        let bytes = drawn.map_err(|error| Failure::writing(&file.display().to_string(), &error))?;
+        let place = Place::new(file, self.overwrite, &self.inputs)?;
+        place.write(None, |out| out.write_all(&bytes))?;
+        self.drawn += 1;
+        Ok(())
+    }
+}

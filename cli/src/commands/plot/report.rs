@@ -1,0 +1,229 @@
+//! The figures of a report, and a page that shows them: for each input two dimensions by
+//! each method and by all, then speed, error and path of every box.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+use tumble::{Interpolation, TrackSet};
+
+use crate::arguments::input;
+use crate::arguments::time::Samples;
+use crate::batch::place::Place;
+use crate::commands::info::Steps;
+use crate::commands::plot::curves::{NAMES, Subject};
+use crate::commands::plot::source::Source;
+use crate::commands::plot::{Arguments, PANELS, Studio};
+use crate::messages::exit::Failure;
+use crate::messages::progress::Progress;
+use crate::messages::words;
+
+/// The dimensions that the original program's report shows, counted from 1.
+const DIMENSIONS: [usize; 2] = [2, 16];
+
+/// One figure of the page.
+struct Shown {
+    file: String,
+    caption: String,
+}
+
+/// What the page says of one input.
+struct Chapter {
+    title: String,
+    facts: String,
+    figures: Vec<Shown>,
+}
+
+pub(crate) fn write(
+    arguments: &Arguments,
+    studio: &mut Studio,
+    interpolations: &[Interpolation],
+    samples: &Samples,
+    folder: &Path,
+) -> Result<(), Failure> {
+    let inputs = studio.inputs.clone();
+    let page = Place::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
+    page.try_out()?;
+    let each = figures_of_one(interpolations.len());
+    let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
+    let mut chapters = Vec::new();
+    for path in &inputs {
+        let set = progress.suspend(|| arguments.inputs.load(path))?.set;
+        let chapter = Chapter {
+            title: input::file_name(path),
+            facts: facts(&set),
+            figures: figures(
+                studio,
+                (path, &set),
+                interpolations,
+                samples,
+                folder,
+                &mut progress,
+            )?,
+        };
+        chapters.push(chapter);
+    }
+    drop(progress);
+    let text = html(&chapters, &studio.device.label);
+    page.write(None, |out| out.write_all(text.as_bytes()))?;
+    words::note(&format!(
+        "{} and a page, on {} → {page}",
+        words::count(studio.drawn, "picture"),
+        studio.device.label
+    ));
+    Ok(())
+}
+
+fn figures_of_one(methods: usize) -> usize {
+    DIMENSIONS.len() * (methods + usize::from(methods > 1)) + 3
+}
+
+/// Draws all figures of one input.
+fn figures(
+    studio: &mut Studio,
+    (path, set): (&PathBuf, &TrackSet),
+    interpolations: &[Interpolation],
+    samples: &Samples,
+    folder: &Path,
+    progress: &mut Progress,
+) -> Result<Vec<Shown>, Failure> {
+    let name = input::file_name(path);
+    let mut shown = Vec::new();
+    let mut draw = |studio: &mut Studio, methods, label: &str, caption, subject: &Subject| {
+        let source = Source::new(name.clone(), set, methods, samples)?;
+        let figure = source.figure(&mut studio.device, subject)?;
+        let file = format!(
+            "{}-{label}.{}",
+            input::stem(path),
+            studio.format.extension()
+        );
+        studio.draw(&figure, &folder.join(&file))?;
+        shown.push(Shown { file, caption });
+        progress.advance(1);
+        Ok::<(), Failure>(())
+    };
+    // Those of the original's report; of a smaller set, its last instead.
+    let mut dimensions = DIMENSIONS
+        .map(|place| place.min(4 * set.track_count()))
+        .to_vec();
+    dimensions.dedup();
+    for place in dimensions {
+        let subject = Subject::Dimensions(vec![place - 1]);
+        let (component, index) = (NAMES[(place - 1) % 4], (place - 1) / 4 + 1);
+        let about = format!("dimension {place}, {component} of box {index}");
+        for one in interpolations.chunks(1) {
+            let method = one[0].method;
+            let label = format!("{method}-dimension-{place}");
+            draw(studio, one, &label, format!("{method}: {about}"), &subject)?;
+        }
+        if interpolations.len() > 1 {
+            let label = format!("all-dimension-{place}");
+            let caption = format!("all together: {about}");
+            draw(studio, interpolations, &label, caption, &subject)?;
+        }
+    }
+    let boxes: Vec<usize> = (0..set.track_count().min(PANELS)).collect();
+    for (label, caption, subject) in [
+        (
+            "speed",
+            "angular speed: where slerp has corners and splines have none",
+            Subject::Speed(boxes.clone()),
+        ),
+        (
+            "error",
+            "the angle to a textbook implementation in f64",
+            Subject::Error(boxes.clone()),
+        ),
+        (
+            "sphere",
+            "where each box points, seen from the one it hangs from",
+            Subject::Sphere(boxes, Vec3::NEG_Y),
+        ),
+    ] {
+        draw(studio, interpolations, label, caption.to_owned(), &subject)?;
+    }
+    Ok(shown)
+}
+
+fn facts(set: &TrackSet) -> String {
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    let steps = match Steps::of(set) {
+        None => String::new(),
+        Some(steps) if steps.are_even() => format!(", a key every {:.4} s", steps.longest),
+        Some(Steps { shortest, longest }) => {
+            format!(", a key every {shortest:.4} to {longest:.4} s")
+        }
+    };
+    format!(
+        "{}, {} in all, from {first} to {last} s{steps}",
+        words::boxes(set.track_count()),
+        words::count(set.key_count(), "key"),
+    )
+}
+
+/// Text as HTML shows it.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// A file's name inside a page's address.
+fn address(file: &str) -> String {
+    let mut address = String::new();
+    for byte in file.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => {
+                address.push(byte.into());
+            }
+            _ => {
+                let _ = write!(address, "%{byte:02X}");
+            }
+        }
+    }
+    address
+}
+
+const STYLE: &str = "\
+:root { color-scheme: light dark; font: 16px/1.5 system-ui, sans-serif }
+body { max-width: 1400px; margin: 2rem auto; padding: 0 1rem }
+h1, h2 { line-height: 1.2 }
+main section { display: grid; gap: 1.5rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)) }
+figure { margin: 0 }
+figure img { width: 100%; height: auto; border-radius: 6px; background: #fff }
+figcaption, p { opacity: .8 }";
+
+fn html(chapters: &[Chapter], device: &str) -> String {
+    let mut text = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>Interpolation of rotations</title>\n<style>\n{STYLE}\n</style>\n\
+         <h1>Interpolation of rotations</h1>\n\
+         <p>Evaluated by tumble {} on {}. Dots are keys. A quaternion and its negative are \
+         the same rotation; curves are drawn with the sign that continues them.</p>\n<main>\n",
+        env!("CARGO_PKG_VERSION"),
+        escaped(device)
+    );
+    for chapter in chapters {
+        let _ = write!(
+            text,
+            "<h2>{}</h2>\n<p>{}</p>\n<section>\n",
+            escaped(&chapter.title),
+            escaped(&chapter.facts)
+        );
+        for figure in &chapter.figures {
+            let caption = escaped(&figure.caption);
+            let _ = writeln!(
+                text,
+                "<figure><a href=\"{0}\"><img src=\"{0}\" alt=\"{caption}\" loading=\"lazy\"></a>\
+                 <figcaption>{caption}</figcaption></figure>",
+                address(&figure.file)
+            );
+        }
+        text.push_str("</section>\n");
+    }
+    text.push_str("</main>\n</html>\n");
+    text
+}

@@ -1,0 +1,152 @@
+//! One input, sampled: what curves are made of.
+
+use glam::Quat;
+use tumble::{Frames, Interpolation, Layout, Timeline, TrackSet};
+
+use crate::arguments::device::Opened;
+use crate::arguments::time::Samples;
+use crate::batch::room;
+use crate::commands::plot::figure::{Axis, range_of};
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// More keys than this stand too close for upright lines.
+const UPRIGHTS: usize = 200;
+
+/// One input, and how to evaluate it.
+pub(crate) struct Source<'a> {
+    pub(crate) name: String,
+    pub(crate) set: &'a TrackSet,
+    pub(crate) interpolations: &'a [Interpolation],
+    pub(crate) frames: Frames,
+    pub(crate) timeline: Timeline,
+    pub(crate) x: Axis,
+    /// Where a time lies on that axis.
+    pub(crate) x_of: Box<dyn Fn(f64) -> f64>,
+    pub(crate) about: String,
+}
+
+impl<'a> Source<'a> {
+    pub(crate) fn new(
+        name: String,
+        set: &'a TrackSet,
+        interpolations: &'a [Interpolation],
+        samples: &Samples,
+    ) -> Result<Self, Failure> {
+        let mut frames = samples.of(set, &name);
+        if let (Samples::Rate { start, end, .. }, Some((first, last))) = (samples, set.time_span())
+        {
+            // A box alone has the frames of the whole set.
+            frames = frames.between(start.unwrap_or(first), end.unwrap_or(last));
+        }
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
+        if timeline.is_empty() {
+            return Err(Failure::usage(format!(
+                "{name}: there are no samples to plot"
+            )));
+        }
+        let start = timeline.time(0, 0);
+        let count = words::count(timeline.len(), "frame");
+        let (label, x_of, about): (_, Box<dyn Fn(f64) -> f64>, _) = match samples {
+            Samples::Rate { rate, .. } => {
+                let per_second = rate.per_second();
+                (
+                    format!("frame ({rate} per second)"),
+                    Box::new(move |time| (time - start) * per_second),
+                    format!("{count}, {rate} per second"),
+                )
+            }
+            Samples::Times(_) => (
+                "time, s".to_owned(),
+                Box::new(|time| time),
+                words::count(timeline.len(), "time"),
+            ),
+        };
+        let range = range_of((0..timeline.len()).map(|sample| x_of(timeline.time(0, sample))));
+        let x = Axis {
+            label,
+            range,
+            powers: false,
+        };
+        Ok(Self {
+            name,
+            set,
+            interpolations,
+            frames,
+            timeline,
+            x,
+            x_of,
+            about,
+        })
+    }
+
+    /// The samples of one box, each with the sign that continues the one before it: a
+    /// quaternion and its negative are the same rotation, and a curve does not jump.
+    pub(crate) fn rotations(
+        &self,
+        device: &mut Opened,
+        index: usize,
+        interpolation: Interpolation,
+    ) -> Result<Vec<Quat>, Failure> {
+        let mut rotations = self.evaluate(device, index, interpolation)?;
+        for place in 1..rotations.len() {
+            if rotations[place].dot(rotations[place - 1]) < 0.0 {
+                rotations[place] = -rotations[place];
+            }
+        }
+        Ok(rotations)
+    }
+
+    pub(crate) fn evaluate(
+        &self,
+        device: &mut Opened,
+        index: usize,
+        interpolation: Interpolation,
+    ) -> Result<Vec<Quat>, Failure> {
+        let one = self.set.select(index..index + 1);
+        // The rotations, the points of a curve and what is drawn of them.
+        room::in_memory(&self.name, &one, &self.frames, 4)?;
+        device
+            .collect(&one, interpolation, &self.frames, Layout::TrackMajor)
+            .map_err(|error| Failure::evaluating(&self.name, &error))
+    }
+
+    /// Points over the samples.
+    pub(crate) fn points(&self, values: impl IntoIterator<Item = f64>) -> Vec<(f64, f64)> {
+        let x = (0..self.timeline.len()).map(|place| (self.x_of)(self.timeline.time(0, place)));
+        x.zip(values).collect()
+    }
+
+    /// Keys among the samples: where they lie, with the sign of the curve there.
+    pub(crate) fn keys(&self, index: usize, rotations: &[Quat]) -> Vec<(f64, Quat)> {
+        let track = self.set.track(index);
+        let times: Vec<f64> = (0..self.timeline.len())
+            .map(|place| self.timeline.time(0, place))
+            .collect();
+        let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
+            return Vec::new();
+        };
+        // Half a frame is none too many.
+        let room = (last - first) / (2 * times.len()) as f64;
+        let keys = track.times.iter().zip(track.keys);
+        let inside = keys.filter(|&(&time, _)| time >= first - room && time <= last + room);
+        let placed = inside.map(|(&time, &key)| {
+            let after = times.partition_point(|&sample| sample < time);
+            let near = rotations[after.min(rotations.len() - 1)];
+            let key = if key.dot(near) < 0.0 { -key } else { key };
+            ((self.x_of)(time), key)
+        });
+        placed.collect()
+    }
+
+    pub(crate) fn key_places(&self, index: usize) -> Vec<f64> {
+        let times = self.set.track(index).times;
+        if times.len() > UPRIGHTS {
+            return Vec::new();
+        }
+        let places = times.iter().map(|&time| (self.x_of)(time));
+        places.filter(|x| self.x.range.contains(x)).collect()
+    }
+}

@@ -1,0 +1,59 @@
+//! Names under the boxes, the same on every frame.
+
+use std::io;
+
+use resvg::{tiny_skia, usvg};
+
+use crate::commands::picture;
+use crate::messages::colours::Colour;
+
+/// Letters over a picture: how much of their colour each pixel has.
+pub(crate) struct Labels {
+    cover: Vec<u8>,
+    ink: Colour,
+}
+
+impl Labels {
+    /// Names, each about a place from 0, the left edge, to 1.
+    pub(crate) fn new<'a>(
+        names: impl Iterator<Item = (&'a str, f32)>,
+        (width, height): (u32, u32),
+        ink: Colour,
+    ) -> io::Result<Self> {
+        let size = (height as f32 / 26.0).clamp(9.0, 40.0);
+        let text = |(name, place): (&str, f32)| {
+            let (x, y) = (place * width as f32, height as f32 - size);
+            format!("<text x=\"{x}\" y=\"{y}\">{name}</text>")
+        };
+        let texts: String = names.map(text).collect();
+        let svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">\
+             <g font-family=\"sans-serif\" font-size=\"{size}\" text-anchor=\"middle\">{texts}</g></svg>"
+        );
+        let tree = usvg::Tree::from_str(&svg, &picture::svg_options()).map_err(io::Error::other)?;
+        let mut canvas = tiny_skia::Pixmap::new(width, height)
+            .ok_or_else(|| io::Error::other("too large a picture"))?;
+        resvg::render(
+            &tree,
+            tiny_skia::Transform::identity(),
+            &mut canvas.as_mut(),
+        );
+        let cover = canvas
+            .data()
+            .chunks_exact(4)
+            .map(|pixel| pixel[3])
+            .collect();
+        Ok(Self { cover, ink })
+    }
+
+    pub(crate) fn put(&self, pixels: &mut [u8]) {
+        let covered = pixels.chunks_exact_mut(3).zip(&self.cover);
+        for (pixel, &cover) in covered.filter(|(_, cover)| **cover > 0) {
+            for (channel, ink) in pixel.iter_mut().zip(self.ink) {
+                let (own, letter) = (u16::from(*channel), u16::from(ink));
+                let cover = u16::from(cover);
+                *channel = ((own * (255 - cover) + letter * cover) / 255) as u8;
+            }
+        }
+    }
+}

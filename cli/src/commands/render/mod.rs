@@ -1,0 +1,298 @@
+//! `tumble render`: boxes drawn to pictures and films, without a display.
+
+pub(crate) mod film;
+pub(crate) mod scene;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use tumble::{Frames, Layout, Skeleton, Timeline, TrackSet, WorldPoses};
+
+use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::input::{self, Inputs};
+use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::time::Sampling;
+use crate::batch::place::{self, Place};
+use crate::batch::room;
+use crate::commands::picture;
+use crate::commands::render::film::Picture;
+use crate::commands::render::film::apng::Apng;
+use crate::commands::render::film::gif::Gif;
+use crate::commands::render::scene::{Actor, Scene, Theme, View};
+use crate::messages::exit::Failure;
+use crate::messages::progress::Progress;
+use crate::messages::{signals, words};
+
+/// Chains side by side in one picture.
+const MOST: usize = 4;
+
+/// What browsers show a frame of a GIF for at least, seconds; less some rounding.
+const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
+
+/// Draw the boxes of a chain as pictures or a film, without a display
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  tumble render data/pendulum.dat -o pendulum.gif
+  tumble render data/pendulum.dat -m slerp,bessel-overhauser --size 800x400 -o both.apng
+  tumble render data/pendulum.dat --start 2.5 -o still.png
+  tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …")]
+pub(crate) struct Arguments {
+    /// A keyframe file (`-`: standard input)
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Where to draw: FILE.gif, FILE.apng, FILE.png (the first frame), or a directory for a
+    /// picture of each frame
+    #[arg(short, long = "out", value_name = "OUT")]
+    out: PathBuf,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
+    /// How to interpolate; several methods stand side by side
+    #[arg(
+        short,
+        long = "method",
+        value_name = "METHODS",
+        value_delimiter = ',',
+        default_value = "bessel-overhauser",
+        value_parser = methods()
+    )]
+    methods: Vec<Selection>,
+    /// Width and height of a picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    size: (u32, u32),
+    /// From where to look: degrees about the upright axis, and above the floor
+    #[arg(long, value_name = "AROUND,ABOVE", default_value = "23,17", value_parser = view, allow_hyphen_values = true)]
+    view: View,
+    /// The colours of ground and floor
+    #[arg(long, value_enum, default_value = "light")]
+    theme: ThemeArgument,
+    #[command(flatten)]
+    sampling: Sampling,
+    #[command(flatten)]
+    manner: Manner,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ThemeArgument {
+    Light,
+    Dark,
+}
+
+impl From<ThemeArgument> for Theme {
+    fn from(theme: ThemeArgument) -> Self {
+        match theme {
+            ThemeArgument::Light => Self::LIGHT,
+            ThemeArgument::Dark => Self::DARK,
+        }
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', '×']);
+    let parsed =
+        sides.and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    match parsed {
+        Some((width @ 16..=4096, height @ 16..=4096)) => Ok((width, height)),
+        _ => Err(format!(
+            "`{text}` is no size; give 640x480, each side 16 to 4096 pixels"
+        )),
+    }
+}
+
+fn view(text: &str) -> Result<View, String> {
+    let angles = text.split_once(',');
+    let parsed = angles.and_then(|(around, above)| {
+        Some((
+            around.trim().parse::<f32>().ok()?,
+            above.trim().parse::<f32>().ok()?,
+        ))
+    });
+    match parsed {
+        Some((around, above)) if around.is_finite() && (-89.0..=89.0).contains(&above) => {
+            Ok(View { around, above })
+        }
+        _ => Err(format!(
+            "`{text}` is no view; give two angles in degrees, such as 23,17, the second -89 to 89"
+        )),
+    }
+}
+
+/// What comes out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Gif,
+    Apng,
+    Still,
+    Folder,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Result<Self, Failure> {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        match extension.map(str::to_lowercase).as_deref() {
+            _ if path.is_dir() => Ok(Self::Folder),
+            Some("gif") => Ok(Self::Gif),
+            Some("apng") => Ok(Self::Apng),
+            Some("png") => Ok(Self::Still),
+            None if !input::is_standard(path) => Ok(Self::Folder),
+            _ => Err(Failure::usage(format!(
+                "{}: end the film in .gif or .apng, a picture in .png, or give a directory",
+                path.display()
+            ))),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let inputs = arguments
+        .inputs
+        .distinct(arguments.sampling.reads_standard_input())?;
+    let [path] = &inputs[..] else {
+        return Err(Failure::usage("one input at a time is rendered"));
+    };
+    let samples = arguments.sampling.samples()?;
+    let methods = chosen(&arguments.methods);
+    if methods.len() > MOST {
+        return Err(Failure::usage(format!(
+            "{} side by side cannot be seen, at most {MOST}; choose some (-m)",
+            words::count(methods.len(), "method")
+        )));
+    }
+    let kind = Kind::of(&arguments.out)?;
+    if kind != Kind::Folder {
+        Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
+    }
+    let name = input::name(path);
+    let set = arguments.inputs.load(path)?.set;
+    let mut frames = samples.of(&set, &name);
+    let mut timeline = frames
+        .resolve(set.track_count(), set.time_span())
+        .map_err(|error| Failure::evaluating(&name, &error.into()))?;
+    if timeline.is_empty() {
+        return Err(Failure::usage(format!(
+            "{name}: there are no frames to render"
+        )));
+    }
+    if kind == Kind::Still {
+        frames = Frames::at(vec![timeline.time(0, 0)]);
+        timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
+    }
+    // The rotations, and twice what becomes of them, for each method.
+    room::in_memory(&name, &set, &frames, 5 * methods.len())?;
+    let mut device = arguments.device.open()?;
+    let mut actors = Vec::new();
+    for method in methods {
+        let poses = arguments.poses(&mut device, &name, &set, method, &frames)?;
+        actors.push(Actor { method, poses });
+    }
+    let theme = arguments.theme.into();
+    let scene = Scene::new(actors, arguments.size, arguments.view, theme)
+        .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
+    arguments.shoot(kind, &scene, &timeline, &inputs)?;
+    words::note(&format!(
+        "{name}: {}, {}, on {} → {}",
+        words::count(timeline.len(), "frame"),
+        words::boxes(set.track_count()),
+        device.label,
+        arguments.out.display()
+    ));
+    Ok(())
+}
+
+impl Arguments {
+    /// Where the boxes hang and how they are turned, by one method.
+    fn poses(
+        &self,
+        device: &mut Opened,
+        name: &str,
+        set: &TrackSet,
+        method: tumble::Method,
+        frames: &Frames,
+    ) -> Result<WorldPoses, Failure> {
+        let interpolation = self.manner.with(method);
+        // A picture has no scale: boxes are 1 long, however long they are.
+        let skeleton = Skeleton::chain(set.track_count(), 1.0);
+        device
+            .choose(set.track_count())
+            .and_then(|()| {
+                let engine = &device.engine;
+                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+                engine.world(&local, &skeleton)
+            })
+            .map_err(|error| Failure::evaluating(name, &error))
+    }
+
+    /// Draws every frame and writes it.
+    fn shoot(
+        &self,
+        kind: Kind,
+        scene: &Scene,
+        timeline: &Timeline,
+        inputs: &[PathBuf],
+    ) -> Result<(), Failure> {
+        let times: Vec<f64> = (0..timeline.len())
+            .map(|frame| timeline.time(0, frame))
+            .collect();
+        let (width, height) = self.size;
+        let mut progress = Progress::new("rendering", times.len() as u64);
+        let too_fast = times
+            .windows(2)
+            .any(|pair| pair[1] - pair[0] < SHORTEST_IN_GIF);
+        if kind == Kind::Gif && too_fast {
+            words::warning(
+                "GIF shows no frame for less than 0.02 s, so the film is slower than its keys; \
+                 give --fps 50 or less, or write .apng",
+            );
+        }
+        if kind == Kind::Folder {
+            place::folder(&self.out)?;
+            let digits = (times.len() - 1).to_string().len().max(5);
+            let place = |frame: usize| {
+                let file = self.out.join(format!("{frame:0digits$}.png"));
+                Place::new(&file, self.overwrite, inputs)
+            };
+            // All that can be refused is, before there are any.
+            (0..times.len()).try_for_each(|frame| place(frame).map(drop))?;
+            return scene.each_frame(|frame, pixels| {
+                if let Some(stopped) = signals::stopped() {
+                    return Err(stopped);
+                }
+                place(frame)?.write(None, |out| picture::png(out, width, height, pixels))?;
+                progress.advance(1);
+                Ok(())
+            });
+        }
+        let file = Place::new(&self.out, self.overwrite, inputs)?;
+        file.write(None, |out| {
+            let mut draw = |film: &mut dyn Picture| {
+                scene.each_frame(|_, pixels| {
+                    progress.advance(1);
+                    if signals::stopped().is_some() {
+                        return Err(io::Error::other("stopped by a signal"));
+                    }
+                    film.frame(pixels)
+                })
+            };
+            match kind {
+                Kind::Gif => {
+                    let mut film = Gif::new(out, self.size, &times, scene.sample_colours())?;
+                    draw(&mut film)
+                }
+                Kind::Apng => {
+                    let mut film = Apng::new(out, self.size, &times)?;
+                    draw(&mut film)?;
+                    film.finish()
+                }
+                Kind::Still | Kind::Folder => {
+                    scene.each_frame(|_, pixels| picture::png(&mut *out, width, height, pixels))
+                }
+            }
+        })
+    }
+}

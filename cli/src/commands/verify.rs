@@ -1,0 +1,204 @@
+//! `tumble verify`: the device against the CPU, both against the f64 reference.
+
+use std::fmt::Write;
+
+use clap::Args;
+use serde::Serialize;
+use tumble::TrackSet;
+use tumble::verify::Verification;
+
+use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::input;
+use crate::arguments::input::Inputs;
+use crate::arguments::interpolation::{Manner, Selection, methods};
+use crate::arguments::time::{Samples, Sampling};
+use crate::batch::room;
+use crate::messages::exit::{DIFFERENCE, Failure, for_each};
+use crate::messages::progress::Progress;
+use crate::messages::words;
+
+/// Compare the device with the CPU, bit for bit, and both with f64
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Every rotation of every frame is computed three times: on the device, by its f32
+twin on the CPU, and by a textbook implementation in f64. The bits of the first two
+must agree; the error against the third has a bound. So is what follows from the
+rotations: velocities, accelerations, every encoding. Exit code 8 when not.
+
+Examples:
+  tumble verify data/pendulum.dat
+  tumble verify *.dat -m slerp --fps 240
+  tumble verify data/pendulum.dat --device llvmpipe --json")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// The method to verify, or all
+    #[arg(short, long, value_name = "METHOD", default_value = "all", value_parser = methods())]
+    method: Selection,
+    #[command(flatten)]
+    sampling: Sampling,
+    #[command(flatten)]
+    manner: Manner,
+    #[command(flatten)]
+    device: DeviceArguments,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// One line of the report; also the form of the JSON.
+#[derive(Serialize)]
+struct Line {
+    input: String,
+    #[serde(flatten)]
+    found: Verification,
+    pass: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let inputs = arguments
+        .inputs
+        .distinct(arguments.sampling.reads_standard_input())?;
+    let samples = arguments.sampling.samples()?;
+    let device = arguments.device.open()?;
+    let steps = (inputs.len() * arguments.method.0.len()) as u64;
+    let mut progress = Progress::new("verifying", steps);
+    let mut lines = Vec::new();
+    let outcome = for_each(&inputs, |path| {
+        let name = input::name(path);
+        let set = progress.suspend(|| arguments.inputs.load(path))?.set;
+        lines.extend(arguments.compare(&device, &samples, &name, &set, &mut progress)?);
+        Ok(())
+    });
+    drop(progress);
+    let failing = lines.iter().filter(|line| !line.pass).count();
+    if arguments.json {
+        words::json(&lines)?;
+    } else {
+        words::listing(&report(&lines, &device))?;
+    }
+    if failing > 0 {
+        let message = format!(
+            "{failing} of {} comparisons failed: bits differ, or an error is over its bound",
+            lines.len()
+        );
+        return Err(Failure::new(DIFFERENCE, message));
+    }
+    outcome
+}
+
+impl Arguments {
+    /// One set, by every method asked for.
+    fn compare(
+        &self,
+        device: &Opened,
+        samples: &Samples,
+        name: &str,
+        set: &TrackSet,
+        progress: &mut Progress,
+    ) -> Result<Vec<Line>, Failure> {
+        let frames = progress.suspend(|| samples.of(set, name));
+        // Two results are in memory at once.
+        room::in_memory(name, set, &frames, 2)?;
+        let mut lines = Vec::new();
+        for &method in &self.method.0 {
+            let interpolation = self.manner.with(method);
+            let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
+                .map_err(|error| Failure::evaluating(name, &error))?;
+            lines.push(Line {
+                input: name.to_owned(),
+                pass: found.passes(),
+                found,
+            });
+            progress.advance(1);
+        }
+        Ok(lines)
+    }
+}
+
+/// A table, a line for each input and method, and what it comes to.
+fn report(lines: &[Line], device: &Opened) -> String {
+    let width = lines
+        .iter()
+        .map(|line| line.input.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(5);
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{:width$}  {:22} {:>12} {:>9}  {:>9} {:>9} {:>9}  {:>9}  verdict",
+        "input", "method", "rotations", "differing", "max rad", "bound", "rms rad", "| |q|-1 |"
+    );
+    for line in lines {
+        line.tell(&mut text, width);
+    }
+    let rotations: u64 = lines.iter().map(|line| line.found.rotations).sum();
+    let outputs = || lines.iter().flat_map(|line| &line.found.outputs);
+    let values: u64 = outputs().map(|output| output.values).sum();
+    let differing: u64 = lines.iter().map(|line| line.found.differing).sum::<u64>()
+        + outputs().map(|output| output.differing).sum::<u64>();
+    let _ = if device.is_vulkan() {
+        writeln!(
+            text,
+            "total: {rotations} rotations, and {values} values that follow from them, compared \
+             between {} and the CPU, {differing} differ",
+            device.label
+        )
+    } else {
+        writeln!(
+            text,
+            "total: {rotations} rotations on {}; NOTHING was compared with a Vulkan device, only \
+             with the f64 reference",
+            device.label
+        )
+    };
+    text
+}
+
+impl Line {
+    fn tell(&self, text: &mut String, width: usize) {
+        let found = &self.found;
+        let _ = writeln!(
+            text,
+            "{:width$}  {:22} {:>12} {:>9}  {:>9.2e} {:>9.0e} {:>9.2e}  {:>9.2e}  {}",
+            self.input,
+            found.method,
+            found.rotations,
+            if found.device.is_some() {
+                found.differing.to_string()
+            } else {
+                "-".to_owned()
+            },
+            found.max_error,
+            found.error_bound,
+            found.rms_error,
+            found.max_norm_error,
+            if self.pass { "pass" } else { "FAIL" },
+        );
+        for output in found.outputs.iter().filter(|output| !output.passes()) {
+            let _ = writeln!(
+                text,
+                "{:width$}  FAIL: {}, {} of {} differ, error {:.2e} of {:.0e}",
+                "",
+                output.output,
+                output.differing,
+                output.values,
+                output.max_error,
+                output.error_bound
+            );
+        }
+        for (what, place) in [
+            ("worst", found.worst),
+            ("first difference", found.first_difference),
+        ] {
+            if let Some(place) = place {
+                let _ = writeln!(
+                    text,
+                    "{:width$}  {what}: track {}, frame {}, at {:.4} s",
+                    "", place.track, place.frame, place.time
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Numbers as short text: differences, deflated, base64. `web/src/data.js` unpacks them.
+
+use std::io::Write;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+/// Little-endian doubles.
+pub(crate) fn doubles(values: &[f64]) -> String {
+    deflated(
+        &values
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// 16-bit integers, each as its difference from the one `stride` before it, which is
+/// small where those are a component of neighbouring samples; all low bytes first, then
+/// all high bytes, which are mostly alike.
+pub(crate) fn differences(values: &[u16], stride: usize) -> String {
+    let difference = |(place, value): (usize, &u16)| match place.checked_sub(stride) {
+        Some(before) => value.wrapping_sub(values[before]),
+        None => *value,
+    };
+    let differences: Vec<u16> = values.iter().enumerate().map(difference).collect();
+    let low = differences.iter().map(|value| *value as u8);
+    let high = differences.iter().map(|value| (value >> 8) as u8);
+    deflated(&low.chain(high).collect::<Vec<u8>>())
+}
+
+fn deflated(bytes: &[u8]) -> String {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    STANDARD.encode(packed.expect("memory takes what is written"))
+}

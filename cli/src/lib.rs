@@ -1,0 +1,79 @@
+//! The program `tumble`: keyframe tracks in, interpolated rotations out.
+//!
+//! Arguments are parsed into validated values ([`arguments`]), one command runs
+//! ([`commands`]), and what went wrong becomes a message on standard error and an exit code
+//! ([`messages`]). Data goes to standard output and words to standard error. A library, so
+//! that other front ends run the same program; it promises no stable interface.
+
+mod arguments;
+mod batch;
+mod commands;
+mod messages;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::commands::Command;
+use crate::messages::{exit, signals, words};
+
+const ABOUT: &str = "Interpolate tracks of rotation keys in bulk, on Vulkan or the CPU, \
+                     with the same bits";
+
+const EXAMPLES: &str = "\
+Examples:
+  tumble generate -o chain.dat                 make a file to play with
+  tumble info chain.dat                        what is in it
+  tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
+  tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
+  tumble eval walks -o results                 a directory of files; --resume goes on
+  tumble check results                         are its bits still what they were?
+  tumble verify chain.dat                      device = CPU, and both against f64
+  tumble view chain.dat --open                 see the boxes turn
+  tumble plot chain.dat -o chain.svg           see every component
+  tumble devices                               what Vulkan offers here
+  tumble bench                                 how fast this machine is
+
+Exit codes:
+  0 done                           5 a Vulkan device was demanded, there is none
+  1 a bug in tumble                6 the device failed, or is not exact
+  2 the command line is wrong      7 output could not be written
+  3 some inputs failed             8 verification found a difference
+  4 all inputs failed              130, 141, 143 stopped by a signal";
+
+/// What the command line says.
+#[derive(Debug, Parser)]
+#[command(name = "tumble", version, about = ABOUT, after_help = EXAMPLES)]
+#[command(max_term_width = 100)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Runs the program with this process's arguments.
+#[must_use]
+pub fn main() -> ExitCode {
+    words::explain_panics();
+    let arguments = Arguments::parse();
+    let outcome = std::panic::catch_unwind(|| {
+        signals::stop_on_signals();
+        arguments.command.run()
+    });
+    let code = match outcome {
+        Ok(Ok(())) => exit::DONE,
+        Ok(Err(failure)) => failure.report(),
+        Err(_) => exit::BUG, // the hook has told about it
+    };
+    ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    /// clap checks its own definition: clashing flags, bad defaults.
+    #[test]
+    fn the_command_line_is_well_defined() {
+        super::Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,144 @@
+//! Exit codes, and the failures that lead to them.
+
+use std::io;
+
+use tumble::{Error, VulkanError};
+use tumble_formats::Diagnostic;
+use tumble_formats::output::OutputError;
+
+use crate::messages::words;
+
+pub(crate) const DONE: u8 = 0;
+pub(crate) const BUG: u8 = 1;
+pub(crate) const USAGE: u8 = 2;
+pub(crate) const SOME_INPUTS: u8 = 3;
+pub(crate) const ALL_INPUTS: u8 = 4;
+pub(crate) const NO_VULKAN: u8 = 5;
+pub(crate) const DEVICE: u8 = 6;
+pub(crate) const OUTPUT: u8 = 7;
+pub(crate) const DIFFERENCE: u8 = 8;
+/// 128 + SIGPIPE, as a shell reports a program that the signal ended.
+pub(crate) const BROKEN_PIPE: u8 = 141;
+
+/// Why a command ends early. An empty message is a quiet end.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) code: u8,
+    message: String,
+    /// The message says itself that it is an error.
+    plain: bool,
+}
+
+impl Failure {
+    pub(crate) fn new(code: u8, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            message: message.into(),
+            plain: false,
+        }
+    }
+
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self::new(USAGE, message)
+    }
+
+    /// What was to be said has been said.
+    pub(crate) fn quiet(code: u8) -> Self {
+        Self::new(code, "")
+    }
+
+    /// The same with more to say.
+    pub(crate) fn hinted(mut self, hint: &str) -> Self {
+        self.message.push_str(hint);
+        self
+    }
+
+    /// Data could not be written. A reader that went away knows it already.
+    pub(crate) fn writing(place: &str, error: &io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::quiet(BROKEN_PIPE),
+            _ => Self::new(OUTPUT, format!("{place}: cannot be written: {error}")),
+        }
+    }
+
+    /// An input was refused; its message has a form of its own.
+    pub(crate) fn input(diagnostic: &Diagnostic, hint: &str) -> Self {
+        let message = format!("{diagnostic}{hint}");
+        Self {
+            code: ALL_INPUTS,
+            message,
+            plain: true,
+        }
+    }
+
+    /// An output was refused: it is not what can be meant, or the system says no.
+    pub(crate) fn output(error: &OutputError) -> Self {
+        match error {
+            _ if error.is_broken_pipe() => Self::quiet(BROKEN_PIPE),
+            OutputError::NoDirectory { .. } | OutputError::Write { .. } => {
+                Self::new(OUTPUT, error.to_string())
+            }
+            _ => Self::usage(error.to_string()),
+        }
+    }
+
+    /// An evaluation failed: the request, the input or the device is to blame.
+    pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
+        let code = match error {
+            Error::Frames(_) => USAGE,
+            Error::Vulkan(VulkanError::NoLoader { .. } | VulkanError::NoDevice) => NO_VULKAN,
+            Error::Vulkan(_) => DEVICE,
+            Error::Interpolation(_) => ALL_INPUTS,
+            _ => BUG,
+        };
+        Self::new(code, format!("{input}: {error}"))
+    }
+
+    /// Whether the next input would fail in the same way.
+    pub(crate) fn is_final(&self) -> bool {
+        !matches!(self.code, USAGE | ALL_INPUTS)
+    }
+
+    /// Says why, on standard error, and gives the exit code.
+    pub(crate) fn report(&self) -> u8 {
+        if self.plain {
+            words::note(&self.message);
+        } else if !self.message.is_empty() {
+            words::error(&self.message);
+        }
+        self.code
+    }
+}
+
+/// Runs `work` for every input. A failure is reported and the others go on, unless
+/// they would fail alike; a single input ends with its own exit code.
+pub(crate) fn for_each<T>(
+    inputs: &[T],
+    mut work: impl FnMut(&T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut failed = 0;
+    for input in inputs {
+        match work(input) {
+            Ok(()) => {}
+            Err(failure) if failure.is_final() || inputs.len() == 1 => return Err(failure),
+            Err(failure) => {
+                failure.report();
+                failed += 1;
+            }
+        }
+    }
+    match failed {
+        0 => Ok(()),
+        _ if failed == inputs.len() => Err(Failure::new(
+            ALL_INPUTS,
+            format!("all {failed} inputs failed"),
+        )),
+        _ => {
+            let message = format!(
+                "{failed} of {} inputs failed; the others are done",
+                inputs.len()
+            );
+            Err(Failure::new(SOME_INPUTS, message))
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! What the program says to people, and the exit codes.
+
+pub(crate) mod colours;
+pub(crate) mod exit;
+pub(crate) mod progress;
+pub(crate) mod signals;
+pub(crate) mod words;

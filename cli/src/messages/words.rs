@@ -1,0 +1,179 @@
+//! Words for people, on standard error, and listings, on standard output.
+//!
+//! `anstream` drops the colours when the stream is no terminal or `NO_COLOR` is
+//! set. A standard error that is closed must not end the program, so what it
+//! refuses is lost.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use crate::messages::exit::Failure;
+
+pub(crate) fn error(message: &str) {
+    let _ = writeln!(anstream::stderr(), "\x1b[1;31merror:\x1b[0m {message}");
+}
+
+pub(crate) fn warning(message: &str) {
+    let _ = writeln!(anstream::stderr(), "\x1b[1;33mwarning:\x1b[0m {message}");
+}
+
+pub(crate) fn note(message: &str) {
+    let _ = writeln!(anstream::stderr(), "{message}");
+}
+
+/// Writes a listing to standard output. A reader that has seen enough (`| head`)
+/// is no failure.
+pub(crate) fn listing(text: &str) -> Result<(), Failure> {
+    let mut out = anstream::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::writing("standard output", &error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// As [`listing`], for programs: pretty-printed JSON.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text =
+        serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
+    listing(&format!("{text}\n"))
+}
+
+/// A panic is a bug of ours: say so, and what to send.
+pub(crate) fn explain_panics() {
+    std::panic::set_hook(Box::new(|info| {
+        let what = info.payload_as_str().unwrap_or("no reason given");
+        let place = info.location().map(ToString::to_string).unwrap_or_default();
+        let line: Vec<String> = std::env::args_os()
+            .map(|a| a.to_string_lossy().into_owned())
+            .collect();
+        error(&format!(
+            "internal error at {place}: {what}\n  this is a bug in tumble {}; please report it \
+             with the command line and, if it can be shared, the input:\n  {}",
+            env!("CARGO_PKG_VERSION"),
+            line.join(" ")
+        ));
+    }));
+}
+
+/// `1 track`, `4 tracks`.
+pub(crate) fn count(number: usize, noun: &str) -> String {
+    match number {
+        1 => format!("1 {noun}"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
+/// `1 box`, `4 boxes`.
+pub(crate) fn boxes(number: usize) -> String {
+    match number {
+        1 => "1 box".to_owned(),
+        _ => format!("{number} boxes"),
+    }
+}
+
+/// `78.6 MB`, in decimal units, as file managers and drives count.
+pub(crate) fn bytes(bytes: f64) -> String {
+    let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
+    let power = if bytes < 1000.0 {
+        0
+    } else {
+        (bytes.log10() / 3.0) as usize
+    };
+    let power = power.min(units.len() - 1);
+    let value = bytes / 1000f64.powi(power as i32);
+    if power == 0 {
+        format!("{value} bytes")
+    } else {
+        format!("{value:.1} {}", units[power])
+    }
+}
+
+/// `3.1 ms`.
+pub(crate) fn duration(duration: Duration) -> String {
+    let seconds = duration.as_secs_f64();
+    match seconds {
+        0.0..1e-3 => format!("{:.0} µs", seconds * 1e6),
+        1e-3..1.0 => format!("{:.1} ms", seconds * 1e3),
+        _ => format!("{seconds:.2} s"),
+    }
+}
+
+/// The known name nearest to a misspelt one, if any is near.
+pub(crate) fn nearest<'a>(
+    given: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    let given = given.to_lowercase();
+    // A part of a name is a name too: `llvmpipe` of `llvmpipe (LLVM 15.0.6)`.
+    let score = |name: &str| {
+        let name = name.to_lowercase();
+        let parts = name.split_whitespace().chain([&*name]);
+        parts
+            .map(|part| strsim::jaro_winkler(&given, part))
+            .fold(0.0, f64::max)
+    };
+    known
+        .into_iter()
+        .map(|name| (score(name), name))
+        .filter(|&(score, _)| score > 0.8)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}
+
+/// `256MiB`, `1.5 GB`, `1000000`: bytes.
+pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
+    let refuse = || format!("`{text}` is no size; give bytes with a unit, such as 256MiB or 2GB");
+    let digits = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let number: f64 = number.parse().map_err(|_| refuse())?;
+    let unit: f64 = match unit.trim().to_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kib" => 1024.0,
+        "kb" => 1e3,
+        "m" | "mib" => 1024.0 * 1024.0,
+        "mb" => 1e6,
+        "g" | "gib" => 1024.0 * 1024.0 * 1024.0,
+        "gb" => 1e9,
+        _ => return Err(refuse()),
+    };
+    let bytes = number * unit;
+    if !(1.0..9e18).contains(&bytes) {
+        return Err(refuse());
+    }
+    Ok(bytes as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        for (text, bytes) in [
+            ("256MiB", 256 << 20),
+            ("2GB", 2_000_000_000),
+            ("1.5k", 1536),
+            ("64", 64),
+            ("8 kb", 8000),
+        ] {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+        for text in [
+            "",
+            "MiB",
+            "-1",
+            "0",
+            "1e3",
+            "12 parsecs",
+            "1..5",
+            "nan",
+            "99999999999GB",
+        ] {
+            assert!(parse_bytes(text).is_err(), "{text}");
+        }
+    }
+}

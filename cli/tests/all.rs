@@ -1,0 +1,23 @@
+//! Every test of the program that may share its process with others.
+//! `cargo test -p tumble-cli --test all plot::` runs those of one file.
+
+mod batch;
+mod cli;
+mod cli_arguments;
+mod configurations;
+mod dat_fixtures;
+mod faults;
+mod peers;
+mod plot;
+mod render;
+mod validation;
+mod view;
+
+#[path = "../../tests/support/application.rs"]
+mod application;
+#[path = "support/browser.rs"]
+mod browser;
+#[path = "support/program.rs"]
+mod program;
+#[path = "../../tests/support/mod.rs"]
+mod support;

@@ -1,0 +1,98 @@
+//! Every way in which the software drivers can be set up gives the CPU's bits, or is
+//! caught by a canary, named and refused.
+#![cfg(target_os = "linux")]
+
+use std::path::Path;
+
+use crate::program::{Run, command, finish};
+use crate::support::vulkan_devices;
+use rayon::prelude::*;
+
+const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
+const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
+
+/// Whether a driver is there; on CI it must be.
+fn is_there(driver: &str) -> bool {
+    let there = Path::new(driver).exists() && !vulkan_devices().is_empty();
+    assert!(
+        there || std::env::var_os("CI").is_none(),
+        "{driver} is not there"
+    );
+    if !there {
+        eprintln!("NOT TESTED: {driver} is not there");
+    }
+    there
+}
+
+/// Every method, and all that follows from rotations, by one driver and by the CPU.
+fn verify(driver: &str, environment: &[(&str, &str)]) -> Run {
+    let root = &crate::program::root();
+    let files = ["data/pendulum.dat", "data/pendulum-random.dat"];
+    let line = [
+        &["verify"][..],
+        &files,
+        &["-m", "all", "--device", "vulkan"],
+    ]
+    .concat();
+    let mut command = command(root, &line);
+    command
+        .env("VK_DRIVER_FILES", driver)
+        .env_remove("VK_ADD_DRIVER_FILES")
+        // It does not know the settings apart.
+        .env("MESA_SHADER_CACHE_DISABLE", "true")
+        .envs(environment.to_vec());
+    finish(command.output().unwrap())
+}
+
+#[test]
+fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
+    if !is_there(LAVAPIPE) {
+        return;
+    }
+    let widths = ["128", "256", "512"];
+    let all: Vec<(&str, String)> = (1..=4)
+        .flat_map(|threads| widths.map(|width| (width, threads.to_string())))
+        .collect();
+    all.par_iter().for_each(|(width, threads)| {
+        let environment = [
+            ("LP_NATIVE_VECTOR_WIDTH", *width),
+            ("LP_NUM_THREADS", threads),
+        ];
+        let run = verify(LAVAPIPE, &environment);
+        let told = String::from_utf8(run.out).unwrap();
+        assert_eq!(run.code, 0, "{environment:?}: {told}{}", run.words);
+        assert!(told.contains(&format!("{width} bits")), "{told}");
+        assert!(told.contains(", 0 differ"), "{environment:?}: {told}");
+    });
+}
+
+#[test]
+fn swiftshader_gives_the_same_bits() {
+    if !is_there(SWIFTSHADER) {
+        return;
+    }
+    let run = verify(SWIFTSHADER, &[]);
+    let told = String::from_utf8(run.out).unwrap();
+    assert_eq!(run.code, 0, "{told}{}", run.words);
+    assert!(
+        told.contains("SwiftShader") && told.contains(", 0 differ"),
+        "{told}"
+    );
+}
+
+/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise: which canary
+/// finds that first depends on the processor.
+#[test]
+fn a_driver_that_is_not_exact_is_named_and_refused() {
+    if !is_there(LAVAPIPE) {
+        return;
+    }
+    let run = verify(LAVAPIPE, &[("GALLIUM_NOSSE", "1")]);
+    assert_eq!(run.code, 6, "{}", run.words);
+    for word in ["llvmpipe", "--allow-inexact"] {
+        assert!(run.words.contains(word), "{word}: {}", run.words);
+    }
+    let canaries = ["contraction", "re-association of a sum"];
+    let is_told = |canary| (run.words).contains(&format!("is not exact: canary `{canary}`"));
+    assert!(canaries.into_iter().any(is_told), "{}", run.words);
+}

@@ -1,0 +1,248 @@
+//! The fuzz targets of `fuzz/`, without `cargo fuzz`: inputs are mutated at random, and
+//! those that lead to something new are mutated further.
+//!
+//! `FUZZ_SECONDS` says how long each target runs; 600 is a run on demand, `scripts/test.sh`
+//! takes 20. A failing input is kept under `target/fuzz/`.
+
+#[path = "../../tests/support/mod.rs"]
+mod support;
+#[path = "../../fuzz/src/targets.rs"]
+mod targets;
+
+use std::collections::HashSet;
+use std::fs;
+use std::panic::catch_unwind;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use support::Random;
+use targets::Target;
+
+/// Longer inputs find no more, and take longer.
+const LONGEST: usize = 4096;
+
+/// Runs a target on mutations of `corpus`; `words` are pieces that its inputs are made of.
+fn fuzz(name: &str, target: Target, mut corpus: Vec<Vec<u8>>, words: &[&str]) {
+    let seconds = std::env::var("FUZZ_SECONDS").map_or(1.0, |text| text.parse().unwrap());
+    let mut random = Random(name.bytes().map(u64::from).sum());
+    let mut seen = HashSet::new();
+    for input in &corpus {
+        seen.insert(run(name, target, input));
+    }
+    let started = Instant::now();
+    let mut runs = 0u64;
+    while started.elapsed() < Duration::from_secs_f64(seconds) {
+        let mut input = corpus[random.next() as usize % corpus.len()].clone();
+        for _ in 0..1 + random.next() % 6 {
+            mutate(&mut input, &mut random, &corpus, words);
+        }
+        let is_new = seen.insert(run(name, target, &input));
+        if is_new && corpus.len() < 20_000 {
+            corpus.push(input);
+        }
+        runs += 1;
+    }
+    println!("{name}: {runs} runs, {} kinds of outcome", seen.len());
+    assert!(
+        seen.len() > 4,
+        "{name}: only {} kinds of outcome",
+        seen.len()
+    );
+}
+
+/// A panic keeps its input.
+fn run(name: &str, target: Target, input: &[u8]) -> u64 {
+    catch_unwind(|| target(input)).unwrap_or_else(|_| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
+        fs::create_dir_all(&folder).unwrap();
+        let file = folder.join(name);
+        fs::write(&file, input).unwrap();
+        panic!("{name} fails on the input in {}", file.display());
+    })
+}
+
+fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &[&str]) {
+    let mut below = |limit: usize| random.next() as usize % limit.max(1);
+    let place = below(input.len());
+    match below(9) {
+        0 if !input.is_empty() => input[place] ^= 1 << below(8),
+        1 if !input.is_empty() => input[place] = below(256) as u8,
+        2 => input.insert(place, below(256) as u8),
+        3 if !input.is_empty() => {
+            let end = (place + 1 + below(16)).min(input.len());
+            input.drain(place..end);
+        }
+        4 if !input.is_empty() => {
+            let end = (place + 1 + below(64)).min(input.len());
+            let piece = input[place..end].to_vec();
+            let to = below(input.len());
+            input.splice(to..to, piece);
+        }
+        5 => input.truncate(place),
+        6 => {
+            let other = &corpus[below(corpus.len())];
+            let from = below(other.len());
+            let piece = other[from..(from + below(64)).min(other.len())].to_vec();
+            input.splice(place..place, piece);
+        }
+        _ if !words.is_empty() => {
+            let word = words[below(words.len())].bytes();
+            let end = (place + below(3) * below(8)).min(input.len());
+            input.splice(place..end, word);
+        }
+        _ => {}
+    }
+    input.truncate(LONGEST);
+}
+
+/// Every good and bad file of the fixtures.
+fn fixtures() -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures/dat");
+    let paths = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let files = paths.filter(|path| path.extension().unwrap() == "dat");
+    files.map(|path| fs::read(path).unwrap()).collect()
+}
+
+#[test]
+fn dat() {
+    let words = [
+        "# 2 3.0\n",
+        "\n",
+        "\r\n",
+        "\r",
+        "\t",
+        " ",
+        "#",
+        "0",
+        "1",
+        "-1",
+        "1e39",
+        "1e-400",
+        "nan",
+        "inf",
+        "0x1",
+        "1_0",
+        "1,5",
+        "+.5e-3",
+        "\u{a0}",
+        "\u{feff}",
+        "\0",
+        "0.7071068",
+        "1e400",
+        "65536",
+        "65537",
+        " 1 0 0 0",
+        "0.5 1 0 0 0 0 1 0 0\n",
+    ];
+    fuzz("dat", targets::dat, fixtures(), &words);
+}
+
+#[test]
+fn outputs() {
+    let seeds = (0..32u8).map(|i| (0..200).map(|j| i.wrapping_mul(31) ^ j).collect());
+    fuzz("outputs", targets::outputs, seeds.collect(), &[]);
+}
+
+#[test]
+fn arguments() {
+    use clap::CommandFactory;
+    let program = tumble_cli::Arguments::command();
+    let mut words: Vec<String> = [
+        "\n",
+        "a.dat",
+        "o.npy",
+        "-",
+        "--",
+        "=",
+        "0",
+        "-1",
+        "1e9",
+        "nan",
+        "30000/1001",
+        "256MiB",
+        "1e400",
+        "\u{fffd}",
+        "all",
+        "x=y",
+    ]
+    .map(str::to_owned)
+    .into();
+    let mut seeds = vec![b"eval\na.dat\n-o\no.npy".to_vec()];
+    for command in program.get_subcommands() {
+        words.push(format!("{}\n", command.get_name()));
+        seeds.push(command.get_name().into());
+        for argument in command.get_arguments() {
+            words.extend(argument.get_long().map(|long| format!("\n--{long}\n")));
+            words.extend(argument.get_short().map(|short| format!("\n-{short}")));
+            let values = argument.get_possible_values();
+            words.extend(values.iter().map(|value| format!("\n{}", value.get_name())));
+        }
+    }
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    fuzz("arguments", targets::arguments, seeds, &words);
+}
+
+#[test]
+fn frames() {
+    let seeds = (0..32u8).map(|i| (0..64).map(|j| i.wrapping_mul(57) ^ (j * 3)).collect());
+    let words = [
+        "30000/1001",
+        "1e-9",
+        "24",
+        "1/0",
+        "0",
+        "1e308",
+        "\u{fa}",
+        "\u{fd}",
+    ];
+    fuzz("frames", targets::frames, seeds.collect(), &words);
+}
+
+#[test]
+fn tracks() {
+    let seeds = (0..64u8).map(|i| {
+        let wave = |j: u8| i.wrapping_mul(j).wrapping_mul(37) ^ j.wrapping_mul(11);
+        [i, 0].into_iter().chain((0..160).map(wave)).collect()
+    });
+    fuzz("tracks", targets::tracks, seeds.collect(), &[]);
+}
+
+#[test]
+fn spirv() {
+    let expressions = [
+        "a + b",
+        "a * b - a",
+        "-a * f32(i32(7))",
+        "select(a, b, a < b)",
+        "a / b",
+        "sqrt(a)",
+        "fma(a, b, a)",
+        "bitcast<f32>(bitcast<u32>(a) ^ 5u)",
+    ];
+    let seeds = expressions.map(kernel_of);
+    assert!(seeds.iter().all(|seed| seed.len() < LONGEST));
+    let words = ["\u{3}\u{2}#\u{7}", "\0\0\0\0", "\u{1}\0\0\0"];
+    fuzz("spirv", targets::spirv, seeds.into(), &words);
+}
+
+/// A small shader, as bytes.
+fn kernel_of(expression: &str) -> Vec<u8> {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    let source = format!(
+        "@group(0) @binding(0) var<storage, read_write> values: array<f32>;
+         @compute @workgroup_size(1) fn main() {{
+             let a = values[0]; let b = values[1];
+             values[2] = {expression};
+         }}"
+    );
+    let module = naga::front::wgsl::parse_str(&source).unwrap();
+    let info = Validator::new(ValidationFlags::all(), Capabilities::all())
+        .validate(&module)
+        .unwrap();
+    let options = naga::back::spv::Options::default();
+    let words = naga::back::spv::write_vec(&module, &info, &options, None).unwrap();
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}

@@ -1,0 +1,212 @@
+//! What reading costs in memory: in a program of its own, because what is counted is the
+//! whole process's.
+#![allow(unsafe_code)] // an allocator
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::{BufReader, Read};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tumble_formats::dat::{DatOptions, Loaded, read_dat};
+use tumble_formats::{Code, Diagnostic};
+
+struct Counting;
+
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+fn grow(bytes: usize) {
+    let now = NOW.fetch_add(bytes, Ordering::Relaxed) + bytes;
+    PEAK.fetch_max(now, Ordering::Relaxed);
+}
+
+// SAFETY: all that it does is count, and pass on.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        grow(layout.size());
+        // SAFETY: as promised to this.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: as promised to this.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        grow(size);
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: as promised to this.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const MIB: usize = 1 << 20;
+
+/// What reading cost at most, beside what was there before; one at a time.
+fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
+    static ONE: Mutex<()> = Mutex::new(());
+    let _one = ONE
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let before = NOW.load(Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
+    let reader = BufReader::with_capacity(1 << 18, input);
+    let loaded = read_dat("t", reader, &DatOptions::default());
+    (loaded, PEAK.load(Ordering::Relaxed) - before)
+}
+
+/// Lines made when they are read: a file that is nowhere.
+struct Lines<F> {
+    make: F,
+    number: usize,
+    line: Vec<u8>,
+    done: usize,
+    total: usize,
+}
+
+impl<F: FnMut(usize, &mut Vec<u8>)> Lines<F> {
+    fn new(make: F) -> Self {
+        let (line, number, done, total) = (Vec::new(), 0, 0, 0);
+        Self {
+            make,
+            number,
+            line,
+            done,
+            total,
+        }
+    }
+}
+
+impl<F: FnMut(usize, &mut Vec<u8>)> Read for Lines<F> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        if self.done == self.line.len() {
+            self.line.clear();
+            (self.make)(self.number, &mut self.line);
+            (self.number, self.done) = (self.number + 1, 0);
+        }
+        let count = out.len().min(self.line.len() - self.done);
+        out[..count].copy_from_slice(&self.line[self.done..self.done + count]);
+        self.done += count;
+        self.total += count;
+        Ok(count)
+    }
+}
+
+/// A file of so many bytes costs its keys and times, and a bounded amount more.
+/// `LARGE_FILE` is its length in bytes, as 2000000000.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_large_file_is_read_in_bounded_extra_memory() {
+    use std::io::Write;
+
+    let length = std::env::var("LARGE_FILE").map_or(100_000_000, |text| text.parse().unwrap());
+    for boxes in [1, 3, 200] {
+        let mut written = 0;
+        let mut input = Lines::new(|number, line: &mut Vec<u8>| {
+            if number == 0 {
+                writeln!(line, "# {boxes} 1").unwrap();
+            } else if written < length {
+                write!(line, "{:.6}", number as f64 * 0.01).unwrap();
+                for _ in 0..boxes {
+                    line.extend_from_slice(b" 0.707107 -0.707107 0.000000 0.000000");
+                }
+                line.push(b'\n');
+            }
+            written += line.len();
+        });
+        let started = std::time::Instant::now();
+        let before = resident(true);
+        let (loaded, _) = reading(&mut input);
+        let peak = resident(false) - before;
+        let set = loaded.unwrap().set;
+        let own = set.key_count() * 16 + set.track(0).times.len() * 8;
+        let extra = peak.saturating_sub(own);
+        println!(
+            "{boxes} boxes, {} MB: {} MB of keys and times, {} MB more, {:.0} MB/s",
+            input.total / 1_000_000,
+            own / 1_000_000,
+            extra / 1_000_000,
+            input.total as f64 / 1e6 / started.elapsed().as_secs_f64()
+        );
+        // A block of keys and one of times are in two places at most.
+        assert!(extra < 128 * MIB, "{boxes} boxes: {} MiB more", extra / MIB);
+    }
+}
+
+#[cfg(target_os = "linux")]
+/// The most memory that was resident since this was last asked to begin anew, bytes.
+fn resident(begin: bool) -> usize {
+    if begin {
+        std::fs::write("/proc/self/clear_refs", "5").unwrap();
+    }
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"));
+    let kibibytes: usize = line
+        .unwrap()
+        .split_whitespace()
+        .nth(1)
+        .unwrap()
+        .parse()
+        .unwrap();
+    kibibytes * 1024
+}
+
+/// What is refused costs no more than was read of it and 64 MiB, whatever it claims.
+#[test]
+fn a_refusal_costs_no_more_than_was_read() {
+    let wide = |number: usize, line: &mut Vec<u8>| match number {
+        0 => line.extend_from_slice(b"# 65536 1\n"),
+        1..4 => {
+            line.push(b'0' + number as u8);
+            for _ in 0..65_536 - usize::from(number == 3) {
+                line.extend_from_slice(b" 1 0 0 0");
+            }
+            line.push(b'\n');
+        }
+        _ => {}
+    };
+    let repeated = |start: &'static str, piece: &'static str| {
+        move |number: usize, line: &mut Vec<u8>| {
+            let text = if number == 0 { start } else { piece };
+            line.extend_from_slice(text.as_bytes());
+        }
+    };
+    type Make = Box<dyn FnMut(usize, &mut Vec<u8>)>;
+    let cases: [(Code, Make); 6] = [
+        (
+            Code::Columns,
+            Box::new(repeated("# 65536 1\n", "0 1 0 0 0\n")),
+        ),
+        (Code::Columns, Box::new(wide)),
+        (
+            Code::LineTooLong,
+            Box::new(repeated("# 1 1\n", "0 0 0 0 0 0 0 0")),
+        ),
+        (
+            Code::LineTooLong,
+            Box::new(repeated("", "7777777777777777")),
+        ),
+        (
+            Code::Boxes,
+            Box::new(repeated("# 99999999999999999999 1\n", "0\n")),
+        ),
+        (Code::LineTooLong, Box::new(repeated("# 1 1\n0 ", "1"))),
+    ];
+    for (code, make) in cases {
+        let mut input = Lines::new(make);
+        let (loaded, peak) = reading(&mut input);
+        assert_eq!(loaded.unwrap_err().code, code);
+        let read = input.total;
+        assert!(
+            peak <= 64 * MIB + read,
+            "{code}: {} KiB for {} KiB",
+            peak / 1024,
+            read / 1024
+        );
+    }
+}

@@ -1,0 +1,87 @@
+//! The program, and a folder of files to run it on.
+#![allow(dead_code)] // each test file uses some of it
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use glam::{Quat, Vec3};
+
+/// The root of the repository.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Five keys of two tracks, as [`sample_folder`] writes them to `a.dat`.
+pub(crate) fn pendulum() -> (Vec<f64>, Vec<Quat>) {
+    let times = [0.0, 0.5, 1.0, 1.5, 2.0].to_vec();
+    let angles = [0.0, 0.9, 0.25, -0.5, 0.125];
+    let about = |axis: Vec3| angles.map(|angle| Quat::from_axis_angle(axis, angle));
+    (times, [about(Vec3::Z), about(Vec3::X)].concat())
+}
+
+/// A folder with `a.dat`, `b.dat` and `folder/a.dat` (good), `bad.dat` (not), and
+/// `old.npy`, which nobody may touch unasked.
+pub(crate) fn sample_folder() -> tempfile::TempDir {
+    let (times, keys) = pendulum();
+    let mut text = String::from("# 2 3\n");
+    for (i, time) in times.iter().enumerate() {
+        let _ = write!(text, "{time}");
+        for track in 0..2 {
+            let q = keys[track * times.len() + i];
+            let _ = write!(text, "  {} {} {} {}", q.w, q.x, q.y, q.z);
+        }
+        text.push('\n');
+    }
+    let place = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).unwrap();
+    for folder in ["folder", "empty"] {
+        std::fs::create_dir(place.path().join(folder)).unwrap();
+    }
+    for name in ["a.dat", "b.dat", "folder/a.dat"] {
+        write(name, &text);
+    }
+    write("bad.dat", "# 2 3\n0 1 0 0\n");
+    write("old.npy", "old");
+    write("antipodal.dat", "# 1 1\n0 1 0 0 0\n1 -1 0 0 0\n");
+    write("t.txt", "0\n1\n");
+    place
+}
+
+/// Hides every Vulkan driver from a program, as old and as new loaders know it.
+pub(crate) fn no_vulkan(command: &mut Command) -> &mut Command {
+    command
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+}
+
+/// A run of the program in `place`.
+pub(crate) struct Run {
+    pub(crate) code: i32,
+    pub(crate) out: Vec<u8>,
+    pub(crate) words: String,
+}
+
+pub(crate) fn command(place: &Path, line: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tumble"));
+    command.current_dir(place).args(line).stdin(Stdio::null());
+    command
+}
+
+pub(crate) fn finish(output: Output) -> Run {
+    Run {
+        code: output.status.code().unwrap_or(-1),
+        out: output.stdout,
+        words: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+pub(crate) fn run(place: &Path, line: &[&str]) -> Run {
+    finish(command(place, line).output().unwrap())
+}
+
+pub(crate) fn succeed(place: &Path, line: &[&str]) -> Run {
+    let run = run(place, line);
+    assert_eq!(run.code, 0, "{line:?}: {}", run.words);
+    run
+}

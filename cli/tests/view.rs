@@ -1,0 +1,694 @@
+//! The page of `tumble view`, in a real browser: what is drawn, what every key and
+//! control does, and that the rotations shown are the engine's.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::browser::Page;
+use crate::program::{run, sample_folder, succeed};
+use glam::Quat;
+use sha1::{Digest, Sha1};
+use tumble::METHODS;
+
+fn root() -> PathBuf {
+    crate::program::root()
+}
+
+fn sample_data(name: &str) -> String {
+    root().join("data").join(name).display().to_string()
+}
+
+fn page(place: &Path, line: &[&str]) -> Option<Page> {
+    let line = [&["view", "-o", "view.html", "--overwrite"], line].concat();
+    succeed(place, &line);
+    Page::open(&place.join("view.html"))
+}
+
+/// Rotations `[track][sample]` by `tumble eval`.
+fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
+    let line = [&["eval", "-o", "out.npy", "--overwrite"], line].concat();
+    succeed(place, &line);
+    let bytes = fs::read(place.join("out.npy")).unwrap();
+    let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+    let shape = file.shape().to_vec();
+    let numbers = file.into_vec::<f32>().unwrap();
+    let quats = numbers.chunks(4).map(|q| Quat::from_slice(q)).collect();
+    (shape, quats)
+}
+
+fn quat(value: &serde_json::Value) -> Quat {
+    let component = |place: usize| value[place].as_f64().unwrap() as f32;
+    Quat::from_xyzw(component(0), component(1), component(2), component(3))
+}
+
+/// How far two rotations are apart, component by component; the sign does not matter.
+fn apart(a: Quat, b: Quat) -> f32 {
+    let b = if a.dot(b) < 0.0 { -b } else { b };
+    (a - b)
+        .to_array()
+        .into_iter()
+        .map(f32::abs)
+        .fold(0.0, f32::max)
+}
+
+/// A page older than its sources would be tested, and shipped, in vain.
+#[test]
+fn the_page_is_built_from_its_sources() {
+    let web = root().join("web");
+    let mut names: Vec<PathBuf> = fs::read_dir(web.join("src"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    names.sort();
+    names.extend([web.join("build.mjs"), web.join("package-lock.json")]);
+    let mut hash = Sha1::new();
+    for name in names {
+        hash.update(fs::read(name).unwrap());
+    }
+    let hash: String = hash
+        .finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let page = fs::read_to_string(web.join("dist/view.html")).unwrap();
+    assert!(
+        page.contains(&format!("sources {hash}")),
+        "web/dist/view.html is older than web/src: npm ci && npm run build in web/"
+    );
+    for licence in ["three 0.", "uplot 1.", "Permission is hereby granted"] {
+        assert!(page.contains(licence), "no `{licence}` in the page");
+    }
+}
+
+#[test]
+fn it_loads_alone_and_draws_boxes_that_move() {
+    let place = sample_folder();
+    let sample = sample_data("pendulum.dat");
+    let Some(mut page) = page(place.path(), &[&sample]) else {
+        return;
+    };
+    let size = fs::metadata(place.path().join("view.html")).unwrap().len();
+    assert!(size < 2_000_000, "{size} bytes");
+    let about = page.value("document.querySelector('#about').textContent");
+    let device = succeed(place.path(), &["eval", &sample, "-o", "d.npy"]).words;
+    let device = device
+        .split(" on ")
+        .nth(1)
+        .unwrap()
+        .split(" in ")
+        .next()
+        .unwrap();
+    assert!(
+        about.as_str().unwrap().contains(device),
+        "{about} names not {device}"
+    );
+
+    page.value("tumble.seek(0)");
+    let (start, _) = page.pixels("#stage");
+    page.value("tumble.seek(3.3)");
+    let (later, width) = page.pixels("#stage");
+    // Boxes are colourful, ground and floor are not.
+    let colourful =
+        |pixel: &&[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap() > 60;
+    for pixels in [&start, &later] {
+        let boxes = pixels.iter().filter(colourful).count();
+        assert!(
+            boxes > pixels.len() / 200,
+            "{boxes} pixels of boxes, width {width}"
+        );
+    }
+    let different = start.iter().zip(&later).filter(|(a, b)| a != b).count();
+    assert!(
+        different > start.len() / 200,
+        "{different} pixels differ between two times"
+    );
+
+    // It moves by itself, and stops.
+    page.click("#play");
+    page.wait("tumble.state.playing && tumble.state.time > 3.5");
+    page.click("#play");
+    assert_eq!(page.value("tumble.state.playing"), false);
+
+    let address = format!("file://{}", place.path().join("view.html").display());
+    assert!(
+        page.requests.iter().all(|request| *request == address),
+        "{:?}",
+        page.requests
+    );
+    assert!(!page.requests.is_empty(), "requests are seen at all");
+    assert_eq!(page.errors, Vec::<String>::new());
+}
+
+/// Keys at uneven times, between frames: the page shows a key itself there.
+#[test]
+fn the_rotations_shown_are_the_engine_s() {
+    let place = sample_folder();
+    let sample = sample_data("pendulum-random.dat");
+    let Some(mut page) = page(place.path(), &[&sample, "--fps", "30"]) else {
+        return;
+    };
+    let text = fs::read_to_string(&sample).unwrap();
+    let key_times: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    let times: Vec<String> = (0..40).map(|i| format!("{}", f64::from(i) / 2.0)).collect();
+    let times: Vec<&str> = times
+        .iter()
+        .map(String::as_str)
+        .chain(key_times.iter().copied())
+        .collect();
+    fs::write(place.path().join("times.txt"), times.join("\n")).unwrap();
+    let mut largest = 0.0f32;
+    for method in METHODS {
+        let line = [&sample, "-m", method.name, "--times", "times.txt"];
+        let (shape, expected) = evaluated(place.path(), &line);
+        assert_eq!(shape[..2], [4, times.len() as u64]);
+        page.choose("#method", method.name);
+        page.value("tumble.loaded().then(() => true)");
+        let list = times.join(",");
+        // What is drawn: read back from the matrices that three.js was given.
+        let shown = page.value(&format!(
+            "[{list}].map((time) => {{ tumble.seek(time); return [0, 1, 2, 3].map((box) => tumble.shown(box)) }})"
+        ));
+        for (sample, time) in times.iter().enumerate() {
+            for track in 0..4 {
+                let found = quat(&shown[sample][track]);
+                let off = apart(found, expected[track * times.len() + sample]);
+                assert!(off < 1e-4, "{method}, {time} s, box {track}: off by {off}");
+                largest = largest.max(off);
+            }
+        }
+    }
+    println!("largest difference of a component: {largest:.1e}");
+    assert!(largest > 0.0, "16 bits leave something");
+}
+
+#[test]
+fn every_key_does_what_it_says() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    // Keys at 0, 0.5, 1, 1.5 and 2 s; 60 frames a second.
+    for (key, expected) in [
+        ("s", "tumble.state.method === 'slerp' && legend === 'slerp'"),
+        (
+            "c",
+            "tumble.state.method === 'catmull-rom' && legend === 'catmull-rom'",
+        ),
+        (
+            "b",
+            "tumble.state.method === 'bessel-overhauser' && legend === 'bessel-overhauser'",
+        ),
+        ("ArrowRight", "tumble.state.sample === 1"),
+        ("ArrowRight", "tumble.state.sample === 2"),
+        ("ArrowLeft", "tumble.state.sample === 1"),
+        ("]", "tumble.state.time === 0.5"),
+        ("]", "tumble.state.time === 1"),
+        ("[", "tumble.state.time === 0.5"),
+        ("End", "tumble.state.time === 2"),
+        (
+            "Home",
+            "tumble.state.time === 0 && document.querySelector('#time').value === '0'",
+        ),
+        (
+            " ",
+            "tumble.state.playing && document.querySelector('#play').textContent === 'Pause'",
+        ),
+        (
+            " ",
+            "!tumble.state.playing && document.querySelector('#play').textContent === 'Play'",
+        ),
+        (
+            "g",
+            "tumble.state.other === 'slerp' && legend === 'bessel-overhauser|ghost: slerp'",
+        ),
+        (
+            "g",
+            "tumble.state.pairing === 'side' && legend === 'left: bessel-overhauser|right: slerp'",
+        ),
+        (
+            "g",
+            "tumble.state.other === '' && legend === 'bessel-overhauser'",
+        ),
+        (
+            "a",
+            "tumble.state.apart && document.querySelector('#arrangement').value === 'apart'",
+        ),
+        ("a", "!tumble.state.apart"),
+        (
+            "n",
+            "tumble.state.box === 1 && document.querySelector('#box').value === '2'",
+        ),
+        ("n", "tumble.state.box === 1"),
+        ("p", "tumble.state.box === 0"),
+        (
+            "+",
+            "tumble.state.speed === 2 && document.querySelector('#speed').value === '2'",
+        ),
+        ("-", "tumble.state.speed === 1"),
+        ("-", "tumble.state.speed === 0.5"),
+        ("=", "tumble.state.speed === 1"),
+        (
+            "l",
+            "!tumble.state.loop && !document.querySelector('#loop').checked",
+        ),
+        ("l", "tumble.state.loop"),
+        ("t", "document.documentElement.dataset.theme === 'dark'"),
+        ("t", "document.documentElement.dataset.theme === 'light'"),
+        (
+            "?",
+            "document.querySelector('#help').open && document.querySelectorAll('#keys dt').length > 10",
+        ),
+        ("Escape", "!document.querySelector('#help').open"),
+        ("m", "document.activeElement.id === 'method'"),
+    ] {
+        page.press(key);
+        let legend =
+            "[...document.querySelectorAll('#legend span')].map((e) => e.textContent).join('|')";
+        let expected = expected.replace("legend", legend);
+        page.value("tumble.loaded().then(() => true)");
+        page.wait(&expected);
+    }
+    assert_eq!(page.errors, Vec::<String>::new());
+}
+
+#[test]
+fn the_view_turns_and_fits_again() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    let (before, _) = page.pixels("#stage");
+    let mut seen = vec![before.clone()];
+    page.value("document.querySelector('#stage').focus()");
+    for key in ["ArrowRight", "ArrowUp", "PageUp"] {
+        page.press(key);
+        seen.push(page.pixels("#stage").0);
+    }
+    page.drag("#stage", (120.0, 30.0));
+    seen.push(page.pixels("#stage").0);
+    for (place, pair) in seen.windows(2).enumerate() {
+        assert!(pair[0] != pair[1], "view {place} is that before it");
+    }
+    page.press("r");
+    assert!(
+        page.pixels("#stage").0 == before,
+        "r brings the first view back"
+    );
+    assert_eq!(
+        page.value("tumble.state.sample"),
+        0,
+        "arrows turned the view, not time"
+    );
+}
+
+#[test]
+fn every_control_does_what_it_says() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat", "b.dat"]) else {
+        return;
+    };
+    for (selector, expected) in [
+        ("#key-after", "tumble.state.time === 0.5"),
+        ("#key-after", "tumble.state.time === 1"),
+        ("#key-before", "tumble.state.time === 0.5"),
+        ("#to-start", "tumble.state.time === 0"),
+        ("#play", "tumble.state.playing"),
+        ("#play", "!tumble.state.playing"),
+        ("#loop", "!tumble.state.loop"),
+        (
+            "#theme",
+            "document.documentElement.dataset.theme === 'dark'",
+        ),
+        ("#help-open", "document.querySelector('#help').open"),
+        ("#help button", "!document.querySelector('#help').open"),
+        (
+            "#components .u-over",
+            "Math.abs(tumble.state.time - 1) < 0.02",
+        ),
+    ] {
+        page.click(selector);
+        page.wait(expected);
+    }
+    for (selector, value, expected) in [
+        ("#time", "30", "tumble.state.time === 0.5"),
+        ("#speed", "0.25", "tumble.state.speed === 0.25"),
+        ("#other", "slerp", "tumble.state.other === 'slerp'"),
+        ("#pairing", "side", "tumble.state.pairing === 'side'"),
+        ("#arrangement", "apart", "tumble.state.apart"),
+        ("#box", "2", "tumble.state.box === 1"),
+        ("#box", "99", "tumble.state.box === 1"),
+        (
+            "#set",
+            "1",
+            "tumble.state.input.name === 'b.dat' && document.title.startsWith('b.dat')",
+        ),
+    ] {
+        page.choose(selector, value);
+        page.value("tumble.loaded().then(() => true)");
+        page.wait(expected);
+    }
+    for method in METHODS {
+        page.choose("#method", method.name);
+        page.value("tumble.loaded().then(() => true)");
+        let shown = page.value("document.querySelector('#legend').textContent");
+        assert!(
+            shown.as_str().unwrap().contains(method.name),
+            "{method}: {shown}"
+        );
+    }
+    assert_eq!(page.errors, Vec::<String>::new());
+}
+
+#[test]
+fn a_click_on_a_box_shows_its_curves() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    let area = page.value("(() => { const r = document.querySelector('#stage').getBoundingClientRect(); return [r.x, r.y] })()");
+    let (pixels, width) = page.pixels("#stage");
+    // Orange is the second box; a pixel inside it has orange ones all round.
+    let orange = |pixel: &[u8; 3]| pixel[0] > 90 && pixel[1] > pixel[0] / 2 && pixel[2] < 30;
+    let inside = (4 * width + 4..pixels.len() - 4 * width - 4).find(|&at| {
+        let round = [at, at - 4, at + 4, at - 4 * width, at + 4 * width];
+        round.iter().all(|&place| orange(&pixels[place]))
+    });
+    let at = inside.expect("the second box is seen");
+    let (x, y) = ((at % width) as f64, (at / width) as f64);
+    page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
+    page.wait("tumble.state.box === 1 && document.querySelector('#box').value === '2'");
+}
+
+/// Without looping it stops at the end; with it, it begins again.
+#[test]
+fn it_loops_or_stops_at_the_end() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    page.value("tumble.seek(1.9)");
+    page.press(" ");
+    page.wait("tumble.state.playing && tumble.state.time < 1");
+    page.press(" ");
+    page.press("l");
+    page.value("tumble.seek(1.9)");
+    page.press(" ");
+    page.wait("!tumble.state.playing && tumble.state.time === 2");
+    page.press(" ");
+    page.wait("tumble.state.playing && tumble.state.time < 1");
+}
+
+#[test]
+fn ghosts_and_pairs_are_drawn() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    page.value("tumble.seek(0.25)");
+    let (alone, _) = page.pixels("#stage");
+    page.choose("#other", "step");
+    page.value("tumble.loaded().then(() => true)");
+    let (ghost, _) = page.pixels("#stage");
+    assert!(alone != ghost);
+    // The ghost shows its own method.
+    let (own, other) = (
+        page.value("tumble.shown(0)"),
+        page.value("tumble.shown(0, 1)"),
+    );
+    assert!(apart(quat(&own), quat(&other)) > 0.1, "{own} and {other}");
+    page.choose("#pairing", "side");
+    page.value("tumble.loaded().then(() => true)");
+    let (side, width) = page.pixels("#stage");
+    let colourful =
+        |pixel: &[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap() > 60;
+    let halves = side.chunks(width).fold([0, 0], |[left, right], row| {
+        let count = |half: &[[u8; 3]]| half.iter().filter(|pixel| colourful(pixel)).count();
+        let (l, r) = row.split_at(width / 2);
+        [left + count(l), right + count(r)]
+    });
+    assert!(
+        halves.iter().all(|&pixels| pixels > 200),
+        "left and right: {halves:?}"
+    );
+}
+
+/// The cursors of the curves move with time, the dots are where the keys are.
+#[test]
+fn curves_follow_time_and_box() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat", "--fps", "50"]) else {
+        return;
+    };
+    let now = "Number(/translateX\\(([\\d.]+)px/.exec(document.querySelector('#components .now').style.transform)[1]) \
+               / document.querySelector('#components .u-over').clientWidth";
+    for time in [0.5, 1.0, 1.5] {
+        page.value(&format!("tumble.seek({time})"));
+        let share = page.value(now).as_f64().unwrap();
+        assert!((share - time / 2.0).abs() < 0.01, "at {time} s: {share}");
+    }
+    // z turns in box 1, x in box 2; a quarter turn's sine is the half angle's.
+    page.value("tumble.seek(0.5)");
+    let values = page.value("document.querySelector('#box-values').textContent");
+    let expected = format!("z +{:.4}", (0.45f64).sin());
+    assert!(
+        values.as_str().unwrap().contains(&expected),
+        "{values} has not {expected}"
+    );
+    page.press("n");
+    let values = page.value("document.querySelector('#box-values').textContent");
+    let expected = format!("x +{:.4}", (0.45f64).sin());
+    assert!(
+        values.as_str().unwrap().contains(&expected),
+        "{values} has not {expected}"
+    );
+    assert_eq!(
+        page.value("document.querySelectorAll('#plots canvas').length"),
+        2
+    );
+    let labels = page.value(
+        "[...document.querySelectorAll('#plots .u-label')].map((e) => e.textContent).join('|')",
+    );
+    for label in [
+        "w",
+        "x",
+        "y",
+        "z",
+        "key w",
+        "angular speed, bessel-overhauser, rad/s",
+    ] {
+        assert!(
+            labels.as_str().unwrap().split('|').any(|own| own == label),
+            "{label} in {labels}"
+        );
+    }
+}
+
+#[test]
+fn it_is_readable_on_a_phone_by_night_and_by_keyboard() {
+    let place = sample_folder();
+    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+        return;
+    };
+    let ground = "getComputedStyle(document.body).backgroundColor";
+    page.scheme("light");
+    let light = page.value(ground);
+    page.scheme("dark");
+    let dark = page.value(ground);
+    assert_ne!(light, dark);
+    let brightness = |(pixels, _): (Vec<[u8; 3]>, usize)| {
+        pixels.iter().map(|pixel| u64::from(pixel[1])).sum::<u64>() / pixels.len() as u64
+    };
+    assert!(brightness(page.pixels("#stage")) < 80);
+    page.scheme("light");
+    assert!(brightness(page.pixels("#stage")) > 180);
+
+    for width in [320, 390, 768] {
+        page.size(width, 800);
+        page.wait(&format!("document.documentElement.scrollWidth <= {width}"));
+        page.wait(&format!(
+            "document.querySelector('.uplot').clientWidth <= {width}"
+        ));
+        let cut = page.value(
+            "[...document.querySelectorAll('button, select, input')].filter((e) => e.checkVisibility()) \
+             .filter((e) => e.getBoundingClientRect().right > innerWidth).length",
+        );
+        assert_eq!(cut, 0, "controls beyond the edge at {width}");
+    }
+
+    let mut reached = Vec::new();
+    for _ in 0..24 {
+        page.press("Tab");
+        reached.push(
+            page.value("document.activeElement.id")
+                .as_str()
+                .unwrap_or_default()
+                .to_owned(),
+        );
+    }
+    for id in [
+        "method",
+        "other",
+        "arrangement",
+        "theme",
+        "help-open",
+        "stage",
+        "to-start",
+        "play",
+        "time",
+        "speed",
+        "loop",
+        "box",
+    ] {
+        assert!(
+            reached.iter().any(|own| own == id),
+            "Tab does not reach {id}: {reached:?}"
+        );
+    }
+    let unnamed = page.value(
+        "[...document.querySelectorAll('button, select, input')] \
+         .filter((e) => !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).length",
+    );
+    assert_eq!(unnamed, 0, "controls without a name");
+}
+
+/// A thousand boxes: right, and how fast (no test of speed: it is only said).
+#[test]
+fn a_thousand_boxes_are_shown() {
+    let place = sample_folder();
+    let line = "generate --boxes 1000 --keys 12 --seconds 3 --random -o many.dat";
+    succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
+    let Some(mut page) = page(place.path(), &["many.dat", "-m", "slerp"]) else {
+        return;
+    };
+    fs::write(place.path().join("times.txt"), "1.5").unwrap();
+    let (_, expected) = evaluated(
+        place.path(),
+        &["many.dat", "-m", "slerp", "--times", "times.txt"],
+    );
+    assert_eq!(
+        page.value("tumble.state.apart"),
+        true,
+        "so long a chain is a tangle"
+    );
+    for arrangement in ["chain", "apart"] {
+        page.choose("#arrangement", arrangement);
+        page.value("tumble.loaded().then(() => true)");
+        page.value("tumble.seek(1.5)");
+        let shown = page.value("Array.from({length: 1000}, (_, box) => tumble.shown(box))");
+        for (track, &expected) in expected.iter().enumerate() {
+            let off = apart(quat(&shown[track]), expected);
+            assert!(off < 1e-4, "box {track}, {arrangement}: off by {off}");
+        }
+        page.value("tumble.seek(0)");
+        page.click("#play");
+        let rate = page.value(
+            "(async () => { const frames = tumble.frames(), start = performance.now(); \
+             await new Promise((done) => setTimeout(done, 2000)); \
+             return (tumble.frames() - frames) / (performance.now() - start) * 1000 })()",
+        );
+        page.click("#play");
+        println!(
+            "1000 boxes, {arrangement}: {:.1} frames per second",
+            rate.as_f64().unwrap()
+        );
+        assert!(rate.as_f64().unwrap() > 0.0, "it moves");
+    }
+}
+
+#[test]
+fn names_cannot_break_the_page() {
+    let place = sample_folder();
+    let name = "a</script><b>&$&.dat".replace('/', "");
+    fs::copy(place.path().join("a.dat"), place.path().join(&name)).unwrap();
+    let Some(mut page) = page(place.path(), &[&name, "-m", "slerp"]) else {
+        return;
+    };
+    assert_eq!(
+        page.value("document.querySelector('#title').textContent"),
+        name
+    );
+    assert_eq!(page.value("document.querySelectorAll('b').length"), 0);
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused() {
+    let place = sample_folder();
+    fs::write(place.path().join("old.html"), "old").unwrap();
+    for (line, code, message) in [
+        ("view a.dat", 2, "--out"),
+        (
+            "view a.dat -o old.html",
+            2,
+            "old.html: exists; give --overwrite to replace it",
+        ),
+        (
+            "view a.dat -o - --open",
+            2,
+            "standard output cannot be opened in a browser",
+        ),
+        (
+            "view a.dat -o x.html --fps 1e7",
+            2,
+            "are more than a page can hold; ask for fewer frames",
+        ),
+        (
+            "view a.dat -o x.html --fps 500000 -m all",
+            2,
+            "more than the 256.0 MB that a page can hold",
+        ),
+        ("view bad.dat -o x.html", 4, "bad.dat:2"),
+        ("view a.dat -o x.html -m slurp", 2, "slerp"),
+    ] {
+        let run = run(place.path(), &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(run.code, code, "{line}: {}", run.words);
+        assert!(run.words.contains(message), "{line}: {}", run.words);
+        assert!(!place.path().join("x.html").exists(), "{line}");
+    }
+    assert_eq!(fs::read(place.path().join("old.html")).unwrap(), b"old");
+    let piped = succeed(place.path(), &["view", "a.dat", "-o", "-"]);
+    assert!(piped.out.starts_with(b"<!doctype html>"));
+}
+
+/// A browser stood in for by a script that says what it was given.
+#[cfg(unix)]
+#[test]
+fn open_shows_the_page_to_the_browser() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let place = sample_folder();
+    let browser = place.path().join("xdg-open");
+    fs::write(
+        &browser,
+        "#!/bin/sh\necho \"$1\" > opened.part && mv opened.part opened\n",
+    )
+    .unwrap();
+    fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!("{}:/usr/bin:/bin", place.path().display());
+    let view = |line: &[&str]| {
+        let mut command = crate::program::command(place.path(), line);
+        let run = crate::program::finish(command.env("PATH", &path).output().unwrap());
+        assert_eq!(run.code, 0, "{}", run.words);
+        let opened = place.path().join("opened");
+        for _ in 0..100 {
+            if opened.exists() {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        let file = fs::read_to_string(&opened).unwrap().trim().to_owned();
+        fs::remove_file(opened).unwrap();
+        file
+    };
+    assert_eq!(view(&["view", "a.dat", "-o", "x.html", "--open"]), "x.html");
+    let temporary = view(&["view", "a.dat", "--open"]);
+    assert!(
+        fs::read_to_string(&temporary)
+            .unwrap()
+            .starts_with("<!doctype html>")
+    );
+    fs::remove_file(temporary).unwrap();
+}

@@ -1,0 +1,133 @@
+//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame; or the
+//! numbers of another encoding in the place of those of quaternions.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use glam::Quat;
+
+use tumble::{Encoding, Timeline, TrackSet};
+
+/// Writes frames as they come, with as many digits as it takes to read the same bits
+/// again; times are seconds.
+pub struct CsvWriter<'a, W: Write> {
+    csv: ::csv::Writer<W>,
+    timeline: &'a Timeline,
+    encoding: Encoding,
+    tracks: usize,
+    /// The next frame to be written.
+    frame: usize,
+    /// Memory for a number.
+    text: String,
+}
+
+impl<'a, W: Write> CsvWriter<'a, W> {
+    /// Writes the header for a set's rotations at the samples of a timeline. F16 and
+    /// Snorm16 are written as F32: digits cost nothing here.
+    ///
+    /// # Errors
+    /// When writing fails.
+    pub fn new(
+        writer: W,
+        set: &TrackSet,
+        timeline: &'a Timeline,
+        encoding: Encoding,
+    ) -> io::Result<Self> {
+        let mut writer = Self {
+            csv: ::csv::Writer::from_writer(writer),
+            timeline,
+            encoding,
+            tracks: set.track_count(),
+            frame: 0,
+            text: String::new(),
+        };
+        writer.header(set).map_err(io_error)?;
+        Ok(writer)
+    }
+
+    /// Writes the next frames, `[frame][track]`.
+    ///
+    /// # Errors
+    /// When writing fails, or (`InvalidInput`) the last frame is not whole or there
+    /// are more than the timeline has.
+    pub fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        let frames = rotations.chunks_exact(self.tracks.max(1));
+        if !frames.remainder().is_empty() || self.frame + frames.len() > self.timeline.len() {
+            let message = "not whole frames, or more than there are";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        }
+        for frame in frames {
+            self.row(frame).map_err(io_error)?;
+        }
+        Ok(())
+    }
+
+    /// Flushes what was written.
+    ///
+    /// # Errors
+    /// When that fails, or (`InvalidInput`) frames are missing.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.csv.flush()?;
+        if self.frame < self.timeline.len() {
+            let message = "there are fewer frames than the timeline has";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        }
+        Ok(())
+    }
+
+    fn header(&mut self, set: &TrackSet) -> ::csv::Result<()> {
+        self.csv.write_field("frame")?;
+        self.csv.write_field("time")?;
+        for track in 0..set.track_count() {
+            let name = set.track_name(track);
+            let mut components = self.encoding.components();
+            if self.is_quaternion() {
+                components.rotate_right(1);
+            }
+            for component in components {
+                self.csv.write_field(format!("{name}.{component}"))?;
+            }
+        }
+        self.csv.write_record(None::<&[u8]>)
+    }
+
+    /// Those are written `w` first, as in `.dat` files, and never rounded.
+    fn is_quaternion(&self) -> bool {
+        matches!(
+            self.encoding,
+            Encoding::F32 | Encoding::F16 | Encoding::Snorm16
+        )
+    }
+
+    fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
+        self.csv.write_field(self.frame.to_string())?;
+        let time = self.timeline.time(0, self.frame);
+        self.csv.write_field(time.to_string())?;
+        let mut bytes = vec![0; self.encoding.bytes()];
+        let is_quaternion = self.is_quaternion();
+        for q in frame {
+            let mut numbers = q.to_array().to_vec();
+            if is_quaternion {
+                numbers.rotate_right(1);
+            } else {
+                self.encoding.encode(&[q.to_array()], &mut bytes);
+                numbers = bytemuck::pod_collect_to_vec(&bytes);
+            }
+            for component in numbers {
+                self.text.clear();
+                let _ = write!(self.text, "{component}"); // a String takes everything
+                self.csv.write_field(&self.text)?;
+            }
+        }
+        self.frame += 1;
+        self.csv.write_record(None::<&[u8]>)
+    }
+}
+
+/// The conversion that the crate offers loses the kind, a broken pipe's too.
+fn io_error(error: ::csv::Error) -> io::Error {
+    match error.into_kind() {
+        ::csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}

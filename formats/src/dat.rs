@@ -1,0 +1,417 @@
+//! The `.dat` keyframe format:
+//!
+//! ```text
+//! # <boxes> <box length>
+//! <time> <w> <x> <y> <z>  <w> <x> <y> <z> …
+//! ```
+//!
+//! A header, then a line for each key: a time in seconds and a quaternion for each
+//! box. Read as a stream; what is refused costs memory in proportion to what was
+//! read, never to a number that the file claims.
+
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+
+use glam::{DQuat, Quat};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::quaternion::{dot, rounded, unit};
+use crate::source::Source;
+use crate::text::blocks::Blocks;
+use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::number;
+use tumble::{NORM_TOLERANCE, TrackSet, UNIT_TOLERANCE};
+
+/// More boxes are refused.
+pub const MAX_BOXES: usize = 65_536;
+
+/// Norms within this of 1 are normalised without a word: six printed digits.
+const QUIET_NORM: f64 = 0.0077;
+
+/// A dot product this close to 0 is a half turn within f32 rounding.
+const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
+
+/// How a `.dat` file is read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DatOptions {
+    /// How much is read at most.
+    pub limits: Limits,
+    /// Named pipes are read too.
+    pub pipes: bool,
+}
+
+/// What was read.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The tracks, one for each box, with shared times.
+    pub set: TrackSet,
+    /// The length of each box (a length, not a duration), as the header says.
+    pub box_length: f64,
+    /// What is remarkable, one entry for each kind.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_dat(path: &Path, options: &DatOptions) -> Result<Loaded, Diagnostic> {
+    let mut source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let loaded = read_dat(&name, &mut source.reader, options)?;
+    source.check_unchanged()?;
+    Ok(loaded)
+}
+
+/// Reads keyframes; `name` is what messages call the input.
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_dat(
+    name: &str,
+    reader: impl BufRead,
+    options: &DatOptions,
+) -> Result<Loaded, Diagnostic> {
+    let mut lines = Lines::new(name, reader, options.limits)?;
+    let header = read_header(&mut lines)?;
+    let mut keys = Keys::new(header.boxes);
+    while let Some(line) = lines.next()? {
+        if line.trim_start().starts_with('#') {
+            check_comment(&lines, &line)?;
+        } else if line.trim().is_empty() {
+            keys.blank.get_or_insert(lines.number);
+        } else {
+            keys.read_row(&mut lines, &line)?;
+        }
+        lines.reuse(line);
+    }
+    keys.finish(lines, header.box_length)
+}
+
+struct Header {
+    boxes: usize,
+    box_length: f64,
+}
+
+fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<Header, Diagnostic> {
+    let Some(line) = lines.next()? else {
+        let message = "the file is empty; it starts with `# <boxes> <box length>`".to_owned();
+        return Err(lines.refuse(1, Code::Empty, message));
+    };
+    let Some(body) = line.trim_start().strip_prefix('#') else {
+        let message = "no header; the first line is `# <boxes> <box length>`".to_owned();
+        return Err(lines.refuse(1, Code::NoHeader, message));
+    };
+    let before = (line.len() - body.len()) as u64;
+    let mut words = tokens(body).map(|(column, token)| (column + before, token));
+    let short = |lines: &Lines<R>, what: &str| {
+        let message = format!("the header lacks {what}; it is `# <boxes> <box length>`");
+        lines.refuse(line.len() as u64 + 1, Code::HeaderShort, message)
+    };
+    let (column, boxes) = words
+        .next()
+        .ok_or_else(|| short(lines, "the number of boxes"))?;
+    let boxes = parse_boxes(boxes).map_err(|message| lines.refuse(column, Code::Boxes, message))?;
+    let (column, length) = words.next().ok_or_else(|| short(lines, "the box length"))?;
+    let length = number::parse(length).map_err(|(_, message)| {
+        let message = format!("box length: {message}");
+        lines.refuse(column, Code::BoxLength, message)
+    })?;
+    let box_length = length.value;
+    if box_length <= 0.0 {
+        let message = format!("the box length is {box_length}; lengths are positive");
+        lines.warn(column, Code::BoxLengthSign, message);
+    }
+    if let Some((column, word)) = words.next() {
+        let message = format!("`{word}` after the header's two numbers; it is ignored");
+        lines.warn(column, Code::HeaderWords, message);
+    }
+    Ok(Header { boxes, box_length })
+}
+
+fn parse_boxes(token: &str) -> Result<usize, String> {
+    let plain = !token.is_empty() && token.bytes().all(|b| b.is_ascii_digit());
+    let boxes = token.parse::<usize>().ok().filter(|_| plain);
+    match boxes {
+        Some(boxes) if (1..=MAX_BOXES).contains(&boxes) => Ok(boxes),
+        _ if plain => Err(format!("{token} boxes; there may be 1 to {MAX_BOXES}")),
+        _ => Err(format!(
+            "`{token}` is no number of boxes; write a whole number from 1 to {MAX_BOXES} in digits"
+        )),
+    }
+}
+
+/// A comment may say anything except what a header says.
+fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnostic> {
+    let body = line.trim_start().trim_start_matches('#');
+    let words: Vec<_> = tokens(body)
+        .map(|(_, token)| number::parse(token))
+        .collect();
+    if words.len() == 2 && words.iter().all(Result::is_ok) {
+        let message = "a second header; split the file, or make it a comment with words";
+        return Err(lines.refuse(1, Code::SecondHeader, message.to_owned()));
+    }
+    Ok(())
+}
+
+/// A line's numbers, one by one.
+struct Row<'a, T> {
+    tokens: T,
+    line: &'a str,
+    /// Column and digits of the last number, and the fewest digits of those before it.
+    last: (u64, usize),
+    fewest_digits: usize,
+}
+
+impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
+    fn new(line: &'a str, tokens: T, fewest_digits: usize) -> Self {
+        Self {
+            tokens,
+            line,
+            last: (1, usize::MAX),
+            fewest_digits,
+        }
+    }
+
+    /// The next number, and its column.
+    fn next<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(u64, f64), Diagnostic> {
+        let Some((place, token)) = self.tokens.next() else {
+            return Err(lines.refuse(self.line.len() as u64, Code::Columns, String::new()));
+        };
+        let number =
+            number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
+        if number.vanished {
+            let message = format!("`{token}` is too small for f32; it becomes 0");
+            lines.warn(place, Code::Tiny, message);
+        }
+        self.fewest_digits = self.fewest_digits.min(self.last.1);
+        self.last = (place, number.digits);
+        Ok((place, number.value))
+    }
+}
+
+/// What was read so far.
+struct Keys {
+    times: Blocks<f64>,
+    rows: Blocks<Quat>,
+    /// The first blank line since the last key.
+    blank: Option<u64>,
+    /// Fewest digits of any number so far.
+    fewest_digits: usize,
+    /// Keys whose first column is near 0 and last near 1.
+    w_last: u64,
+    total: u64,
+    previous: Vec<DQuat>,
+}
+
+impl Keys {
+    fn new(count: usize) -> Self {
+        Self {
+            times: Blocks::new(1),
+            rows: Blocks::new(count),
+            blank: None,
+            fewest_digits: usize::MAX,
+            w_last: 0,
+            total: 0,
+            previous: Vec::new(),
+        }
+    }
+
+    fn read_row<R: BufRead>(&mut self, lines: &mut Lines<R>, line: &str) -> Result<(), Diagnostic> {
+        if let Some(blank) = self.blank.take() {
+            let message = format!("line {blank} is blank; it is skipped");
+            lines.warn(1, Code::BlankLine, message);
+        }
+        self.read_numbers(lines, line).or_else(|error| {
+            // What is wrong with the line as a whole explains more.
+            self.check_columns(lines, line)?;
+            Err(error)
+        })
+    }
+
+    fn read_numbers<R: BufRead>(
+        &mut self,
+        lines: &mut Lines<R>,
+        line: &str,
+    ) -> Result<(), Diagnostic> {
+        let mut row = Row::new(line, tokens(line), self.fewest_digits);
+        let (_, time) = row.next(lines)?;
+        self.check_time(lines, time)?;
+        for index in 0..self.rows.width() {
+            let (place, w) = row.next(lines)?;
+            let (_, x) = row.next(lines)?;
+            let (_, y) = row.next(lines)?;
+            let (_, z) = row.next(lines)?;
+            self.push(lines, place, index, DQuat::from_xyzw(x, y, z, w))?;
+        }
+        if row.tokens.next().is_some() {
+            self.check_columns(lines, line)?;
+        }
+        self.times.push(time);
+        // A file that stops in the middle of its last number reads as a whole one.
+        let (place, digits) = row.last;
+        if !lines.ended && digits < row.fewest_digits {
+            let message = "the file ends in the middle of a line, and its last number is shorter \
+                           than all others; is it cut?";
+            lines.warn(place, Code::MaybeCut, message);
+        }
+        self.fewest_digits = row.fewest_digits.min(digits);
+        Ok(())
+    }
+
+    fn check_columns<R: BufRead>(&self, lines: &Lines<R>, line: &str) -> Result<(), Diagnostic> {
+        let boxes = self.rows.width();
+        let expected = 1 + 4 * boxes;
+        let (found, extra) = tokens(line).fold((0, None), |(found, extra), (column, _)| {
+            let first_extra = if found == expected {
+                Some(column)
+            } else {
+                extra
+            };
+            (found + 1, first_extra)
+        });
+        if found == expected {
+            return Ok(());
+        }
+        let message = format!(
+            "{found} numbers where {expected} are expected: a time and 4 for each of {boxes} boxes"
+        );
+        let column = extra.unwrap_or(line.trim_end().len() as u64 + 1);
+        Err(lines.refuse(column, Code::Columns, message))
+    }
+
+    fn check_time<R: BufRead>(&self, lines: &mut Lines<R>, time: f64) -> Result<(), Diagnostic> {
+        let Some(previous) = self.times.last() else {
+            return Ok(());
+        };
+        if time <= previous {
+            let what = if time == previous {
+                "repeats"
+            } else {
+                "comes before"
+            };
+            let message = format!(
+                "time {time} {what} the one before it, {previous}; times increase strictly"
+            );
+            return Err(lines.refuse(1, Code::TimeNotIncreasing, message));
+        }
+        let gap = time - previous;
+        if !(1e-9..=1e9).contains(&gap) {
+            let message = format!("{gap:e} s since the key before; are the times seconds?");
+            lines.warn(1, Code::Gap, message);
+        }
+        Ok(())
+    }
+
+    fn push<R: BufRead>(
+        &mut self,
+        lines: &mut Lines<R>,
+        column: u64,
+        index: usize,
+        key: DQuat,
+    ) -> Result<(), Diagnostic> {
+        let norm = dot(key, key).sqrt();
+        let off = (norm - 1.0).abs();
+        if off > NORM_TOLERANCE {
+            let message = format!(
+                "box {}: the quaternion has norm {norm:.6}; a rotation has norm 1 (±{NORM_TOLERANCE})",
+                index + 1
+            );
+            return Err(lines.refuse(column, Code::Norm, message));
+        }
+        if off > QUIET_NORM {
+            let message = format!(
+                "box {}: the quaternion has norm {norm:.6}; it is normalised",
+                index + 1
+            );
+            lines.warn(column, Code::NormOff, message);
+        }
+        // Small rotations, w last: the last number is nearly 1, the first nearly 0.
+        self.total += 1;
+        if key.z.abs() > 0.9 && key.w.abs() < 0.3 {
+            self.w_last += 1;
+        }
+        let unit = nearest_unit(key);
+        let exact = unit.as_dquat();
+        match self.previous.get_mut(index) {
+            Some(previous) => {
+                if dot(*previous, exact).abs() <= HALF_TURN {
+                    let message = format!(
+                        "box {} turns by exactly 180° from the key before; the signs decide which way",
+                        index + 1
+                    );
+                    lines.warn(column, Code::HalfTurn, message);
+                }
+                *previous = exact;
+            }
+            None => self.previous.push(exact),
+        }
+        self.rows.push(unit);
+        Ok(())
+    }
+
+    fn finish<R: BufRead>(
+        self,
+        mut lines: Lines<R>,
+        box_length: f64,
+    ) -> Result<Loaded, Diagnostic> {
+        if self.times.rows() == 0 {
+            // Where the end is: on the last line, unless that has ended.
+            lines.number -= u64::from(!lines.ended);
+            let message = "no keys behind the header; a key line is `time w x y z …`".to_owned();
+            return Err(lines.refuse(1, Code::NoKeys, message));
+        }
+        lines.number = lines.number.saturating_sub(1);
+        if self.times.rows() == 1 {
+            lines.warn(1, Code::OneKey, "only one key; nothing moves");
+        }
+        if self.total >= 8 && self.w_last == self.total {
+            let message = "every quaternion is near 0 … 1 from left to right: is w the last column? \
+                           this format has w first";
+            lines.warn(1, Code::Order, message);
+        }
+        let (times, keys) = (self.times.into_columns(), self.rows.into_columns());
+        // Checked above; a set refuses what slipped through.
+        let set = TrackSet::from_shared_times(times, keys)
+            .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
+        Ok(Loaded {
+            set,
+            box_length,
+            warnings: lines.warnings,
+        })
+    }
+}
+
+/// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
+/// writing and reading a set is exact; others are normalised in f64.
+fn nearest_unit(key: DQuat) -> Quat {
+    let near = rounded(key);
+    let exact = near.as_dquat();
+    if (dot(exact, exact).sqrt() - 1.0).abs() <= UNIT_TOLERANCE {
+        return near;
+    }
+    unit(key)
+}
+
+/// Writes a set whose tracks share their times, with boxes of that length. Numbers have as
+/// many digits as it takes to read the same bits again.
+///
+/// # Errors
+/// When writing fails, or (`InvalidInput`) the tracks' times differ.
+pub fn write_dat(writer: &mut impl Write, set: &TrackSet, box_length: f64) -> io::Result<()> {
+    let times = set.tracks().next().map_or(&[][..], |track| track.times);
+    if set.tracks().any(|track| track.times != times) {
+        let message = "a .dat file has one list of times for all tracks; these differ";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+    }
+    writeln!(writer, "# {} {box_length:?}", set.track_count())?;
+    for (i, time) in times.iter().enumerate() {
+        write!(writer, "{time:?}")?;
+        for track in set.tracks() {
+            let q = track.keys[i];
+            write!(writer, " {:?} {:?} {:?} {:?}", q.w, q.x, q.y, q.z)?;
+        }
+        writeln!(writer)?;
+    }
+    Ok(())
+}

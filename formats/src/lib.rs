@@ -1,0 +1,18 @@
+//! The files that Tumble reads and writes: keyframes in (`.dat`), results out (NPY, CSV),
+//! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
+//! play with ([`generate`](mod@generate)).
+
+pub mod csv;
+pub mod dat;
+pub mod diagnostic;
+pub mod generate;
+pub mod npy;
+pub mod output;
+pub mod poses;
+mod quaternion;
+mod source;
+mod text;
+pub mod times;
+
+pub use crate::diagnostic::{Code, Diagnostic, Severity};
+pub use crate::text::lines::Limits;

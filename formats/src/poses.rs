@@ -1,0 +1,125 @@
+//! Poses as files: so many numbers for every track at every frame, `[frame][track]`.
+
+use std::io::{self, Write};
+
+use npyz::WriterBuilder;
+
+use tumble::{Timeline, TrackSet};
+
+/// What the numbers of a local transform are called: moved, turned, scaled.
+pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "sy", "sz"];
+
+/// What the numbers of a pose in the world are called.
+pub const WORLD: [&str; 7] = ["px", "py", "pz", "x", "y", "z", "w"];
+
+/// Numbers of all tracks at all frames, and what each is called.
+#[derive(Debug, Clone, Copy)]
+pub struct Poses<'a> {
+    /// The set whose tracks they are.
+    pub set: &'a TrackSet,
+    /// Their frames.
+    pub timeline: &'a Timeline,
+    /// What the numbers of one track at one frame are called.
+    pub components: &'a [&'a str],
+    /// `[frame][track][component]`.
+    pub numbers: &'a [f32],
+}
+
+impl Poses<'_> {
+    /// Writes NPY: float32 of shape (frames, tracks, components).
+    ///
+    /// # Errors
+    /// When writing fails, or (`InvalidInput`) there are not as many numbers.
+    pub fn write_npy(&self, writer: &mut impl Write) -> io::Result<()> {
+        self.check()?;
+        let shape = [
+            self.timeline.len(),
+            self.set.track_count(),
+            self.components.len(),
+        ];
+        let mut header = Vec::new();
+        npyz::WriteOptions::<f32>::new()
+            .default_dtype()
+            .shape(&shape.map(|length| length as u64))
+            .writer(&mut header)
+            .begin_nd()?
+            .extend(self.numbers.iter().copied())?;
+        writer.write_all(&header)
+    }
+
+    /// Writes CSV: `frame,time,<track>.<component>,…`, a line a frame.
+    ///
+    /// # Errors
+    /// As [`Poses::write_npy`].
+    pub fn write_csv(&self, writer: &mut impl Write) -> io::Result<()> {
+        self.check()?;
+        let mut csv = ::csv::Writer::from_writer(writer);
+        let tracks = self.set.track_count();
+        let mut row = vec!["frame".to_owned(), "time".to_owned()];
+        for track in 0..tracks {
+            let name = self.set.track_name(track);
+            let component = |component| format!("{name}.{component}");
+            row.extend(self.components.iter().map(component));
+        }
+        csv.write_record(&row)?;
+        let each = tracks * self.components.len();
+        for frame in 0..self.timeline.len() {
+            row.clear();
+            row.push(frame.to_string());
+            row.push(self.timeline.time(0, frame).to_string());
+            let numbers = &self.numbers[frame * each..(frame + 1) * each];
+            row.extend(numbers.iter().map(f32::to_string));
+            csv.write_record(&row)?;
+        }
+        csv.flush()
+    }
+
+    fn check(&self) -> io::Result<()> {
+        let needed = self.timeline.len() * self.set.track_count() * self.components.len();
+        if self.numbers.len() == needed {
+            return Ok(());
+        }
+        let message = format!("{} numbers where there are {needed}", self.numbers.len());
+        Err(io::Error::new(io::ErrorKind::InvalidInput, message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+    use tumble::Frames;
+
+    #[test]
+    fn poses_are_written_frame_by_frame() {
+        let mut set = TrackSet::new();
+        set.push("hip", &[0.0], &[Quat::IDENTITY]).unwrap();
+        let timeline = Frames::at(vec![0.0, 0.5]).resolve(1, None).unwrap();
+        let numbers: Vec<f32> = (0..14u8).map(|i| f32::from(i) * 0.5).collect();
+        let poses = Poses {
+            set: &set,
+            timeline: &timeline,
+            components: &WORLD,
+            numbers: &numbers,
+        };
+        let mut csv = Vec::new();
+        poses.write_csv(&mut csv).unwrap();
+        let text = String::from_utf8(csv).unwrap();
+        assert_eq!(
+            text,
+            "frame,time,hip.px,hip.py,hip.pz,hip.x,hip.y,hip.z,hip.w\n\
+             0,0,0,0.5,1,1.5,2,2.5,3\n1,0.5,3.5,4,4.5,5,5.5,6,6.5\n"
+        );
+        let mut npy = Vec::new();
+        poses.write_npy(&mut npy).unwrap();
+        let read = npyz::NpyFile::new(&npy[..]).unwrap();
+        assert_eq!(read.shape(), [2, 1, 7]);
+        assert_eq!(read.into_vec::<f32>().unwrap(), numbers);
+        let short = Poses {
+            numbers: &numbers[1..],
+            ..poses
+        };
+        assert!(short.write_npy(&mut Vec::new()).is_err());
+    }
+}

@@ -1,0 +1,111 @@
+//! Opening an input: what the name stands for, before a byte of it is read.
+
+use std::fs::{File, Metadata};
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+use crate::diagnostic::{Code, Diagnostic};
+
+/// An open input. What it was at the start is compared with what it is at the end.
+pub(super) struct Source {
+    pub(super) name: String,
+    pub(super) reader: BufReader<Box<dyn Read>>,
+    file: Option<(File, Metadata)>,
+}
+
+impl Source {
+    /// `-` is standard input; a named pipe is opened only when `pipes` says so.
+    pub(super) fn open(path: &Path, pipes: bool) -> Result<Self, Diagnostic> {
+        let name = path.display().to_string();
+        let refuse = |code, message: String| Diagnostic {
+            file: name.clone(),
+            place: None,
+            code,
+            message,
+            count: 1,
+        };
+        let unreadable = |error: io::Error| refuse(Code::Open, format!("cannot be read: {error}"));
+        if path.as_os_str() == "-" {
+            let reader: Box<dyn Read> = Box::new(io::stdin().lock());
+            return Ok(Self {
+                name: "standard input".to_owned(),
+                reader: BufReader::with_capacity(BUFFER, reader),
+                file: None,
+            });
+        }
+        // Looked at before it is opened: opening a pipe waits for its writer.
+        let metadata = std::fs::metadata(path).map_err(unreadable)?;
+        let kind = file_kind(&metadata);
+        let readable = kind == "a file" || kind == "a named pipe" && pipes;
+        if !readable {
+            let hint = if kind == "a named pipe" {
+                "; give `-` and send it to standard input"
+            } else {
+                "; give a .dat file"
+            };
+            return Err(refuse(Code::NotAFile, format!("is {kind}{hint}")));
+        }
+        let file = File::open(path).map_err(unreadable)?;
+        let metadata = file.metadata().map_err(unreadable)?;
+        let watched = file.try_clone().map_err(unreadable)?;
+        let reader: Box<dyn Read> = Box::new(file);
+        Ok(Self {
+            name,
+            reader: BufReader::with_capacity(BUFFER, reader),
+            file: metadata.is_file().then_some((watched, metadata)),
+        })
+    }
+
+    /// Refuses a file that was written to while it was read.
+    pub(super) fn check_unchanged(&self) -> Result<(), Diagnostic> {
+        let Some((file, before)) = &self.file else {
+            return Ok(());
+        };
+        let after = file.metadata();
+        let same = after.is_ok_and(|after| {
+            after.len() == before.len() && after.modified().ok() == before.modified().ok()
+        });
+        if same {
+            return Ok(());
+        }
+        Err(Diagnostic {
+            file: self.name.clone(),
+            place: None,
+            code: Code::Changed,
+            message: "changed while it was read; read it again when its writer is done".to_owned(),
+            count: 1,
+        })
+    }
+}
+
+/// Large enough that reading is not a matter of system calls.
+const BUFFER: usize = 1 << 18;
+
+/// An input longer than this is refused unless the caller raises the limit.
+pub(super) const MAX_BYTES: u64 = 16 << 30;
+
+#[cfg(unix)]
+fn file_kind(metadata: &Metadata) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    let kind = metadata.file_type();
+    if kind.is_dir() {
+        "a directory"
+    } else if kind.is_fifo() {
+        "a named pipe"
+    } else if kind.is_socket() {
+        "a socket"
+    } else if kind.is_char_device() || kind.is_block_device() {
+        "a device"
+    } else {
+        "a file"
+    }
+}
+
+#[cfg(not(unix))]
+fn file_kind(metadata: &Metadata) -> &'static str {
+    if metadata.is_dir() {
+        "a directory"
+    } else {
+        "a file"
+    }
+}

@@ -1,0 +1,67 @@
+//! A list of times: numbers of seconds separated by blanks, commas or line ends,
+//! with `#` comments.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::source::Source;
+use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::number;
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_times(path: &Path) -> Result<Vec<f64>, Diagnostic> {
+    let mut source = Source::open(path, true)?;
+    let name = source.name.clone();
+    let times = read_times(&name, &mut source.reader)?;
+    source.check_unchanged()?;
+    Ok(times)
+}
+
+/// Reads times; `name` is what messages call the input.
+///
+/// # Errors
+/// The first fault that refuses the input; also when it holds no time.
+pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnostic> {
+    let mut lines = Lines::new(name, reader, Limits::default())?;
+    let mut times = Vec::new();
+    while let Some(line) = lines.next()? {
+        let plain = line.split('#').next().unwrap_or_default().replace(',', " ");
+        for (column, token) in tokens(&plain) {
+            let number = number::parse(token)
+                .map_err(|(code, message)| lines.refuse(column, code, message))?;
+            times.push(number.value);
+        }
+        lines.reuse(line);
+    }
+    if times.is_empty() {
+        let message = "no times; write numbers of seconds, one a line".to_owned();
+        return Err(lines.refuse_whole(Code::Time, message));
+    }
+    Ok(times)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blanks_commas_lines_and_comments_separate() {
+        let text = "# half a second\n0 0.5,1.25\n\t-2 # before\r\n7e0";
+        let times = read_times("t", text.as_bytes()).unwrap();
+        assert_eq!(times, [0.0, 0.5, 1.25, -2.0, 7.0]);
+    }
+
+    #[test]
+    fn faults_have_their_place() {
+        let error = read_times("t", "0\n 1 x".as_bytes()).unwrap_err();
+        assert_eq!((error.place, error.code), (Some((2, 4)), Code::Number));
+        assert_eq!(
+            read_times("t", "#\n".as_bytes()).unwrap_err().code,
+            Code::Time
+        );
+    }
+}

@@ -1,0 +1,3 @@
+//! Every test of the files.
+
+mod dat_fixtures;

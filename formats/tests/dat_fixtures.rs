@@ -1,0 +1,254 @@
+//! Every kind of `.dat` file, good and bad, with what is said of it: the fixtures in
+//! `tests/fixtures/dat/`, each with its `.expected` beside it.
+
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use glam::Quat;
+use proptest::prelude::*;
+use tumble::TrackSet;
+use tumble_formats::Limits;
+use tumble_formats::dat::{DatOptions, open_dat, read_dat, write_dat};
+use tumble_formats::times::read_times;
+use tumble_formats::{Code, Diagnostic, Severity};
+
+fn fixtures() -> Vec<PathBuf> {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/dat");
+    let entries = fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = entries
+        .filter(|path| path.extension().unwrap() == "dat")
+        .collect();
+    files.sort();
+    files
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// What a person would be told: the verdict, then each message.
+fn said(path: &Path) -> String {
+    let bytes = fs::read(path).unwrap();
+    match read_dat(&name(path), &*bytes, &DatOptions::default()) {
+        Ok(loaded) => {
+            let (tracks, keys) = (loaded.set.track_count(), loaded.set.key_count());
+            let mut text = format!("accepted: {tracks} tracks, {keys} keys\n");
+            for warning in &loaded.warnings {
+                assert_eq!(warning.code.severity(), Severity::Warning);
+                text += &format!("{warning}\n");
+            }
+            text
+        }
+        Err(error) => {
+            assert_eq!(error.code.severity(), Severity::Error);
+            format!("refused\n{error}\n")
+        }
+    }
+}
+
+/// Set `UPDATE_EXPECTED=1` to write what is said now, then read the difference.
+#[test]
+fn every_fixture_gets_its_verdict_and_message() {
+    let files = fixtures();
+    assert!(files.len() >= 75, "{} fixtures", files.len());
+    let mut wrong = Vec::new();
+    for path in files {
+        let expected = path.with_extension("expected");
+        let said = said(&path);
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            fs::write(&expected, &said).unwrap();
+        }
+        let wanted = fs::read_to_string(&expected).unwrap_or_default();
+        if said != wanted {
+            wrong.push(format!("{}:\n{said}wanted:\n{wanted}", name(&path)));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A code that no fixture shows is a code that nobody has seen.
+#[test]
+fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
+    let all: String = fixtures().iter().map(|path| said(path)).collect();
+    let elsewhere = [
+        Code::Open,
+        Code::NotAFile,
+        Code::Changed,
+        Code::LineTooLong,
+        Code::FileTooLong,
+        Code::Time,
+    ];
+    for &code in Code::ALL {
+        let shown = all.contains(&format!("[{code}]"));
+        assert!(
+            shown != elsewhere.contains(&code),
+            "{code}: {}",
+            code.title()
+        );
+        assert_eq!(Code::named(&code.name().to_lowercase()), Some(code));
+    }
+}
+
+fn refusal(path: &Path) -> Diagnostic {
+    open_dat(path, &DatOptions::default()).unwrap_err()
+}
+
+#[test]
+fn what_is_no_file_is_refused_with_a_reason() {
+    let directory = tempfile::tempdir().unwrap();
+    assert_eq!(refusal(directory.path()).code, Code::NotAFile);
+    let missing = refusal(&directory.path().join("missing.dat"));
+    assert_eq!(missing.code, Code::Open);
+    assert!(missing.message.contains("No such file"), "{missing}");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::symlink;
+        let (a, b) = (directory.path().join("a"), directory.path().join("b"));
+        symlink(&a, &b).unwrap();
+        symlink(&b, &a).unwrap();
+        assert_eq!(refusal(&a).code, Code::Open);
+        assert_eq!(refusal(Path::new("/dev/null")).code, Code::NotAFile);
+        let socket = directory.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        assert_eq!(refusal(&socket).code, Code::NotAFile);
+        let pipe = directory.path().join("pipe");
+        let made = std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap();
+        assert!(made.success());
+        assert_eq!(refusal(&pipe).code, Code::NotAFile);
+    }
+}
+
+#[test]
+fn limits_refuse_before_memory_runs_out() {
+    let endless = || BufReader::new(io::repeat(b'7'));
+    let limits = Limits {
+        line: 1000,
+        file: 5000,
+    };
+    let options = DatOptions {
+        limits,
+        ..DatOptions::default()
+    };
+    assert_eq!(
+        read_dat("t", endless(), &options).unwrap_err().code,
+        Code::LineTooLong
+    );
+    let lines =
+        BufReader::new(io::Cursor::new("# 1 1\n").chain(io::Cursor::new("# c\n".repeat(2000))));
+    assert_eq!(
+        read_dat("t", lines, &options).unwrap_err().code,
+        Code::FileTooLong
+    );
+}
+
+/// A disk that fails, at once or on the way, is a refusal with the system's reason.
+#[test]
+fn what_cannot_be_read_on_is_refused() {
+    struct Failing;
+    impl Read for Failing {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(io::Error::other("the disk is on fire"))
+        }
+    }
+    for start in ["", "# 1 1\n", "# 1 1\n0 1 0 0 0\n1 1 0"] {
+        let reader = BufReader::new(io::Cursor::new(start).chain(Failing));
+        let error = read_dat("t", reader, &DatOptions::default()).unwrap_err();
+        assert_eq!(error.code, Code::Open);
+        assert!(error.message.contains("the disk is on fire"), "{error}");
+        assert_eq!(
+            read_times("t", BufReader::new(Failing)).unwrap_err().code,
+            Code::Open
+        );
+    }
+}
+
+/// 65 536 boxes are allowed; a header alone must not cost what they would.
+#[test]
+fn the_largest_header_costs_nothing() {
+    let error = read_dat("t", &b"# 65536 1\n0 1 0 0 0\n"[..], &DatOptions::default());
+    assert_eq!(error.unwrap_err().code, Code::Columns);
+}
+
+/// As many boxes as there may be: a row is read once, not once for each box.
+#[test]
+fn the_widest_file_is_read() {
+    let row = " 0 1 0 0".repeat(65_536);
+    let text = format!("# 65536 3\n0{row}\n1{row}\n");
+    let loaded = read_dat("t", text.as_bytes(), &DatOptions::default()).unwrap();
+    assert_eq!(
+        (loaded.set.track_count(), loaded.set.key_count()),
+        (65_536, 131_072)
+    );
+}
+
+proptest! {
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let _ = read_dat("t", &*bytes, &DatOptions::default());
+    }
+
+    /// Nearly right files reach deeper than arbitrary bytes.
+    #[test]
+    fn damaged_files_never_panic(place in 0usize..60, byte in any::<u8>(), cut in 0usize..70) {
+        let mut bytes = b"# 2 3.0\n0.5 1 0 0 0 0.6 0.8 0 0\n1.25 0 1 0 0 0 0 1e0 -0.0\n".to_vec();
+        let place = place % bytes.len();
+        bytes[place] = byte;
+        bytes.truncate(cut);
+        let _ = read_dat("t", &*bytes, &DatOptions::default());
+    }
+
+    #[test]
+    fn what_is_written_reads_back_bit_for_bit(
+        keys in prop::collection::vec(prop::array::uniform3(-4.0f32..4.0), 1..20),
+        start in -1e6f64..1e6,
+    ) {
+        let quats: Vec<Quat> =
+            keys.iter().map(|&[x, y, z]| Quat::from_scaled_axis([x, y, z].into())).collect();
+        let times: Vec<f64> = (0..quats.len()).map(|i| start + i as f64 / 3.0).collect();
+        let set = TrackSet::with_shared_times(&times, &quats).unwrap();
+        let mut file = Vec::new();
+        write_dat(&mut file, &set, 0.1).unwrap();
+        let loaded = read_dat("t", &*file, &DatOptions::default()).unwrap();
+        let read = loaded.set;
+        prop_assert_eq!(read.track(0).times, set.track(0).times);
+        let bits = |set: &TrackSet| -> Vec<[u32; 4]> {
+            set.track(0).keys.iter().map(|q| q.to_array().map(f32::to_bits)).collect()
+        };
+        prop_assert_eq!(bits(&read), bits(&set));
+        prop_assert_eq!(loaded.box_length, 0.1);
+    }
+}
+
+/// `docs/codes.md`: every code, why, and what is said of a file that has it.
+/// `UPDATE_EXPECTED=1` writes it.
+#[test]
+fn the_page_of_codes_is_up_to_date() {
+    use std::fmt::Write;
+
+    let messages: Vec<String> = fixtures().iter().map(|path| said(path)).collect();
+    let mut page = String::from(
+        "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
+         Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \
+         `tumble explain CODE` says the same.\n",
+    );
+    for &code in Code::ALL {
+        let (title, text) = (code.title(), code.explanation());
+        write!(page, "\n## {code}: {title}\n\n{text}\n").unwrap();
+        let sign = format!("[{code}]");
+        let mut lines = messages.iter().flat_map(|message| message.lines());
+        if let Some(line) = lines.find(|line| line.contains(&sign)) {
+            write!(page, "\n```text\n{line}\n```\n").unwrap();
+        }
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/codes.md");
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        fs::write(&file, &page).unwrap();
+    }
+    assert_eq!(fs::read_to_string(file).unwrap(), page);
+}
