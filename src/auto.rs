@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use glam::Quat;
 
-use crate::clock::Frames;
 use crate::device::Device;
 use crate::engine::{Engine, Error};
-use crate::rotations::Layout;
-use crate::tracks::TrackSet;
+use crate::output::rotations::Layout;
+use crate::time::frames::Frames;
+use crate::tracks::set::TrackSet;
 
 /// Rotations that the CPU evaluates (in 1 to 3 ms) before a device has been opened (in
 /// 50): see [`Engine::auto`].
@@ -45,7 +45,7 @@ impl Probe {
 
     /// The shortest of three evaluations after one that does not count.
     fn time(&self, engine: &Engine) -> Result<Duration, Error> {
-        let clip = engine.upload(&self.set, crate::method::SLERP)?;
+        let clip = engine.upload(&self.set, crate::method::slerp::SLERP)?;
         let mut output = vec![Quat::IDENTITY; self.rotations];
         let mut shortest = Duration::MAX;
         for round in 0..4 {
@@ -109,7 +109,9 @@ mod tests {
         let small = Engine::auto(2000).unwrap();
         assert!(small.device_info().is_none());
         let large = Engine::auto(usize::MAX).unwrap();
-        let software = |info: &crate::DeviceInfo| info.kind == crate::DeviceKind::Cpu;
+        let software = |info: &crate::gpu::physical::DeviceInfo| {
+            info.kind == crate::gpu::physical::DeviceKind::Cpu
+        };
         assert!(!large.device_info().is_some_and(software));
     }
 

@@ -4,15 +4,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Quat;
 
-use crate::clock::{Frames, FramesError, Timeline};
-use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
-use crate::gpu::{ClipBuffers, Job, VulkanEngine, VulkanError};
-use crate::method::Quantity;
-use crate::output_buffer::OutputBuffer;
-use crate::prepare::{ClipData, Prepared};
-use crate::rotations::{Layout, Rotations, Storage};
-use crate::window::Window;
+use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::method::interpolation::Quantity;
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Rotations, Storage};
+use crate::prepare::Prepared;
+use crate::prepare::clip_data::ClipData;
+use crate::time::frames::{Frames, FramesError, Timeline};
+use crate::time::window::Window;
 
 /// A set prepared for one method, on its engine's device; evaluate it as often as
 /// needed, at any frames.

@@ -3,8 +3,10 @@
 use std::ops::AddAssign;
 use std::time::Duration;
 
-use crate::cpu::VectorWidth;
-use crate::gpu::{self, DeviceInfo, DeviceKind, PhysicalDevice, VulkanError};
+use crate::gpu;
+use crate::gpu::error::VulkanError;
+use crate::gpu::physical::{DeviceInfo, DeviceKind, PhysicalDevice};
+use crate::simd::dispatch::VectorWidth;
 
 /// Where an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
@@ -43,12 +45,12 @@ impl Device {
     }
 
     /// As [`Device::list`], with the Khronos validation layer watching every call
-    /// to the devices ([`Engine::validation_messages`](crate::Engine::validation_messages)).
+    /// to the devices ([`Engine::validation_messages`](crate::engine::Engine::validation_messages)).
     ///
     /// # Errors
     /// Also when the layer is not installed.
     pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
-        let devices = gpu::list(validation)?;
+        let devices = gpu::physical::list(validation)?;
         Ok(devices
             .into_iter()
             .map(|physical| {
@@ -110,7 +112,7 @@ pub enum Reads {
     TexelBuffers,
 }
 
-/// Choices for an [`Engine`](crate::Engine); none of them changes a bit of any result.
+/// Choices for an [`Engine`](crate::engine::Engine); none of them changes a bit of any result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct EngineOptions {
@@ -130,7 +132,7 @@ pub struct EngineOptions {
 }
 
 /// Where the time of a Vulkan device's evaluations went
-/// ([`Engine::take_timings`](crate::Engine::take_timings)).
+/// ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
     /// The host made work lists and recorded commands; the device may have worked on

@@ -5,17 +5,23 @@ use std::sync::{Arc, Mutex};
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::clock::{Frames, FramesError};
-use crate::cpu::{CpuEngine, UnknownWidth, VectorWidth, straight};
-use crate::cycle::Sides;
+use crate::cpu::engine::CpuEngine;
 use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
-use crate::encoding::Encoding;
-use crate::gpu::{CanaryReport, ClipBuffers, DeviceInfo, EvaluateError, Opened, VulkanError};
-use crate::method::{Interpolation, InterpolationError};
-use crate::output_buffer::OutputBuffer;
-use crate::prepare::{ClipData, Wanted};
-use crate::rotations::{Layout, Rotations};
-use crate::tracks::TrackSet;
+use crate::from_keys::evaluate::straight;
+use crate::gpu::engine::{ClipBuffers, EvaluateError};
+use crate::gpu::error::VulkanError;
+use crate::gpu::physical::DeviceInfo;
+use crate::gpu::recovery::Opened;
+use crate::gpu::self_test::CanaryReport;
+use crate::method::interpolation::{Interpolation, InterpolationError};
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Rotations};
+use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::simd::dispatch::{UnknownWidth, VectorWidth};
+use crate::time::frames::{Frames, FramesError};
+use crate::time::wrap::Sides;
+use crate::tracks::set::TrackSet;
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]

@@ -45,69 +45,58 @@
 //!   methods that pass through their keys).
 
 mod auto;
-mod backward;
-mod branchless;
 mod clip;
-mod clock;
 mod cpu;
-mod cycle;
+mod curve;
 mod device;
-mod encoding;
 mod engine;
-mod euler;
-mod formula;
-mod frame_clock;
-mod frame_rate;
+mod evaluate;
+mod from_keys;
 mod gpu;
-mod joints;
-mod key_pieces;
+mod math;
 pub mod method;
-mod numeric;
-mod output_buffer;
-mod pieces;
-mod plan;
-mod poses;
+mod output;
+mod pose;
 mod prepare;
 pub mod reference;
-mod rotations;
-mod scalar;
-mod schedule;
-mod segment;
-mod skeleton;
-mod span_block;
-pub mod spirv;
+mod shader;
+mod simd;
 mod stream;
-mod time_runs;
+mod time;
 mod tracks;
-mod transforms;
-mod vector_method;
+mod twin;
 pub mod verify;
-mod window;
 
-pub use clip::Clip;
-pub use clock::{Frames, FramesError, MAX_FRAMES, Timeline};
-pub use cpu::{UnknownWidth, VectorWidth};
-pub use cycle::Outside;
-pub use device::{Device, EngineOptions, Reads, Timings, Transfer, VulkanDevice};
-pub use encoding::{Encoding, MatrixOrder};
-pub use engine::{Engine, Error};
-pub use euler::{EulerSequence, UnknownSequence};
-pub use frame_rate::FrameRate;
-pub use gpu::{
-    CanaryReport, DeviceInfo, DeviceKind, VulkanBuffer, VulkanError, VulkanHandles, kernels,
+pub use crate::clip::Clip;
+pub use crate::device::{Device, EngineOptions, Reads, Timings, Transfer, VulkanDevice};
+pub use crate::engine::{Engine, Error};
+pub use crate::gpu::error::VulkanError;
+pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
+pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
+pub use crate::gpu::self_test::CanaryReport;
+pub use crate::method::interpolation::{
+    Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed,
 };
-pub use method::{
-    Axes, Continuity, Cost, Ends, Form, Interpolation, InterpolationError, Keys, METHODS, Method,
-    Path, Quantity, Speed,
-};
-pub use output_buffer::OutputBuffer;
-pub use poses::WorldPoses;
-pub use rotations::{Layout, Rotations};
-pub use skeleton::{Skeleton, SkeletonError};
-pub use stream::Chunk;
-pub use tracks::{NORM_TOLERANCE, Tcb, Track, TrackError, TrackSet, UNIT_TOLERANCE};
-pub use transforms::{Transforms, Vectors};
-pub use vector_method::{UnknownVectorMethod, VectorMethod};
+pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
+pub use crate::method::{Continuity, Cost, Keys, METHODS, Method};
+pub use crate::output::buffer::OutputBuffer;
+pub use crate::output::encoding::{Encoding, MatrixOrder};
+pub use crate::output::euler::{EulerSequence, UnknownSequence};
+pub use crate::output::rotations::{Layout, Rotations};
+pub use crate::pose::poses::WorldPoses;
+pub use crate::pose::skeleton::{Skeleton, SkeletonError};
+pub use crate::pose::transforms::{Transforms, Vectors};
+pub use crate::shader::Form;
+pub use crate::shader::{kernels, spirv};
+pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
+pub use crate::stream::Chunk;
+pub use crate::time::frame_rate::FrameRate;
+pub use crate::time::frames::{Frames, FramesError, MAX_FRAMES, Timeline};
+pub use crate::time::wrap::Outside;
+pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
+pub use crate::tracks::error::TrackError;
+pub use crate::tracks::key_data::Tcb;
+pub use crate::tracks::set::{Track, TrackSet};
 
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]

@@ -8,14 +8,14 @@ use std::thread;
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::clock::Frames;
 use crate::engine::{Engine, Error};
-use crate::method::Interpolation;
-use crate::output_buffer::OutputBuffer;
-use crate::prepare::Wanted;
-use crate::rotations::Layout;
-use crate::tracks::TrackSet;
-use crate::window::Window;
+use crate::method::interpolation::Interpolation;
+use crate::output::buffer::OutputBuffer;
+use crate::output::rotations::Layout;
+use crate::prepare::clip_data::Wanted;
+use crate::time::frames::Frames;
+use crate::time::window::Window;
+use crate::tracks::set::TrackSet;
 
 /// Some of a result: chunks come in the order in which the whole lies in memory, and
 /// leave nothing out.

@@ -11,8 +11,6 @@ use tumble::spirv::{
     FloatControls, SpirvError, float_controls, no_contraction, texel_buffers, without_decorations,
 };
 
-const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
-
 const ALL_CONTROLS: FloatControls = FloatControls {
     preserve_signed_zero_inf_nan: true,
     round_to_nearest_even: true,
@@ -62,7 +60,7 @@ fn kernel_of(expression: &str) -> Vec<u32> {
 #[test]
 fn every_float_operation_of_every_shader_is_decorated_once() {
     const FLOAT_ARITHMETIC: [u16; 5] = [127, 129, 131, 133, 142];
-    for &(name, code) in SHADERS {
+    for (name, code) in tumble::kernels() {
         let mut decorations = BTreeMap::<u32, u32>::new();
         let mut results = 0;
         let code = instructions(&words(code));
@@ -93,7 +91,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
 
 #[test]
 fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
-    for &(name, code) in SHADERS {
+    for (name, code) in tumble::kernels() {
         let passed = words(code);
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
@@ -130,7 +128,7 @@ fn inexact_operations_are_refused() {
 #[test]
 fn the_validator_accepts_every_shader() {
     let environments = ["vulkan1.1", "vulkan1.2"];
-    for &(name, code) in SHADERS {
+    for (name, code) in tumble::kernels() {
         for controls in 0..4 {
             let offered = FloatControls {
                 preserve_signed_zero_inf_nan: controls & 1 != 0,
@@ -173,7 +171,7 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
 
 #[test]
 fn controls_reach_every_entry_point() {
-    for &(name, code) in SHADERS {
+    for (name, code) in tumble::kernels() {
         let module = float_controls(&words(code), ALL_CONTROLS).unwrap();
         let modes: Vec<_> = instructions(&module)
             .into_iter()
@@ -261,7 +259,7 @@ proptest! {
     /// A damaged shader is refused or stays a list of whole instructions.
     #[test]
     fn damaged_shaders_never_panic(place in 0usize..2000, value in any::<u32>()) {
-        for (_, code) in SHADERS {
+        for (_, code) in tumble::kernels() {
             let mut module = words(code);
             let place = place % module.len();
             module[place] = value;

@@ -2,19 +2,19 @@
 
 use std::slice;
 
-use super::evaluate::{Evaluate, Parameters};
-use super::lanes::Lanes;
-use super::stage::Line;
+use crate::cpu::evaluate::{Evaluate, Parameters};
+use crate::cpu::streaming::Line;
+use crate::simd::lanes::Lanes;
 
 /// Samples of a turn at most.
 const MOST: usize = 16;
 
 /// The samples of a run, a turn at a time.
-pub(super) struct Turns<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const FAR: bool> {
-    pub(super) segment: &'a S,
-    pub(super) constant: L,
-    pub(super) begun: S::Begun<L>,
-    pub(super) parameters: P,
+pub(crate) struct Turns<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const FAR: bool> {
+    pub(crate) segment: &'a S,
+    pub(crate) constant: L,
+    pub(crate) begun: S::Begun<L>,
+    pub(crate) parameters: P,
 }
 
 impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>
@@ -30,7 +30,7 @@ impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: boo
     }
 }
 
-pub(super) trait Destination {
+pub(crate) trait Destination {
     /// Takes the first `count` samples.
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
         self,
@@ -75,12 +75,12 @@ fn store<L: Lanes>(vectors: &impl AsRef<[L]>, rotations: &mut [[f32; 4]]) {
 
 /// Whole lines that lie past the caches, and what is not whole yet. Samples begin where a line
 /// does.
-pub(super) struct Places<'a> {
+pub(crate) struct Places<'a> {
     /// The first line, whose first so many rotations are there already: they stay.
-    pub(super) begun: (Line, usize),
-    pub(super) whole: &'a mut [Line],
+    pub(crate) begun: (Line, usize),
+    pub(crate) whole: &'a mut [Line],
     /// The line behind them.
-    pub(super) rest: &'a mut Line,
+    pub(crate) rest: &'a mut Line,
 }
 
 impl Destination for Places<'_> {
@@ -144,15 +144,15 @@ fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Blo
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
     use crate::cpu::evaluate::{Affine, frames_past_caches};
-    use crate::cpu::stage::EACH;
+    use crate::cpu::streaming::EACH;
 
     /// Frames past the caches, behind so many rotations of their first line.
-    pub(in crate::cpu) fn in_lines<L: Lanes, S: Evaluate>(
+    pub(crate) fn in_lines<L: Lanes, S: Evaluate>(
         segment: &S,
         affine: Affine,
         first: f32,

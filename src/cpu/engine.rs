@@ -5,23 +5,24 @@ use std::ops::Range;
 use glam::Quat;
 use rayon::prelude::*;
 
-use super::dispatch::{Kernels, VectorWidth, bring_near};
-use super::evaluate::FEW;
-use super::few::FewTimes;
-use super::memory::{Memories, Memory};
-use super::mend::Row;
-use super::sampled::{Sampled, Straight, straight};
-use super::stage::{Output, Stage};
-use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cycle::Cycle;
-use crate::encoding::Encoding;
+use crate::cpu::evaluate::FEW;
+use crate::cpu::row::row;
+use crate::cpu::scratch::{Memories, Memory};
+use crate::cpu::sparse_times::FewTimes;
+use crate::cpu::streaming::{Output, Stage};
+use crate::curve::segment::Segments;
 use crate::engine::Error;
-use crate::method::Interpolation;
-use crate::prepare::{ClipData, PartRef, Wanted};
-use crate::rotations::Layout;
-use crate::segment::Segments;
-use crate::tracks::TrackSet;
-use crate::window::Window;
+use crate::from_keys::evaluate::{Sampled, Straight, straight};
+use crate::from_keys::fallback::Row;
+use crate::method::interpolation::Interpolation;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::prepare::clip_data::{ClipData, PartRef, Wanted};
+use crate::simd::dispatch::{VectorWidth, bring_near, in_lanes_of};
+use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::window::Window;
+use crate::time::wrap::Cycle;
+use crate::tracks::set::TrackSet;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
 /// share a short result among all threads.
@@ -41,9 +42,9 @@ pub(crate) const TASK_KEYS: usize = 1024;
 
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
-    kernels: Kernels,
+    width: VectorWidth,
     pool: Option<rayon::ThreadPool>,
-    pub(super) memories: Memories,
+    pub(crate) memories: Memories,
 }
 
 impl CpuEngine {
@@ -56,7 +57,7 @@ impl CpuEngine {
             .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
             .transpose()?;
         Ok(Self {
-            kernels: Kernels::new(width),
+            width,
             pool,
             memories: Memories::default(),
         })
@@ -65,7 +66,7 @@ impl CpuEngine {
     /// As wide as it gets, on the process's threads.
     pub(crate) fn widest() -> Self {
         Self {
-            kernels: Kernels::new(VectorWidth::widest()),
+            width: VectorWidth::widest(),
             pool: None,
             memories: Memories::default(),
         }
@@ -135,7 +136,7 @@ impl CpuEngine {
     }
 
     /// Runs `work` with the engine's own threads, where it has any.
-    pub(super) fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+    pub(crate) fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
@@ -166,7 +167,7 @@ impl CpuEngine {
                 output,
                 others: Vec::new(),
             };
-            self.kernels.in_lanes(&mut few);
+            in_lanes_of(self.width, &mut few);
             return few.others.into_iter().try_for_each(|place| {
                 let row = &mut output[place * samples..][..samples];
                 let track = window.tracks.start + place;
@@ -177,7 +178,7 @@ impl CpuEngine {
         match window.layout {
             Layout::TrackMajor => {
                 let of_a_run = || clip.samples_of_a_run(timeline);
-                let mut stage = Stage::new(&self.kernels, rotations, samples, of_a_run, output);
+                let mut stage = Stage::new(self.width, rotations, samples, of_a_run, output);
                 for track in window.tracks.clone() {
                     stage.row(samples, |samples, output| {
                         let first = window.samples.start + samples.start;
@@ -247,7 +248,7 @@ impl CpuEngine {
     }
 
     /// The samples of one part of a track.
-    pub(super) fn part(
+    pub(crate) fn part(
         &self,
         part: PartRef<'_>,
         timeline: &Timeline,
@@ -255,14 +256,8 @@ impl CpuEngine {
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         match &part.prepared.segments {
-            Segments::Arc(all) => {
-                let kernel = &self.kernels.arc;
-                kernel.row(part, all, timeline, cycle, output)
-            }
-            Segments::Polynomial(all) => {
-                let kernel = &self.kernels.polynomial;
-                kernel.row(part, all, timeline, cycle, output)
-            }
+            Segments::Arc(all) => row(self.width, part, all, timeline, cycle, output),
+            Segments::Polynomial(all) => row(self.width, part, all, timeline, cycle, output),
         }
     }
 
@@ -298,7 +293,7 @@ impl CpuEngine {
         let task = |first: usize, rows: &mut [_]| -> Result<(), Error> {
             let tracks = first..first + rows.len() / samples;
             let of_a_run = || samples / keys_each;
-            let mut stage = Stage::new(&self.kernels, rotations, samples, of_a_run, rows);
+            let mut stage = Stage::new(self.width, rotations, samples, of_a_run, rows);
             let mut memory = self.memories.take(interpolation, timeline, set);
             let Memory {
                 prepared,
@@ -344,7 +339,7 @@ impl CpuEngine {
     }
 
     /// As [`CpuEngine::evaluate_set`], straight from keys.
-    pub(super) fn sampled(
+    pub(crate) fn sampled(
         &self,
         set: &TrackSet,
         tracks: Range<usize>,

@@ -4,9 +4,8 @@ use std::marker::PhantomData;
 
 use glam::Vec4;
 
-use super::destination::{Destination, Places, Turns};
-use super::lanes::{Lanes, Number as _};
-use crate::segment::shader::TINY_BITS;
+use crate::cpu::destination::{Destination, Places, Turns};
+use crate::simd::lanes::{Lanes, Number as _};
 
 /// So few samples are evaluated one by one: a vector would be mostly waste.
 pub(crate) const FEW: usize = 3;
@@ -43,7 +42,7 @@ pub(crate) trait Evaluate {
     ) -> Self::Begun<L>;
 
     /// What is known of the samples behind those that are next, and the rotations of these.
-    /// Where there may be tiny components, `FILTER` makes them [`canonical`].
+    /// Where there may be tiny components, `FILTER` makes them [`canonical`](crate::math::canonical::canonical).
     fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         constant: L,
@@ -54,7 +53,7 @@ pub(crate) trait Evaluate {
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
 
-    /// Whether [`canonical`] would change no component of any sample. Each is a sum `m + r`
+    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample. Each is a sum `m + r`
     /// with the segment's middle `m`. Where |m| >= 2^-40, either |r| < |m|/2, and the sum is
     /// more than 2^-41; or both are multiples of 2^-64, and so is the sum, which is +0 where
     /// they cancel. Where all of the component's constants are +0, it is +0.
@@ -62,11 +61,11 @@ pub(crate) trait Evaluate {
 }
 
 /// See [`Evaluate::is_canonical`].
-pub(super) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
+pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// Whether no component of a segment's middle is smaller than [`COARSE`].
 #[inline(always)]
-pub(super) fn is_coarse(middle: [f32; 4]) -> bool {
+pub(crate) fn is_coarse(middle: [f32; 4]) -> bool {
     let magnitudes = Vec4::from_array(middle).abs();
     magnitudes.cmpge(Vec4::splat(COARSE)).all()
 }
@@ -81,7 +80,7 @@ pub(crate) struct Affine {
 /// Whether the distances of all frames of a run, and of those that fill its last vector, are
 /// whole numbers of f32, and so are their sums.
 #[inline(always)]
-pub(super) fn are_exact(first: i32, count: usize) -> bool {
+pub(crate) fn are_exact(first: i32, count: usize) -> bool {
     const EXACT: i64 = 1 << 24;
     let last = i64::from(first) + (count + STEPS.len()) as i64;
     i64::from(first) >= -EXACT && last <= EXACT
@@ -90,7 +89,7 @@ pub(super) fn are_exact(first: i32, count: usize) -> bool {
 /// Evaluates frames `first`, `first + 1`, … into `output[..count]`. What lies behind
 /// `count` may be overwritten up to the end of a vector. Distances [`are_exact`].
 #[inline(always)]
-pub(super) fn frames<L: Lanes, S: Evaluate>(
+pub(crate) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     first: f32,
@@ -113,7 +112,7 @@ const STEPS: [f32; 16] = [
 
 /// As [`frames`], to whole lines past the caches.
 #[inline(always)]
-pub(super) fn frames_past_caches<L: Lanes, S: Evaluate>(
+pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     first: f32,
@@ -146,7 +145,7 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
 /// Evaluates the first `count` samples of those whose distances from the middle are given;
 /// behind `count` there are more, up to the end of a vector.
 #[inline(always)]
-pub(super) fn distances<L: Lanes, S: Evaluate>(
+pub(crate) fn distances<L: Lanes, S: Evaluate>(
     segment: &S,
     affine: Affine,
     distances: &[f32],
@@ -165,7 +164,7 @@ pub(super) fn distances<L: Lanes, S: Evaluate>(
 
 /// Evaluates the sample at a distance from the middle.
 #[inline(always)]
-pub(super) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
+pub(crate) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
     let rotation = segment.at(distance * affine.scale + affine.offset);
     rotation.canonical().to_array()
 }
@@ -282,20 +281,15 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     output.take(count, turns);
 }
 
-/// Magnitudes below 2^-64 become +0. Twin: `shaders/canonical.wgsl`.
-#[inline(always)]
-pub(super) fn canonical(q: f32) -> f32 {
-    let magnitude = q.to_bits() & 0x7fff_ffff;
-    if magnitude < TINY_BITS { 0.0 } else { q }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use fastrand::Rng;
 
+    use crate::math::canonical::canonical;
+
     use super::*;
     use crate::cpu::destination::tests::in_lines;
-    use crate::segment::{ArcSegment, PolynomialSegment};
+    use crate::shader::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.
     fn hostile(random: &mut Rng) -> f32 {
@@ -309,10 +303,10 @@ pub(crate) mod tests {
     }
 
     fn four(random: &mut Rng) -> [f32; 4] {
-        std::array::from_fn(|_| crate::numeric::canonical(hostile(random)))
+        std::array::from_fn(|_| canonical(hostile(random)))
     }
 
-    /// How many components of some samples are changed by [`canonical`].
+    /// How many components of some samples are changed by [`canonical`](crate::math::canonical::canonical).
     fn changed<S: Evaluate>(segment: &S, random: &mut Rng) -> usize {
         let mut changed = 0;
         for _ in 0..32 {

@@ -6,18 +6,21 @@ use std::ops::Range;
 use glam::Quat;
 use rayon::prelude::*;
 
-use super::engine::CpuEngine;
-use super::mend::Row;
-use super::sampled::{Sampled, Straight};
-use super::stage::Output;
-use crate::clock::{Ticks, Timeline};
-use crate::cycle::{Cycle, Sides};
+use crate::cpu::engine::CpuEngine;
+use crate::cpu::streaming::Output;
 use crate::engine::Error;
-use crate::frame_clock::FrameClock;
-use crate::method::{Interpolation, Speed};
-use crate::plan::Stretch;
-use crate::prepare::{BATCH, PartRef, Preparation, Prepared, flip};
-use crate::tracks::TrackSet;
+use crate::from_keys::evaluate::{Sampled, Straight};
+use crate::from_keys::fallback::Row;
+use crate::method::interpolation::{Interpolation, Speed};
+use crate::prepare::Prepared;
+use crate::prepare::clip_data::PartRef;
+use crate::prepare::set::{BATCH, Preparation};
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::key_samples::Stretch;
+use crate::time::wrap::{Cycle, Sides};
+use crate::tracks::set::TrackSet;
+use crate::tracks::signs::flip;
 
 /// Intervals that one task takes, where nothing is prepared.
 const STRETCH: usize = 16 * 1024;

@@ -4,24 +4,85 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
-use super::lanes::Lanes;
-use super::stage::Samples;
-use crate::clock::{FramesError, Ticks, Timeline};
-use crate::cycle::Cycle;
-use crate::frame_clock::FrameClock;
-use crate::numeric::round_f32;
-use crate::prepare::{NONE, PartRef, Source};
-use crate::schedule::{Distance, Emit, Run, RunSource, runs_after, runs_before};
-use crate::span_block::{SpanBlock, SpanBlocks};
+use crate::cpu::evaluate::{Affine, Evaluate, FEW, are_exact, distances, frames, one};
+use crate::cpu::streaming::{Output, Samples};
+use crate::math::canonical::round_f32;
+use crate::prepare::clip_data::PartRef;
+use crate::prepare::{NONE, Source};
+use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::simd::lanes::Lanes;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::interval_block::{SpanBlock, SpanBlocks};
+use crate::time::runs::{Distance, Emit, Run, RunSource, runs_after, runs_before};
+use crate::time::wrap::Cycle;
 
 /// Samples whose distances are found out together.
 const CHUNK: usize = 64;
 
-/// The samples of one part of a track in a cycle, into `output`, which
-/// starts with the first of them.
+/// Evaluates the samples of one part of a track in a cycle into `output`, which starts with the
+/// first of them, with vectors of that width.
+pub(crate) fn row<S: Evaluate>(
+    width: VectorWidth,
+    part: PartRef<'_>,
+    segments: &[S],
+    timeline: &Timeline,
+    cycle: &Cycle,
+    output: &mut Output<'_, '_>,
+) -> Result<(), FramesError> {
+    match output {
+        Output::Here(samples) => in_place(width, part, segments, timeline, cycle, *samples),
+        Output::Staged(staged) => in_place(width, part, segments, timeline, cycle, staged),
+    }
+}
+
+fn in_place<S: Evaluate, O: Samples + ?Sized>(
+    width: VectorWidth,
+    part: PartRef<'_>,
+    segments: &[S],
+    timeline: &Timeline,
+    cycle: &Cycle,
+    output: &mut O,
+) -> Result<(), FramesError> {
+    let mut work = RowWork {
+        part,
+        segments,
+        timeline,
+        cycle,
+        output,
+        done: Ok(()),
+    };
+    in_lanes_of(width, &mut work);
+    work.done
+}
+
+/// A row to evaluate, and how that went.
+struct RowWork<'a, S, O: ?Sized> {
+    part: PartRef<'a>,
+    segments: &'a [S],
+    timeline: &'a Timeline,
+    cycle: &'a Cycle,
+    output: &'a mut O,
+    done: Result<(), FramesError>,
+}
+
+impl<S: Evaluate, O: Samples + ?Sized> InLanes for RowWork<'_, S, O> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Self {
+            part,
+            segments,
+            timeline,
+            cycle,
+            output,
+            done,
+        } = self;
+        *done = in_lanes_row::<L, S, O>(*part, segments, timeline, cycle, output);
+    }
+}
+
 #[inline(always)]
-pub(super) fn row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
+fn in_lanes_row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
     part: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::device::LogicalDevice;
-use super::error::{Named, VulkanError};
-use super::physical::PhysicalDevice;
-use crate::segment::PolynomialSegment;
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::physical::PhysicalDevice;
+use crate::shader::PolynomialSegment;
 
 /// Where a buffer lives and who touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Residence {
+pub(crate) enum Residence {
     /// The host writes, the device reads.
     Upload,
     /// The device writes, the host reads.
@@ -50,7 +50,7 @@ fn usage(is_texels: bool) -> vk::BufferUsageFlags {
 }
 
 /// Whether a device takes such memory for a buffer.
-pub(super) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
+pub(crate) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
     let info = vk::PhysicalDeviceExternalBufferInfo::default()
         .usage(usage(is_texels))
         .handle_type(LENT);
@@ -65,11 +65,11 @@ pub(super) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
 }
 
 /// A storage buffer, mapped for as long as it lives where the host touches it.
-pub(super) struct Buffer {
+pub(crate) struct Buffer {
     device: Arc<LogicalDevice>,
-    pub(super) raw: vk::Buffer,
+    pub(crate) raw: vk::Buffer,
     /// As texels of 16 bytes; null where no kernel reads it so.
-    pub(super) view: vk::BufferView,
+    pub(crate) view: vk::BufferView,
     memory: vk::DeviceMemory,
     mapped: Option<NonNull<u8>>,
     size: u64,
@@ -87,7 +87,7 @@ const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
 impl Buffer {
     /// At least `size` bytes; an empty buffer still has room for one of what kernels read,
     /// which may do so before they choose.
-    pub(super) fn new(
+    pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         name: &str,
         size: u64,
@@ -127,7 +127,7 @@ impl Buffer {
     ///
     /// # Safety
     /// They must be there as long as the buffer is, and as anything works on it.
-    pub(super) unsafe fn around(
+    pub(crate) unsafe fn around(
         device: &Arc<LogicalDevice>,
         name: &str,
         pages: NonNull<u8>,
@@ -219,12 +219,12 @@ impl Buffer {
     }
 
     /// Size in bytes.
-    pub(super) fn size(&self) -> u64 {
+    pub(crate) fn size(&self) -> u64 {
         self.size
     }
 
     /// Some of the mapped bytes; none where the host cannot touch them.
-    pub(super) fn bytes(&self, range: Range<usize>) -> &[u8] {
+    pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
         match self.mapped {
             // SAFETY: mapped with at least this size for the life of the buffer.
             // Callers read only after the fence of the work that writes the range.
@@ -236,7 +236,7 @@ impl Buffer {
     }
 
     /// Some of the mapped bytes, to write.
-    pub(super) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
+    pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
         match self.mapped {
             // SAFETY: as in `bytes`, and `&mut self` makes this the host's only
             // reference; the device works on other ranges.

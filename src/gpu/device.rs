@@ -7,28 +7,28 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use super::buffer::may_be_lent;
-use super::error::{Named, VulkanError};
-use super::physical::{DeviceKind, PhysicalDevice};
 use crate::device::Reads;
+use crate::gpu::buffer::may_be_lent;
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 
 /// An opened device, destroyed with its last user unless it was handed in.
-pub(super) struct LogicalDevice {
-    pub(super) raw: ash::Device,
-    pub(super) physical: PhysicalDevice,
+pub(crate) struct LogicalDevice {
+    pub(crate) raw: ash::Device,
+    pub(crate) physical: PhysicalDevice,
     /// Whether its kernels read texel buffers.
-    pub(super) reads_texels: bool,
+    pub(crate) reads_texels: bool,
     queue: Mutex<vk::Queue>,
     names: Option<ext::debug_utils::Device>,
     /// Where it may work on the caller's memory.
-    pub(super) borrows: Option<ext::external_memory_host::Device>,
+    pub(crate) borrows: Option<ext::external_memory_host::Device>,
     owned: bool,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
 }
 
 impl LogicalDevice {
-    pub(super) fn new(physical: PhysicalDevice, reads: Reads) -> Result<Arc<Self>, VulkanError> {
+    pub(crate) fn new(physical: PhysicalDevice, reads: Reads) -> Result<Arc<Self>, VulkanError> {
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(physical.queue_family)
@@ -63,7 +63,7 @@ impl LogicalDevice {
     }
 
     /// An application's device; it stays the application's to destroy.
-    pub(super) fn borrowed(
+    pub(crate) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
@@ -98,12 +98,12 @@ impl LogicalDevice {
     }
 
     /// The queue; Vulkan wants one user at a time.
-    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Gives an object the name that validation and debuggers show.
-    pub(super) fn name(&self, object: impl vk::Handle, name: &str) {
+    pub(crate) fn name(&self, object: impl vk::Handle, name: &str) {
         let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else {
             return;
         };
@@ -116,7 +116,7 @@ impl LogicalDevice {
     }
 
     /// From now on nothing of this device is destroyed: it may still be in use.
-    pub(super) fn mark_hung(&self) {
+    pub(crate) fn mark_hung(&self) {
         if !self.hung.swap(true, Ordering::Relaxed) {
             // The instance must outlive the device, which stays.
             std::mem::forget(Arc::clone(&self.physical.instance));
@@ -124,7 +124,7 @@ impl LogicalDevice {
     }
 
     /// Waits for everything; a device that cannot even do that is as good as hung.
-    pub(super) fn wait_until_idle(&self) {
+    pub(crate) fn wait_until_idle(&self) {
         let _queue = self.queue();
         // SAFETY: the device is alive, and its queue is locked.
         match unsafe { self.raw.device_wait_idle() } {
@@ -134,7 +134,7 @@ impl LogicalDevice {
     }
 
     /// Waits for everything, however long it takes.
-    pub(super) fn wait_in_any_case(&self) {
+    pub(crate) fn wait_in_any_case(&self) {
         let _queue = self.queue();
         // SAFETY: as in `wait_until_idle`.
         while let Err(error) = unsafe { self.raw.device_wait_idle() }
@@ -145,12 +145,12 @@ impl LogicalDevice {
     }
 
     /// Whether it was opened here, and is ours to open again.
-    pub(super) fn is_owned(&self) -> bool {
+    pub(crate) fn is_owned(&self) -> bool {
         self.owned
     }
 
     /// Whether objects may be destroyed.
-    pub(super) fn may_destroy(&self) -> bool {
+    pub(crate) fn may_destroy(&self) -> bool {
         !self.hung.load(Ordering::Relaxed)
     }
 }

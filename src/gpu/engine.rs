@@ -3,24 +3,24 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::buffer::{Buffer, Residence};
-use super::device::LogicalDevice;
-use super::error::VulkanError;
-use super::lent::Lent;
-use super::mapped::{FreeBuffers, MappedQuats};
-use super::physical::{DeviceKind, PhysicalDevice};
-use super::pipeline::{KERNELS, POSES, Pipeline, SAMPLED};
-use super::sampled::KeySlot;
-use super::slot::{External, Slot, Target};
-use super::submission::{Access, Submission};
-use crate::clock::{FramesError, Timeline};
 use crate::device::{EngineOptions, Timings, Transfer};
-use crate::encoding::Encoding;
-use crate::output_buffer::OutputBuffer;
-use crate::prepare::ClipData;
-use crate::rotations::{Layout, Storage};
-use crate::segment::Item;
-use crate::window::Window;
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::error::VulkanError;
+use crate::gpu::from_keys::KeySlot;
+use crate::gpu::imported_memory::Lent;
+use crate::gpu::in_flight::{External, Slot, Target};
+use crate::gpu::mapped::{FreeBuffers, MappedQuats};
+use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::gpu::submission::{Access, Submission};
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Storage};
+use crate::prepare::clip_data::ClipData;
+use crate::shader::{Item, KERNELS, Kernel};
+use crate::time::frames::{FramesError, Timeline};
+use crate::time::window::Window;
 
 /// Rotations of one window, unless limits, the budget or the device's speed say less:
 /// 32 MiB.
@@ -30,21 +30,19 @@ const WINDOW: u64 = 1 << 21;
 const SMALLEST_WINDOW: usize = 1 << 16;
 
 /// Windows in flight: the host fills one while the device works on another.
-pub(super) const SLOTS: usize = 2;
+pub(crate) const SLOTS: usize = 2;
 
 /// A Vulkan device with its kernels.
 pub(crate) struct VulkanEngine {
-    pub(super) device: Arc<LogicalDevice>,
+    pub(crate) device: Arc<LogicalDevice>,
     /// Made when they are first needed.
-    pub(super) pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS]>,
-    pub(super) pose_pipelines: Mutex<[Option<Arc<Pipeline>>; POSES]>,
-    pub(super) slots: Mutex<Vec<Slot>>,
-    pub(super) key_pipelines: Mutex<[Option<Arc<Pipeline>>; SAMPLED]>,
-    pub(super) key_slots: Mutex<Vec<KeySlot>>,
+    pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
+    pub(crate) slots: Mutex<Vec<Slot>>,
+    pub(crate) key_slots: Mutex<Vec<KeySlot>>,
     /// Results are written in place, or copied out of the device's own memory.
-    pub(super) in_place: bool,
+    pub(crate) in_place: bool,
     /// Kernels work on the caller's memory where they can.
-    pub(super) lends: bool,
+    pub(crate) lends: bool,
     /// Rotations of one window.
     window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
@@ -52,18 +50,18 @@ pub(crate) struct VulkanEngine {
     /// Bytes that the segments of one clip may take; no limit unless one was asked.
     clip_bytes: Option<u64>,
     free: FreeBuffers,
-    pub(super) timings: Mutex<Timings>,
+    pub(crate) timings: Mutex<Timings>,
 }
 
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
     device: Arc<LogicalDevice>,
-    pub(super) groups: Vec<GroupBuffers>,
+    pub(crate) groups: Vec<GroupBuffers>,
 }
 
-pub(super) struct GroupBuffers {
-    pub(super) segments: Buffer,
-    pub(super) constants: Buffer,
+pub(crate) struct GroupBuffers {
+    pub(crate) segments: Buffer,
+    pub(crate) constants: Buffer,
 }
 
 /// What is to be evaluated, and how stored.
@@ -101,7 +99,7 @@ impl VulkanEngine {
         Self::with_device(device, options)
     }
 
-    pub(super) fn with_device(
+    pub(crate) fn with_device(
         device: Arc<LogicalDevice>,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
@@ -127,10 +125,8 @@ impl VulkanEngine {
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         Ok(Self {
-            pipelines: Mutex::new([const { None }; KERNELS]),
-            pose_pipelines: Mutex::default(),
+            pipelines: Mutex::new([const { None }; KERNELS.len()]),
             slots: Mutex::default(),
-            key_pipelines: Mutex::default(),
             key_slots: Mutex::default(),
             in_place,
             lends: options.transfer == Transfer::Automatic,
@@ -143,18 +139,29 @@ impl VulkanEngine {
         })
     }
 
-    pub(super) fn device(&self) -> &Arc<LogicalDevice> {
+    pub(crate) fn device(&self) -> &Arc<LogicalDevice> {
         &self.device
     }
 
+    /// The pipeline of a kernel, made when it is first needed.
+    pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
+        let mut all = (self.pipelines.lock()).unwrap_or_else(PoisonError::into_inner);
+        let kept = &mut all[kernel as usize];
+        if let Some(pipeline) = kept {
+            return Ok(Arc::clone(pipeline));
+        }
+        let pipeline = Pipeline::new(&self.device, kernel, Exactness::Demanded)?;
+        Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
+    }
+
     /// Name, kind and limits of the device.
-    pub(crate) fn info(&self) -> &super::DeviceInfo {
+    pub(crate) fn info(&self) -> &crate::gpu::physical::DeviceInfo {
         &self.device.physical.info
     }
 
     /// Runs every canary.
-    pub(crate) fn canaries(&self) -> Result<Vec<super::CanaryReport>, VulkanError> {
-        super::canary::run(self)
+    pub(crate) fn canaries(&self) -> Result<Vec<crate::gpu::self_test::CanaryReport>, VulkanError> {
+        crate::gpu::self_test::run(self)
     }
 
     /// Where the time went since this was last asked.
@@ -221,7 +228,7 @@ impl VulkanEngine {
     }
 
     /// The same device opened again; nothing for an application's own.
-    pub(super) fn reopened(&self, options: &EngineOptions) -> Result<Option<Self>, VulkanError> {
+    pub(crate) fn reopened(&self, options: &EngineOptions) -> Result<Option<Self>, VulkanError> {
         if !self.device.is_owned() {
             return Ok(None);
         }
@@ -236,7 +243,7 @@ impl VulkanEngine {
     }
 
     /// Halves the windows to come; false when they are as small as they may be.
-    pub(super) fn halve_windows(&self) -> bool {
+    pub(crate) fn halve_windows(&self) -> bool {
         let half = self.window() / 2;
         let smaller = half >= SMALLEST_WINDOW;
         if smaller {
@@ -246,7 +253,7 @@ impl VulkanEngine {
     }
 
     /// Gives back what is kept for the next evaluation; false when that is nothing.
-    pub(super) fn give_back(&self) -> bool {
+    pub(crate) fn give_back(&self) -> bool {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let mut key_slots = (self.key_slots.lock()).unwrap_or_else(PoisonError::into_inner);
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
@@ -334,7 +341,7 @@ impl VulkanEngine {
     }
 
     /// Evaluates into a buffer of the caller's device, where it stays.
-    pub(super) fn evaluate_to(
+    pub(crate) fn evaluate_to(
         &self,
         job: Job<'_>,
         layout: Layout,

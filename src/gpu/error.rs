@@ -132,7 +132,7 @@ fn hint(result: vk::Result) -> &'static str {
 }
 
 /// Keeps the name of the call that failed.
-pub(super) trait Named<T> {
+pub(crate) trait Named<T> {
     fn named(self, call: &'static str) -> Result<T, VulkanError>;
 }
 

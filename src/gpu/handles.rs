@@ -2,23 +2,23 @@
 
 use ash::vk;
 
-use super::device::LogicalDevice;
-use super::engine::{Job, VulkanEngine};
-use super::error::VulkanError;
-use super::instance::Instance;
-use super::opened::Opened;
-use super::physical::PhysicalDevice;
-use super::slot::External;
 use crate::clip::Clip;
-use crate::clock::Frames;
 use crate::device::EngineOptions;
-use crate::encoding::Encoding;
 use crate::engine::{Backend, Engine, Error};
-use crate::rotations::Layout;
-use crate::spirv::FloatControls;
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::engine::{Job, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::gpu::in_flight::External;
+use crate::gpu::instance::Instance;
+use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::recovery::Opened;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::shader::spirv::FloatControls;
+use crate::time::frames::Frames;
 
 /// An application's instance, device and queue, to evaluate on
-/// ([`Engine::from_vulkan`](crate::Engine::from_vulkan)).
+/// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)).
 ///
 /// The device needs no features, but is faster with one where it is software
 /// ([`VulkanHandles::shader_int64`]). Below Vulkan 1.2, enable

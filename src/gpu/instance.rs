@@ -6,14 +6,14 @@ use std::sync::Mutex;
 
 use ash::{ext, vk};
 
-use super::error::{Named, VulkanError};
+use crate::gpu::error::{Named, VulkanError};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// An instance, destroyed with its last user unless it was handed in.
-pub(super) struct Instance {
-    pub(super) raw: ash::Instance,
-    pub(super) debug_utils: bool,
+pub(crate) struct Instance {
+    pub(crate) raw: ash::Instance,
+    pub(crate) debug_utils: bool,
     messenger: Option<Messenger>,
     owned: bool,
     /// Keeps the loader library open; last, so that it closes last.
@@ -29,7 +29,7 @@ struct Messenger {
 
 impl Instance {
     /// Loads Vulkan and creates an instance of version 1.1 or newer.
-    pub(super) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
+    pub(crate) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
         // SAFETY: loading a library runs its initialisers; that is what is asked for.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| VulkanError::NoLoader {
             reason: error.to_string(),
@@ -112,7 +112,7 @@ impl Instance {
     }
 
     /// An application's instance; it stays the application's to destroy.
-    pub(super) fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
+    pub(crate) fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
         Arc::new(Self {
             raw,
             debug_utils: false,
@@ -123,13 +123,13 @@ impl Instance {
     }
 
     /// Every physical device, in the loader's order.
-    pub(super) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>, VulkanError> {
+    pub(crate) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>, VulkanError> {
         // SAFETY: the instance is alive.
         unsafe { self.raw.enumerate_physical_devices() }.named("vkEnumeratePhysicalDevices")
     }
 
     /// What the validation layer has said so far.
-    pub(super) fn validation_messages(&self) -> Vec<String> {
+    pub(crate) fn validation_messages(&self) -> Vec<String> {
         let messages = self.messenger.as_ref().map(|messenger| &messenger.messages);
         messages
             .and_then(|m| m.lock().ok())

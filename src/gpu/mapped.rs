@@ -4,22 +4,22 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Quat;
 
-use super::buffer::Buffer;
-use crate::rotations::Storage;
+use crate::gpu::buffer::Buffer;
+use crate::output::rotations::Storage;
 
 /// Output buffers given back by results: touching fresh memory costs more than
 /// evaluating.
-pub(super) type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
+pub(crate) type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
 
 /// A result in mapped memory; the buffer goes back to its engine.
-pub(super) struct MappedQuats {
+pub(crate) struct MappedQuats {
     buffer: Option<Buffer>,
     count: usize,
     free: FreeBuffers,
 }
 
 impl MappedQuats {
-    pub(super) fn new(buffer: Buffer, count: usize, free: &FreeBuffers) -> Self {
+    pub(crate) fn new(buffer: Buffer, count: usize, free: &FreeBuffers) -> Self {
         Self {
             buffer: Some(buffer),
             count,

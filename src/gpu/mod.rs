@@ -2,32 +2,22 @@
 //! not safe Rust. One type owns one Vulkan object and destroys it.
 #![allow(unsafe_code)]
 
-mod buffer;
-mod canary;
-mod device;
-mod engine;
-mod error;
-mod handles;
-mod instance;
-mod lent;
-mod mapped;
-mod opened;
-mod pass;
-mod physical;
-mod pipeline;
-mod run;
-mod sampled;
-mod singles;
-mod slot;
-mod submission;
-mod work_list;
-
-pub use canary::CanaryReport;
-pub(crate) use engine::{ClipBuffers, EvaluateError, Job, VulkanEngine};
-pub use error::VulkanError;
-pub use handles::{VulkanBuffer, VulkanHandles};
-pub(crate) use opened::Opened;
-pub use physical::{DeviceInfo, DeviceKind};
-pub(crate) use physical::{PhysicalDevice, list};
-pub(crate) use pipeline::PoseKernel;
-pub use pipeline::kernels;
+pub(crate) mod buffer;
+pub(crate) mod device;
+pub(crate) mod engine;
+pub(crate) mod error;
+pub(crate) mod from_keys;
+pub(crate) mod handles;
+pub(crate) mod imported_memory;
+pub(crate) mod in_flight;
+pub(crate) mod instance;
+pub(crate) mod mapped;
+pub(crate) mod physical;
+pub(crate) mod pipeline;
+pub(crate) mod pose_pass;
+pub(crate) mod recovery;
+pub(crate) mod run;
+pub(crate) mod sample_list;
+pub(crate) mod self_test;
+pub(crate) mod submission;
+pub(crate) mod work_list;

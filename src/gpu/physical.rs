@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use super::error::{Named, VulkanError};
-use super::instance::Instance;
 use crate::device::Reads;
-use crate::spirv::FloatControls;
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::instance::Instance;
+use crate::shader::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,22 +68,22 @@ pub enum DeviceKind {
 /// A physical device, not yet opened.
 #[derive(Clone)]
 pub(crate) struct PhysicalDevice {
-    pub(super) instance: Arc<Instance>,
-    pub(super) raw: vk::PhysicalDevice,
-    pub(super) queue_family: u32,
+    pub(crate) instance: Arc<Instance>,
+    pub(crate) raw: vk::PhysicalDevice,
+    pub(crate) queue_family: u32,
     /// Valid bits of a time stamp, for each queue family; 0 where there are none.
     timestamp_bits: Vec<u32>,
     /// Nanoseconds of one tick of a time stamp.
     timestamp_period: f64,
-    pub(super) float_controls: FloatControls,
+    pub(crate) float_controls: FloatControls,
     /// The extension must be enabled: the device is older than Vulkan 1.2.
-    pub(super) float_controls_extension: bool,
-    pub(super) memory: vk::PhysicalDeviceMemoryProperties,
+    pub(crate) float_controls_extension: bool,
+    pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
     max_texel_buffer_elements: u32,
     /// Shaders may have integers of 64 bits.
-    pub(super) has_int64: bool,
+    pub(crate) has_int64: bool,
     /// What memory must be aligned to that the device is to work on where it is, bytes.
-    pub(super) lent_alignment: Option<u64>,
+    pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
 
 impl PhysicalDevice {
     /// `None` for a device that cannot compute or has only Vulkan 1.0.
-    pub(super) fn new(
+    pub(crate) fn new(
         instance: &Arc<Instance>,
         raw: vk::PhysicalDevice,
     ) -> Result<Option<Self>, VulkanError> {
@@ -209,7 +209,7 @@ impl PhysicalDevice {
     /// Whether its kernels are to read texel buffers, and to store 64 bits at once. Cards
     /// bring together what neighbouring lanes ask for; lavapipe brings it lane by lane, and
     /// 32 bits of a storage buffer more slowly than a texel of 128.
-    pub(super) fn reads_texels(&self, reads: Reads) -> bool {
+    pub(crate) fn reads_texels(&self, reads: Reads) -> bool {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
         match reads {
@@ -220,12 +220,12 @@ impl PhysicalDevice {
     }
 
     /// Whether its queue can take time stamps.
-    pub(super) fn has_timestamps(&self) -> bool {
+    pub(crate) fn has_timestamps(&self) -> bool {
         self.timestamp_bits[self.queue_family as usize] > 0
     }
 
     /// The time between two stamps.
-    pub(super) fn between(&self, start: u64, end: u64) -> Duration {
+    pub(crate) fn between(&self, start: u64, end: u64) -> Duration {
         let bits = self.timestamp_bits[self.queue_family as usize];
         let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.clamp(1, 64)));
         Duration::from_nanos((ticks as f64 * self.timestamp_period) as u64)
@@ -233,7 +233,7 @@ impl PhysicalDevice {
 
     /// The first memory type allowed by `allowed` with all of `required`; one that
     /// also has `preferred`, where there is one.
-    pub(super) fn memory_type(
+    pub(crate) fn memory_type(
         &self,
         allowed: u32,
         required: vk::MemoryPropertyFlags,

@@ -2,25 +2,22 @@
 //! while the device does that of the other.
 
 use std::collections::VecDeque;
+use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
-use super::buffer::Residence;
-use super::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
-use super::error::VulkanError;
-use super::pipeline::{Exactness, Listing, Pipeline, kernel, kernel_bindings};
-use super::slot::{Finish, Slot, Stopwatch, Target};
-use super::submission::{Access, Binding};
-use crate::encoding::Encoding;
-use crate::method::Form;
-use crate::segment::Launch;
-use crate::segment::shader::WORKGROUP;
-use crate::window::Window;
+use crate::gpu::buffer::Residence;
+use crate::gpu::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
+use crate::gpu::in_flight::{Finish, Slot, Stopwatch, Target};
+use crate::gpu::submission::{Access, Binding};
+use crate::output::encoding::Encoding;
+use crate::shader::WORKGROUP;
+use crate::shader::{Dispatch, Kernel, List};
+use crate::time::window::Window;
 
 impl VulkanEngine {
     /// Evaluates a window of a result, in windows of its own.
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         job: Job<'_>,
         window: &Window,
@@ -158,7 +155,8 @@ impl VulkanEngine {
             (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
-        let pipeline = self.pipeline(clip.interpolation.form(), work.listing, encoding)?;
+        let form = clip.interpolation.form();
+        let pipeline = self.pipeline(Kernel::over_segments(form, work.list, encoding.store()))?;
         slot.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
         for own in work.groups {
@@ -167,14 +165,16 @@ impl VulkanEngine {
                 continue;
             }
             let group = &buffers.groups[own.group];
-            let bindings = [
+            let mut bindings = vec![
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
                 Binding::whole(items),
-                Binding::whole(distances),
-                rotations,
             ];
-            let launch = Launch {
+            if work.list == List::Times {
+                bindings.push(Binding::whole(distances));
+            }
+            bindings.push(rotations);
+            let dispatch = Dispatch {
                 first_item,
                 item_count,
                 stride: window.stride() as u32,
@@ -182,8 +182,12 @@ impl VulkanEngine {
                 first_output: own.first_output,
             };
             let groups = self.workgroups(item_count);
-            slot.submission
-                .dispatch(&pipeline, &bindings, bytemuck::bytes_of(&launch), groups)?;
+            slot.submission.dispatch(
+                &pipeline,
+                &bindings,
+                bytemuck::bytes_of(&dispatch),
+                groups,
+            )?;
             first_item += item_count;
         }
         let mut patches = work.patches;
@@ -212,30 +216,8 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// The kernel for some work, made when it is first needed.
-    fn pipeline(
-        &self,
-        form: Form,
-        listing: Listing,
-        encoding: Encoding,
-    ) -> Result<Arc<Pipeline>, VulkanError> {
-        let mut all = self
-            .pipelines
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let (shader, place) = kernel(self.device.reads_texels, form, listing, encoding);
-        let place = &mut all[place];
-        if let Some(pipeline) = place {
-            return Ok(Arc::clone(pipeline));
-        }
-        let exactness = Exactness::Demanded;
-        let bindings = kernel_bindings(self.device.reads_texels);
-        let pipeline = Pipeline::new(&self.device, shader, bindings, exactness)?;
-        Ok(Arc::clone(place.insert(Arc::new(pipeline))))
-    }
-
     /// Enough workgroups for `items`, within the limit along x.
-    pub(super) fn workgroups(&self, items: u32) -> [u32; 2] {
+    pub(crate) fn workgroups(&self, items: u32) -> [u32; 2] {
         let groups = items.div_ceil(WORKGROUP);
         let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
         [x, groups.div_ceil(x)]

@@ -5,16 +5,19 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 
-use super::buffer::Buffer;
-use super::device::LogicalDevice;
-use super::error::{Named, VulkanError};
-use super::pipeline::{MOST_BINDINGS, Pipeline};
+use crate::gpu::buffer::Buffer;
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::pipeline::Pipeline;
 
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
 
+/// No kernel binds more buffers.
+const MOST_BINDINGS: u32 = 5;
+
 /// Command buffer, fence and descriptor pool, used again and again.
-pub(super) struct Submission {
+pub(crate) struct Submission {
     device: Arc<LogicalDevice>,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
@@ -31,28 +34,28 @@ pub(super) struct Submission {
 
 /// When a submission ran.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Spent {
+pub(crate) struct Spent {
     /// When it was handed over.
-    pub(super) submitted: Instant,
+    pub(crate) submitted: Instant,
     /// When its fence was seen.
-    pub(super) finished: Instant,
+    pub(crate) finished: Instant,
     /// On the device, by its own clock; zero where it has none.
-    pub(super) on_device: Duration,
+    pub(crate) on_device: Duration,
 }
 
 /// A stretch of a buffer that a kernel sees.
 #[derive(Clone, Copy)]
-pub(super) struct Binding {
-    pub(super) buffer: vk::Buffer,
+pub(crate) struct Binding {
+    pub(crate) buffer: vk::Buffer,
     /// As texels, all of the buffer; where a kernel reads it so.
-    pub(super) view: vk::BufferView,
-    pub(super) offset: u64,
-    pub(super) size: u64,
+    pub(crate) view: vk::BufferView,
+    pub(crate) offset: u64,
+    pub(crate) size: u64,
 }
 
 impl Binding {
     /// A stretch of a buffer that no kernel reads as texels.
-    pub(super) fn stretch(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
+    pub(crate) fn stretch(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
         Self {
             buffer,
             view: vk::BufferView::null(),
@@ -62,7 +65,7 @@ impl Binding {
     }
 
     /// All of a buffer.
-    pub(super) fn whole(buffer: &Buffer) -> Self {
+    pub(crate) fn whole(buffer: &Buffer) -> Self {
         Self {
             buffer: buffer.raw,
             view: buffer.view,
@@ -73,7 +76,7 @@ impl Binding {
 }
 
 impl Submission {
-    pub(super) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         let mut submission = Self {
             device: Arc::clone(device),
             pool: vk::CommandPool::null(),
@@ -115,7 +118,7 @@ impl Submission {
     /// Starts recording, with room for `sets` descriptor sets.
     ///
     /// Must not be called while work is pending.
-    pub(super) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
+    pub(crate) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
         debug_assert!(self.submitted.is_none());
         let raw = &self.device.raw;
         if sets > self.capacity {
@@ -163,14 +166,14 @@ impl Submission {
     }
 
     /// Records a dispatch with one buffer for each binding.
-    pub(super) fn dispatch(
+    pub(crate) fn dispatch(
         &mut self,
         pipeline: &Pipeline,
         bindings: &[Binding],
         constants: &[u8],
         groups: [u32; 2],
     ) -> Result<(), VulkanError> {
-        debug_assert_eq!(bindings.len(), pipeline.bindings.count as usize);
+        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
         let raw = &self.device.raw;
         let layouts = [pipeline.set_layout];
         let info = vk::DescriptorSetAllocateInfo::default()
@@ -192,7 +195,7 @@ impl Submission {
         let writes: Vec<_> = (0..)
             .zip(infos.iter().zip(&views))
             .map(|(binding, (info, view))| {
-                let kind = pipeline.bindings.kind(binding);
+                let kind = pipeline.kind(binding);
                 let write = vk::WriteDescriptorSet::default()
                     .dst_set(set)
                     .dst_binding(binding)
@@ -219,7 +222,7 @@ impl Submission {
     }
 
     /// Records a copy of `size` bytes.
-    pub(super) fn copy(&mut self, from: &Buffer, to: &Buffer, to_offset: u64, size: u64) {
+    pub(crate) fn copy(&mut self, from: &Buffer, to: &Buffer, to_offset: u64, size: u64) {
         let region = [vk::BufferCopy::default().dst_offset(to_offset).size(size)];
         // SAFETY: as in `dispatch`; both ranges lie within their buffers.
         unsafe {
@@ -230,7 +233,7 @@ impl Submission {
     }
 
     /// Records that some bytes, a multiple of 4, are written into a buffer.
-    pub(super) fn update(&mut self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
+    pub(crate) fn update(&mut self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
         // SAFETY: as in `copy`; the bytes are few, and copied into the commands.
         unsafe {
             self.device
@@ -240,7 +243,7 @@ impl Submission {
     }
 
     /// Records that what was written before `from` is seen after `to`.
-    pub(super) fn barrier(&mut self, from: Access, to: Access) {
+    pub(crate) fn barrier(&mut self, from: Access, to: Access) {
         let (source_stage, source_access) = from.scope(true);
         let (destination_stage, destination_access) = to.scope(false);
         let memory = [vk::MemoryBarrier::default()
@@ -262,7 +265,7 @@ impl Submission {
     }
 
     /// Ends recording and hands the work to the queue.
-    pub(super) fn submit(&mut self) -> Result<(), VulkanError> {
+    pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
         let raw = &self.device.raw;
         if self.stamps != vk::QueryPool::null() {
             let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
@@ -281,7 +284,7 @@ impl Submission {
     }
 
     /// Waits until submitted work has finished; at once when there is none.
-    pub(super) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
+    pub(crate) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
         let Some(submitted) = self.submitted else {
             return Ok(None);
         };
@@ -335,7 +338,7 @@ impl Submission {
 
 /// Who touches memory on one side of a barrier.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Access {
+pub(crate) enum Access {
     Kernel,
     Copy,
     Host,

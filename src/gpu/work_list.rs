@@ -2,55 +2,57 @@
 
 use rayon::prelude::*;
 
-use super::pipeline::Listing;
-use crate::clock::{FramesError, Timeline};
-use crate::cpu::{InLanes, Lanes, in_lanes};
-use crate::numeric::round_f32;
-use crate::prepare::{ClipData, Part, Prepared};
-use crate::schedule::{Distance, Emit, Run, RunSource};
-use crate::segment::Item;
-use crate::segment::shader::{HOLD, ITEM_SAMPLES};
-use crate::window::Window;
+use crate::math::canonical::round_f32;
+use crate::prepare::clip_data::ClipData;
+use crate::prepare::{Part, Prepared};
+use crate::shader::Item;
+use crate::shader::List;
+use crate::shader::{IS_CONSTANT, ITEM_SAMPLES};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::time::frames::{FramesError, Timeline};
+use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::window::Window;
 
 /// What the device and the host have to do in a window.
-pub(super) struct Work {
-    pub(super) listing: Listing,
+pub(crate) struct Work {
+    pub(crate) list: List,
     /// What is listed of each group lies one behind the other.
-    pub(super) groups: Vec<GroupItems>,
+    pub(crate) groups: Vec<GroupItems>,
     /// Rotations that the host computed.
-    pub(super) patches: Vec<Patch>,
+    pub(crate) patches: Vec<Patch>,
 }
 
 /// How much the device has to do for one group of a clip.
-pub(super) struct GroupItems {
-    pub(super) group: usize,
+pub(crate) struct GroupItems {
+    pub(crate) group: usize,
     /// Items, or single samples.
-    pub(super) items: u32,
+    pub(crate) items: u32,
     /// Where the first of single samples is stored.
-    pub(super) first_output: u32,
+    pub(crate) first_output: u32,
 }
 
 /// A place in the window, and the rotation there.
-pub(super) type Patch = (usize, [f32; 4]);
+pub(crate) type Patch = (usize, [f32; 4]);
 
 /// What one group of a clip has to do in a window.
-pub(super) struct GroupWork {
-    pub(super) group: usize,
-    pub(super) chunks: Vec<WorkChunk>,
+pub(crate) struct GroupWork {
+    pub(crate) group: usize,
+    pub(crate) chunks: Vec<WorkChunk>,
 }
 
 /// A piece of a work list, made by one thread. The `first` of items that take their
 /// distances from `distances` counts from the chunk's own first.
 #[derive(Default)]
-pub(super) struct WorkChunk {
-    pub(super) items: Vec<Item>,
-    pub(super) distances: Vec<f32>,
-    pub(super) patches: Vec<Patch>,
+pub(crate) struct WorkChunk {
+    pub(crate) items: Vec<Item>,
+    pub(crate) distances: Vec<f32>,
+    pub(crate) patches: Vec<Patch>,
 }
 
 impl WorkChunk {
     /// Empty, and ready to be used again.
-    pub(super) fn cleared(mut self) -> Self {
+    pub(crate) fn cleared(mut self) -> Self {
         self.items.clear();
         self.distances.clear();
         self.patches.clear();
@@ -59,11 +61,11 @@ impl WorkChunk {
 }
 
 impl GroupWork {
-    pub(super) fn item_count(&self) -> usize {
+    pub(crate) fn item_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.items.len()).sum()
     }
 
-    pub(super) fn distance_count(&self) -> usize {
+    pub(crate) fn distance_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.distances.len()).sum()
     }
 }
@@ -73,12 +75,12 @@ impl GroupWork {
 const PARTS_PER_CHUNK: usize = 64;
 const SAMPLES_PER_CHUNK: usize = 4096;
 
-pub(super) fn parts_per_chunk(window: &Window) -> usize {
+pub(crate) fn parts_per_chunk(window: &Window) -> usize {
     (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK)
 }
 
 /// The parts of a group that a window's tracks have.
-pub(super) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part] {
+pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part] {
     let from = |track: usize| {
         let is_before = |part: &Part| (part.track as usize) < track;
         prepared.parts.partition_point(is_before)
@@ -89,7 +91,7 @@ pub(super) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part
 /// The work lists of a window: one for each group that has any of its tracks. `shift` is
 /// added to every place in the output; `spare` are chunks to use again, whose memory would
 /// cost more than their work.
-pub(super) fn work(
+pub(crate) fn work(
     clip: &ClipData,
     timeline: &Timeline,
     window: &Window,
@@ -140,7 +142,7 @@ impl InLanes for PartsList<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         for part in self.parts {
-            let mut list = List {
+            let mut list = RunItems {
                 prepared: self.prepared,
                 timeline: self.timeline,
                 window: self.window,
@@ -161,7 +163,7 @@ impl InLanes for PartsList<'_> {
 }
 
 /// The runs of one part, as items.
-struct List<'a> {
+struct RunItems<'a> {
     prepared: &'a Prepared,
     timeline: &'a Timeline,
     window: &'a Window,
@@ -170,7 +172,7 @@ struct List<'a> {
     chunk: &'a mut WorkChunk,
 }
 
-impl Emit for List<'_> {
+impl Emit for RunItems<'_> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let &mut Self {
@@ -214,16 +216,16 @@ impl Emit for List<'_> {
 
 /// The item of so many samples; of what the host evaluates it stores nothing.
 #[inline(always)]
-pub(super) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
+pub(crate) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
     let (source, count, scale, offset) = match source {
-        RunSource::Constant(source) => (source, count | HOLD, 0.0, 0.0),
+        RunSource::Constant(source) => (source, count | IS_CONSTANT, 0.0, 0.0),
         RunSource::Segment {
             index,
             scale,
             offset,
             ..
         } => (index, count, scale, offset),
-        RunSource::Exact { .. } => (0, HOLD, 0.0, 0.0),
+        RunSource::Exact { .. } => (0, IS_CONSTANT, 0.0, 0.0),
     };
     Item {
         source,

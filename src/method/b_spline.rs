@@ -1,13 +1,17 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
-use super::ends::End;
-use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
-use crate::branchless::{Vector, exp, product, ratio, scaled, sum};
-use crate::cpu::in_lanes;
-use crate::formula::Product;
-use crate::prepare::{BetweenNeighbours, Intervals, Shape, Stretch};
+use crate::curve::formula::product::Product;
+use crate::math::quaternion::{Vector, exp, product, ratio, scaled, sum};
+use crate::method::ends::End;
+use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::prepare::double::handles::BetweenNeighbours;
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::simd::dispatch::in_lanes;
+use crate::tracks::set::Track;
 
 /// The cumulative cubic B-spline: the smoothest, but it only nears its keys. Its knots
 /// are the key times, even or not; before the first and behind the last they go on in

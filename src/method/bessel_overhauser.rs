@@ -1,14 +1,18 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real as _, product, ratio, scaled, sum};
-use crate::joints::Joints;
-use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
+use crate::prepare::tangent_weights::WeightRule;
 use crate::reference;
+use crate::shader::Form;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
-/// equal to [`CATMULL_ROM`](super::CATMULL_ROM) for even ones.
+/// equal to [`CATMULL_ROM`](crate::method::catmull_rom::CATMULL_ROM) for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
     summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",
@@ -34,7 +38,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
 static CURVES: Curves = Curves::Smooth(
     Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
         .steady_alone()
-        .direct::<Rule>(Joints::ByTime),
+        .direct::<Rule>(WeightRule::ByTime),
 );
 
 struct Rule;

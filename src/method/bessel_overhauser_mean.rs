@@ -1,10 +1,14 @@
 //! Bessel-Overhauser by the mean of the slopes: the parabola through three keys, in
 //! logarithms.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real, ratio, scaled, sum};
-use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real, ratio, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
 /// curve is the same forwards and backwards in time.
@@ -54,7 +58,7 @@ impl HandleRule for Rule {
 /// The handle towards an interval that lasts `duration`: of the slopes of both sides, each
 /// weighted by the other side's step, and by a weight of its own.
 #[inline(always)]
-pub(super) fn handle<R: Real>(
+pub(crate) fn handle<R: Real>(
     before: Interval<R>,
     after: Interval<R>,
     duration: R,

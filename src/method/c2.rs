@@ -4,12 +4,16 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use super::ends::End;
-use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
-use crate::branchless::{self, Vector, log, scaled, sine_cosine, sum};
-use crate::prepare::{Intervals, Shape, Stretch};
+use crate::math::quaternion as branchless;
+use crate::math::quaternion::{Vector, log, scaled, sine_cosine, sum};
+use crate::method::ends::End;
+use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::tracks::set::Track;
 
 /// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
 /// and the angular velocities at the keys are such that the angular acceleration is

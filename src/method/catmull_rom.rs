@@ -1,13 +1,17 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real as _, product, scaled, sum};
-use crate::joints::Joints;
-use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real as _, product, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
+use crate::prepare::tangent_weights::WeightRule;
 use crate::reference;
+use crate::shader::Form;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps: on
-/// uneven keys its velocity jumps; [`BESSEL_OVERHAUSER`](super::BESSEL_OVERHAUSER)
+/// uneven keys its velocity jumps; [`BESSEL_OVERHAUSER`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER)
 /// is its cure.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",
@@ -34,7 +38,7 @@ pub const CATMULL_ROM: Method = Method {
 static CURVES: Curves = Curves::Smooth(
     Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
         .steady_alone()
-        .direct::<Rule>(Joints::Alike),
+        .direct::<Rule>(WeightRule::Alike),
 );
 
 struct Rule;

@@ -3,16 +3,16 @@
 
 use std::marker::PhantomData;
 
-use super::Ends;
-use crate::branchless::{Quaternion, Vector, exp, log, product, scaled};
-use crate::cpu::in_lanes;
-use crate::prepare::{
-    BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, Intervals, KeyHandles,
-    Stretch,
+use crate::math::quaternion::{Quaternion, Vector, exp, log, product, scaled};
+use crate::method::interpolation::Ends;
+use crate::prepare::double::handles::{
+    BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, KeyHandles,
 };
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::simd::dispatch::in_lanes;
 
 /// Curves in cumulative form, for a method with that rule for handles.
-pub(super) fn products<R: HandleRule>(
+pub(crate) fn products<R: HandleRule>(
     intervals: &mut Intervals,
     stretches: &[Stretch],
     ends: Ends,
@@ -22,7 +22,7 @@ pub(super) fn products<R: HandleRule>(
 }
 
 /// Curves by control rotations, for a method with that rule for handles.
-pub(super) fn controls<R: HandleRule>(
+pub(crate) fn controls<R: HandleRule>(
     intervals: &mut Intervals,
     stretches: &[Stretch],
     ends: Ends,
@@ -71,7 +71,7 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
 
 /// What happens at one end.
 #[derive(Clone, Copy)]
-pub(super) enum End {
+pub(crate) enum End {
     Parabolic,
     Natural,
     Secant,
@@ -81,7 +81,7 @@ pub(super) enum End {
 
 impl Ends {
     /// What happens at the first key.
-    pub(super) fn start(self) -> End {
+    pub(crate) fn start(self) -> End {
         match self {
             Self::Clamped { start, .. } => End::Clamped(scaled(start.to_array(), 0.5)),
             _ => self.either(),
@@ -89,7 +89,7 @@ impl Ends {
     }
 
     /// What happens at the last key.
-    pub(super) fn end(self) -> End {
+    pub(crate) fn end(self) -> End {
         match self {
             Self::Clamped { end, .. } => End::Clamped(scaled(end.to_array(), 0.5)),
             _ => self.either(),

@@ -1,15 +1,16 @@
 //! The cubic spline of glTF.
 
-use super::{
-    Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Path, Smooth,
-};
-use crate::branchless::{Quaternion, Vector, length};
-use crate::prepare::{Intervals, Shape, Stretch};
+use crate::math::quaternion::{Quaternion, Vector, length};
+use crate::method::interpolation::{Ends, Interpolation, Path};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::tracks::set::Track;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
-/// ([`TrackSet::set_tangents`](crate::TrackSet::set_tangents)), normalised. Keys count
+/// ([`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents)), normalised. Keys count
 /// with the signs that they are stored with, as the specification has it, whatever the
 /// path asked for. Without tangents they are 0.
 pub const GLTF_CUBIC: Method = Method {
@@ -60,13 +61,13 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         // About how far it turns: what the tangents have along their keys only changes
         // the length.
         let log = intervals.log(lane);
-        let across = [across(start, outgoing), log, across(end, incoming)];
+        let across = [cross3(start, outgoing), log, cross3(end, incoming)];
         intervals.set_energy(lane, across);
     }
 }
 
 /// As long as what is left of a tangent across its key.
-fn across(key: Quaternion, tangent: Quaternion) -> Vector {
+fn cross3(key: Quaternion, tangent: Quaternion) -> Vector {
     let along: f64 = key.iter().zip(tangent).map(|(k, t)| k * t).sum();
     let rest: [f64; 4] = std::array::from_fn(|c| tangent[c] - key[c] * along);
     [rest[0], rest[1], length([rest[2], rest[3], 0.0])]

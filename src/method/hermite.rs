@@ -1,14 +1,18 @@
 //! Given angular velocities at the keys.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth};
-use crate::branchless::scaled;
-use crate::cpu::in_lanes;
-use crate::prepare::{BetweenHandles, Intervals, Shape, Stretch};
+use crate::math::quaternion::scaled;
+use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::prepare::double::handles::BetweenHandles;
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::simd::dispatch::in_lanes;
+use crate::tracks::set::Track;
 
 /// Hermite: the rotation and the angular velocity of every key are given
-/// ([`TrackSet::set_velocities`](crate::TrackSet::set_velocities)); without them every
+/// ([`TrackSet::set_velocities`](crate::tracks::set::TrackSet::set_velocities)); without them every
 /// key is at rest.
 pub const HERMITE: Method = Method {
     name: "hermite",

@@ -1,14 +1,17 @@
 //! What can be asked of a method: the path, the ends, what lies outside, which quantity.
 
+use crate::tracks::signs::DOT_NOISE;
 use glam::Quat;
 
-use super::{Curves, Form, Method};
-use crate::branchless::{self, length, log, unit};
-use crate::cycle::{Outside, Sides};
-use crate::joints::Joints;
-use crate::tracks::Tcb;
+use crate::math::quaternion as branchless;
+use crate::math::quaternion::{length, log, unit};
+use crate::method::{Curves, Method};
+use crate::prepare::tangent_weights::WeightRule;
+use crate::shader::Form;
+use crate::time::wrap::{Outside, Sides};
+use crate::tracks::key_data::Tcb;
 
-/// A method with its options: what [`Engine::upload`](crate::Engine::upload)
+/// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
 /// takes. A bare [`Method`] has the default options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interpolation {
@@ -18,7 +21,7 @@ pub struct Interpolation {
     pub path: Path,
     /// What happens at the first and the last key.
     pub ends: Ends,
-    /// For [`KOCHANEK_BARTELS`](super::KOCHANEK_BARTELS), where a track has none of its own.
+    /// For [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS), where a track has none of its own.
     pub tcb: Tcb,
     /// What of the rotation is asked for.
     pub quantity: Quantity,
@@ -53,14 +56,14 @@ impl Interpolation {
 
     /// How curves that turn little follow from keys alone, where every key counts with the
     /// sign nearer to its predecessor's.
-    pub(crate) fn gentle_joints(&self) -> Option<Joints> {
+    pub(crate) fn small_angle_weights(&self) -> Option<WeightRule> {
         let Curves::Smooth(smooth) = self.method.curves else {
             return None;
         };
         let suits = self.path == Path::Shortest
             && self.quantity == Quantity::Rotation
             && self.speed == Speed::AsKeyed;
-        smooth.direct.filter(|_| suits).map(|direct| direct.joints)
+        smooth.direct.filter(|_| suits).map(|direct| direct.weights)
     }
 
     /// Whether arcs too are curves with a formula: for what follows from derivatives.
@@ -93,7 +96,7 @@ pub enum Quantity {
     Acceleration(Axes),
 }
 
-/// How fast a track runs through its curve; no effect on [`STEP`](super::STEP).
+/// How fast a track runs through its curve; no effect on [`STEP`](crate::method::step::STEP).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Speed {
     /// As the key times say.
@@ -141,10 +144,6 @@ pub enum Path {
     AsAuthored,
 }
 
-/// Dot products nearer to zero than this are rounding noise of f32 keys: the signs
-/// given decide, never the noise.
-const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
-
 impl Path {
     /// A key counts with the other sign where its dot product with its predecessor
     /// is below this.
@@ -179,7 +178,7 @@ pub enum Ends {
         end: glam::DVec3,
     },
     /// The angular velocity of slerp between the last two keys: constant velocity stays
-    /// constant too. [`C2`](super::C2)'s own ends.
+    /// constant too. [`C2`](crate::method::c2::C2)'s own ends.
     Secant,
     /// The last key repeats the first; neighbours are taken across the seam.
     Loop,

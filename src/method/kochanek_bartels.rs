@@ -1,18 +1,20 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use super::bessel_overhauser_mean::handle;
-use super::{
-    Continuity, Cost, Curves, Ends, Form, Given, Interpolation, Keys, Method, Smooth, ends,
-};
-use crate::branchless::{Algebra, Real as _};
-use crate::prepare::{HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::Real as _;
+use crate::math::ranges::Algebra;
+use crate::method::bessel_overhauser_mean::handle;
+use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::tracks::set::Track;
 
-/// Kochanek-Bartels, with [`Tcb`](crate::Tcb) for each key
-/// ([`TrackSet::set_tcb`](crate::TrackSet::set_tcb)) or for all
+/// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
+/// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all
 /// ([`Interpolation::tcb`]). With zeros it is
-/// [`BESSEL_OVERHAUSER_MEAN`](super::BESSEL_OVERHAUSER_MEAN).
+/// [`BESSEL_OVERHAUSER_MEAN`](crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN).
 pub const KOCHANEK_BARTELS: Method = Method {
     name: "kochanek-bartels",
     summary: "an animator's curve: tension, continuity and bias at each key",

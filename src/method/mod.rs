@@ -4,50 +4,57 @@
 //! keys into curves, one for each key interval; the few forms those curves have
 //! are what the kernels evaluate ([`Form`]). [`METHODS`] lists them all.
 
-mod b_spline;
-mod bessel_overhauser;
-mod bessel_overhauser_mean;
-mod c2;
-mod catmull_rom;
-mod ends;
-mod gltf_cubic;
-mod hermite;
-mod interpolation;
-mod kochanek_bartels;
-mod nlerp;
-mod shoemake;
-mod shoemake_1985;
-mod shoemake_2;
-mod slerp;
-mod squad;
-mod step;
+pub(crate) mod b_spline;
+pub(crate) mod bessel_overhauser;
+pub(crate) mod bessel_overhauser_mean;
+pub(crate) mod c2;
+pub(crate) mod catmull_rom;
+pub(crate) mod ends;
+pub(crate) mod gltf_cubic;
+pub(crate) mod hermite;
+pub(crate) mod interpolation;
+pub(crate) mod kochanek_bartels;
+pub(crate) mod nlerp;
+pub(crate) mod shoemake;
+pub(crate) mod shoemake_1985;
+pub(crate) mod shoemake_2;
+pub(crate) mod slerp;
+pub(crate) mod squad;
+pub(crate) mod step;
+pub(crate) mod vector_method;
 
-pub use b_spline::B_SPLINE;
-pub use bessel_overhauser::BESSEL_OVERHAUSER;
-pub use bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
-pub use c2::C2;
-pub use catmull_rom::CATMULL_ROM;
-pub use gltf_cubic::GLTF_CUBIC;
-pub use hermite::HERMITE;
-pub use interpolation::{Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed};
-pub use kochanek_bartels::KOCHANEK_BARTELS;
-pub use nlerp::NLERP;
-pub use shoemake::SHOEMAKE;
-pub use shoemake_2::SHOEMAKE_2;
-pub use shoemake_1985::SHOEMAKE_1985;
-pub use slerp::SLERP;
-pub use squad::SQUAD;
-pub use step::STEP;
+pub use crate::method::b_spline::B_SPLINE;
+pub use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
+pub use crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
+pub use crate::method::c2::C2;
+pub use crate::method::catmull_rom::CATMULL_ROM;
+pub use crate::method::gltf_cubic::GLTF_CUBIC;
+pub use crate::method::hermite::HERMITE;
+pub use crate::method::interpolation::{
+    Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed,
+};
+pub use crate::method::kochanek_bartels::KOCHANEK_BARTELS;
+pub use crate::method::nlerp::NLERP;
+pub use crate::method::shoemake::SHOEMAKE;
+pub use crate::method::shoemake_2::SHOEMAKE_2;
+pub use crate::method::shoemake_1985::SHOEMAKE_1985;
+pub use crate::method::slerp::SLERP;
+pub use crate::method::squad::SQUAD;
+pub use crate::method::step::STEP;
 
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::branchless::Vector;
-use crate::joints::Joints;
-use crate::prepare::{FarKeys, HandleRule, Intervals, Shape, Stretch};
+use crate::math::quaternion::Vector;
+use crate::prepare::double::handles::HandleRule;
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
+use crate::prepare::single::long_tangents::FarKeys;
+use crate::prepare::tangent_weights::WeightRule;
 use crate::reference;
-use crate::tracks::Track;
+use crate::shader::Form;
+use crate::tracks::set::Track;
 
 /// Every method, in the order in which help and reports list them.
 pub static METHODS: [Method; 15] = [
@@ -145,7 +152,7 @@ pub(crate) struct Smooth {
 #[derive(Clone, Copy)]
 pub(crate) struct FromKeys {
     /// What tangents are made of, in f32.
-    pub(crate) joints: Joints,
+    pub(crate) weights: WeightRule,
     /// Finds the handles of keys that f32 finds none for.
     pub(crate) find_far: fn(&mut FarKeys),
 }
@@ -172,10 +179,10 @@ impl Smooth {
         }
     }
 
-    const fn direct<R: HandleRule>(self, joints: Joints) -> Self {
+    const fn direct<R: HandleRule>(self, weights: WeightRule) -> Self {
         Self {
             direct: Some(FromKeys {
-                joints,
+                weights,
                 find_far: FarKeys::find::<R>,
             }),
             ..self
@@ -192,15 +199,6 @@ impl Smooth {
     const fn with(self, given: Given) -> Self {
         Self { given, ..self }
     }
-}
-
-/// What a kernel evaluates. Many methods share one form.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Form {
-    /// A great circle at constant angular velocity.
-    Arc,
-    /// A polynomial in time for each component, fitted to the curve.
-    Polynomial,
 }
 
 /// How smooth a curve is where its segments meet. With given tangents, tension or

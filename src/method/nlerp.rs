@@ -1,9 +1,13 @@
 //! Normalised linear interpolation.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real as _, Vector};
-use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real as _, Vector};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Nlerp: the straight line between neighbouring keys, brought back to the sphere. It
 /// takes the way of slerp at another speed, slower near the keys: by up to 8° where keys

@@ -1,13 +1,17 @@
 //! Shoemake's first approach, as lectured, and the rule of all three.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real as _, Vector, dot, scaled, sum};
-use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its
 /// keys three times too fast, and overshoots; for comparison.
-/// [`SHOEMAKE_1985`](super::SHOEMAKE_1985) is its cure.
+/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) is its cure.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
@@ -39,7 +43,7 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
 ///
 /// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Seen from `q_i`,
 /// `Double(q_{i-1}, q_i)` is the step before the key once more.
-pub(super) struct Bisector<const PART: u8>;
+pub(crate) struct Bisector<const PART: u8>;
 
 impl<const PART: u8> HandleRule for Bisector<PART> {
     #[inline(always)]

@@ -1,9 +1,11 @@
 //! Shoemake's construction, as published.
 
-use super::shoemake::Bisector;
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::prepare::Shape;
+use crate::method::interpolation::Ends;
+use crate::method::shoemake::Bisector;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Shoemake's own construction: the handle is a third of the bisector's. It ignores the
 /// time steps: on uneven keys its velocity jumps.

@@ -1,12 +1,14 @@
 //! Shoemake's second approach, as lectured.
 
-use super::shoemake::Bisector;
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::prepare::Shape;
+use crate::method::interpolation::Ends;
+use crate::method::shoemake::Bisector;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Approach II of the lecture: the handle is half of the bisector's. It passes its keys
-/// one and a half times too fast; [`SHOEMAKE_1985`](super::SHOEMAKE_1985) is its cure.
+/// one and a half times too fast; [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) is its cure.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
     summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",

@@ -1,8 +1,11 @@
 //! Spherical linear interpolation.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth};
-use crate::prepare::{Intervals, Shape, Stretch};
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth};
+use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.
 pub const SLERP: Method = Method {

@@ -1,9 +1,13 @@
 //! Spherical quadrangle interpolation.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method, Smooth, ends};
-use crate::branchless::{Algebra, Real as _, Vector, scaled, sum};
-use crate::prepare::{EndHandle, EndInterval, HandleRule, Handles, Interval, Shape};
+use crate::math::quaternion::{Real as _, Vector, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::prepare::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::prepare::double::shape::Shape;
 use crate::reference;
+use crate::shader::Form;
 
 /// Squad. It ignores the time steps: on uneven keys its velocity jumps.
 pub const SQUAD: Method = Method {

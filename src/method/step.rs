@@ -1,7 +1,9 @@
 //! Keys that are held.
 
-use super::{Continuity, Cost, Curves, Ends, Form, Keys, Method};
+use crate::method::interpolation::Ends;
+use crate::method::{Continuity, Cost, Curves, Keys, Method};
 use crate::reference;
+use crate::shader::Form;
 
 /// The key at or before the time: for what switches and does not move.
 pub const STEP: Method = Method {

@@ -6,13 +6,14 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::set::prepare;
-use super::{Part, Prepared, vectors};
-use crate::clock::{Ticks, Timeline};
-use crate::cycle::{Cycle, Outside};
-use crate::method::{Axes, Interpolation, InterpolationError, Quantity};
-use crate::tracks::{Channel, TrackSet};
-use crate::vector_method::VectorMethod;
+use crate::method::interpolation::{Axes, Interpolation, InterpolationError, Quantity};
+use crate::method::vector_method::VectorMethod;
+use crate::prepare::set::prepare;
+use crate::prepare::{Part, Prepared, vectors};
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::wrap::{Cycle, Outside};
+use crate::tracks::set::TrackSet;
+use crate::tracks::vectors::Channel;
 
 /// Tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;

@@ -3,60 +3,27 @@
 //! their four keys mostly in f32. Independent of frame rate and
 //! device, so the CPU and every Vulkan device evaluate the same segments.
 
-mod arc_lanes;
-mod arcs;
-mod clip_data;
-mod curve;
-mod cut;
-mod direct;
-mod far_keys;
-mod fit;
-mod fitting;
-mod gentle_lanes;
-mod intervals;
-mod key_curves;
-mod key_fit;
-mod key_joints;
-mod key_steps;
-mod motion;
-mod nodes;
-mod pace;
-mod part;
-mod passes;
-mod retime;
-mod sample;
-mod set;
-mod shape;
-mod sides;
-mod smooth;
-mod steady;
-mod steps;
-mod turns;
-mod vectors;
-mod whole_lanes;
+pub(crate) mod arcs;
+pub(crate) mod both_sides;
+pub(crate) mod clip_data;
+pub(crate) mod constant_velocity;
+pub(crate) mod double;
+pub(crate) mod motion;
+pub(crate) mod nodes;
+pub(crate) mod set;
+pub(crate) mod single;
+pub(crate) mod steps;
+pub(crate) mod tangent_weights;
+pub(crate) mod vectors;
 
-pub(crate) use arc_lanes::{
-    LANES as ARC_LANES, any_turns, arc_anyhow, arc_in_lanes, arcs, flip, may_turn, whole,
-};
-pub(crate) use clip_data::{ClipData, PartRef, Wanted};
-pub(crate) use curve::Curve;
-pub(crate) use far_keys::FarKeys;
-pub(crate) use intervals::{Intervals, Stretch};
-pub(crate) use passes::{
-    BetweenHandles, BetweenNeighbours, ControlRotations, EndHandle, EndInterval, HandleRule,
-    Handles, Interval, KeyHandles,
-};
-pub(crate) use set::{BATCH, Preparation};
-pub(crate) use shape::Shape;
-pub(crate) use steady::arc_component;
-
+use crate::prepare::double::curve::Curve;
 use std::ops::Range;
 
-use crate::clock::{FramesError, Timeline};
-use crate::cycle::{Cycle, Sides};
-use crate::method::Interpolation;
-use crate::segment::Segments;
-use crate::tracks::Track;
+use crate::curve::segment::Segments;
+use crate::method::interpolation::Interpolation;
+use crate::time::frames::{FramesError, Timeline};
+use crate::time::wrap::{Cycle, Sides};
+use crate::tracks::set::Track;
 
 /// No constant.
 pub(crate) const NONE: u32 = u32::MAX;

@@ -1,40 +1,40 @@
 //! Chebyshev nodes, and what leads from values at them to coefficients of powers.
 
-use super::fit::Samples;
-use crate::cpu::Lanes;
+use crate::prepare::double::fit::Samples;
+use crate::simd::lanes::Lanes;
 
 /// Nodes on one side of the middle, which is one more. Where the first is the middle again, two
 /// derivatives there are given too; where the last comes twice, the derivatives there.
-pub(super) struct Nodes<const PAIRS: usize> {
+pub(crate) struct Nodes<const PAIRS: usize> {
     /// In the order in which Newton's polynomials take them: chosen for what f32 rounds.
-    pub(super) at: [f32; PAIRS],
-    pub(super) squares: [f32; PAIRS],
+    pub(crate) at: [f32; PAIRS],
+    pub(crate) squares: [f32; PAIRS],
     /// `1/(2s²)` and `1/(2s)`: from the sum of the differences at `-s` and `s`, and from what
     /// they differ by, to polynomials in s². 1 at the middle, where the derivative and half of
     /// the second are these.
-    pub(super) even: [f32; PAIRS],
-    pub(super) odd: [f32; PAIRS],
+    pub(crate) even: [f32; PAIRS],
+    pub(crate) odd: [f32; PAIRS],
     /// `quotients[l][k]` is 1 / (sₖ² - sₖ₋ₗ²); 1 where both are the same.
-    pub(super) quotients: [[f32; PAIRS]; PAIRS],
+    pub(crate) quotients: [[f32; PAIRS]; PAIRS],
 }
 
 /// Chebyshev nodes of degree 7.
-pub(super) const GENTLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.21694186, 0.48746395]);
+pub(crate) const GENTLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.21694186, 0.48746395]);
 
 /// Chebyshev nodes of degree 11.
-pub(super) const FULL_NODES: Nodes<5> =
+pub(crate) const FULL_NODES: Nodes<5> =
     Nodes::new([0.45481598, 0.49491072, 0.14086628, 0.27032042, 0.3778748]);
 
 /// The middle and the ends, with the derivatives there, and pairs for which the product of all
 /// distances, which is what a fit leaves out, is least: 2.71 times as much as Chebyshev's.
-pub(super) const END_NODES: Nodes<5> = Nodes::new([0.0, 0.265_266_77, 0.394_327_03, 0.5, 0.5]);
+pub(crate) const END_NODES: Nodes<5> = Nodes::new([0.0, 0.265_266_77, 0.394_327_03, 0.5, 0.5]);
 
 /// The same of degree 8: 3.53 times as much.
-pub(super) const FEW_END_NODES: Nodes<4> = Nodes::new([0.0, 0.331_538_23, 0.5, 0.5]);
+pub(crate) const FEW_END_NODES: Nodes<4> = Nodes::new([0.0, 0.331_538_23, 0.5, 0.5]);
 
 /// Nearer to the middle, for longer curves of which hardly anything is left out: 3.85 times as
 /// much as Chebyshev's.
-pub(super) const HALF_END_NODES: Nodes<5> = Nodes::new([0.0, 0.26, 0.374, 0.5, 0.5]);
+pub(crate) const HALF_END_NODES: Nodes<5> = Nodes::new([0.0, 0.26, 0.374, 0.5, 0.5]);
 
 impl<const PAIRS: usize> Nodes<PAIRS> {
     const fn new(at: [f32; PAIRS]) -> Self {
@@ -73,7 +73,7 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
     /// The coefficients of s, s³, … and of s², s⁴, … of a component: of Newton's polynomials
     /// in s² through the samples, then of powers.
     #[inline(always)]
-    pub(super) fn powers<L: Lanes>(
+    pub(crate) fn powers<L: Lanes>(
         &self,
         samples: &Samples<L, PAIRS>,
         c: usize,
@@ -104,9 +104,9 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
 
 /// What the fit of a component leaves out, twice, about: from the last Chebyshev
 /// coefficients, by those of powers. Of curves that are
-/// [entire](super::shape::Shape::entire), or not.
+/// [entire](crate::prepare::double::shape::Shape::entire), or not.
 #[inline(always)]
-pub(super) fn tail<L: Lanes, const PAIRS: usize>(
+pub(crate) fn tail<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
     [odd, even]: &[[L; PAIRS]; 2],
 ) -> L {
@@ -133,7 +133,7 @@ mod tests {
     use glam::Vec4;
 
     use super::*;
-    use crate::prepare::sides::Sides;
+    use crate::prepare::both_sides::Sides;
 
     /// Catches a wrong node or quotient, powers in another order, and a tail that takes one
     /// Chebyshev coefficient for another.

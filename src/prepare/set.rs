@@ -6,18 +6,20 @@ use std::sync::{Mutex, PoisonError};
 use glam::Quat;
 use rayon::prelude::*;
 
-use super::arcs::ArcPreparation;
-use super::clip_data::Wanted;
-use super::smooth::SmoothPreparation;
-use super::steps::StepPreparation;
-use super::{NONE, Prepared};
-use crate::clock::{Ticks, Timeline};
-use crate::cycle::Sides;
-use crate::frame_rate::FrameRate;
-use crate::method::{Curves, Ends, Form, Interpolation, InterpolationError, Quantity, Speed};
-use crate::numeric::canonical;
-use crate::segment::segment_size;
-use crate::tracks::{Track, TrackSet};
+use crate::curve::segment::segment_size;
+use crate::math::canonical::canonical;
+use crate::method::Curves;
+use crate::method::interpolation::{Ends, Interpolation, InterpolationError, Quantity, Speed};
+use crate::prepare::arcs::arcs::ArcPreparation;
+use crate::prepare::clip_data::Wanted;
+use crate::prepare::double::smooth::SmoothPreparation;
+use crate::prepare::steps::StepPreparation;
+use crate::prepare::{NONE, Prepared};
+use crate::shader::Form;
+use crate::time::frame_rate::FrameRate;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::wrap::Sides;
+use crate::tracks::set::{Track, TrackSet};
 
 /// Key intervals prepared as one piece of work.
 pub(crate) const BATCH: usize = 4096;
@@ -25,7 +27,7 @@ pub(crate) const BATCH: usize = 4096;
 /// Prepares tracks of a set, in parallel: one [`Prepared`] for each batch of tracks, or of
 /// intervals where a track is long, in order; and what the signs of the last long track's
 /// keys make of that of its last.
-pub(super) fn prepare(
+pub(crate) fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
     wanted: Wanted<'_>,
@@ -161,7 +163,7 @@ impl Prepared {
 }
 
 /// Makes segments from key intervals, in blocks that may hold several tracks'.
-pub(super) trait Prepare: Send {
+pub(crate) trait Prepare: Send {
     /// Adds some intervals of a track, the `index`th of its set, as a part of their own, as
     /// if their first key had the sign it is stored with.
     fn add(
@@ -252,10 +254,10 @@ impl Preparation {
 mod tests {
     use glam::Quat;
 
-    use super::super::Source;
     use super::*;
-    use crate::cpu::at_every_width;
     use crate::method::METHODS;
+    use crate::prepare::Source;
+    use crate::simd::dispatch::tests::at_every_width;
 
     /// The bytes of every span's segment; parts of curves may lie in another order.
     fn curves(prepared: &Prepared) -> Vec<&[u8]> {

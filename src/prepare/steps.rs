@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use super::set::Prepare;
-use super::{NONE, Part, Prepared, Source};
-use crate::method::{Interpolation, InterpolationError, Quantity};
-use crate::tracks::Track;
+use crate::method::interpolation::{Interpolation, InterpolationError, Quantity};
+use crate::prepare::set::Prepare;
+use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::tracks::set::Track;
 
 /// Prepares tracks whose keys are held.
 pub(crate) struct StepPreparation {

@@ -4,20 +4,20 @@
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use super::curve::{Curve, Piece};
-use super::fitting::polynomials;
-use super::shape::Shape;
-use super::{Beyond, NONE, Part, Prepared, Source};
-use crate::branchless::ratio;
-use crate::cycle::Outside;
-use crate::method::{Ends, Interpolation, Quantity};
-use crate::numeric::{canonical, round_f32};
-use crate::segment::PolynomialSegment;
-use crate::tracks::VectorTrack;
-use crate::vector_method::VectorMethod;
+use crate::math::canonical::{canonical, round_f32};
+use crate::math::quaternion::ratio;
+use crate::method::interpolation::{Ends, Interpolation, Quantity};
+use crate::method::vector_method::VectorMethod;
+use crate::prepare::double::curve::{Curve, Piece};
+use crate::prepare::double::fitting::polynomials;
+use crate::prepare::double::shape::Shape;
+use crate::prepare::{Beyond, NONE, Part, Prepared, Source};
+use crate::shader::PolynomialSegment;
+use crate::time::wrap::Outside;
+use crate::tracks::vectors::VectorTrack;
 
 /// Adds a track's vectors; those of a track without any are `rest`.
-pub(super) fn add(
+pub(crate) fn add(
     prepared: &mut Prepared,
     index: usize,
     track: Option<&VectorTrack>,

@@ -2,12 +2,12 @@
 
 use glam::{DQuat, DVec3};
 
-use super::quaternion::{exponential, invert, logarithm, multiply, vector};
-use super::segment::{Basis, Segment};
-use super::tangents::Track;
-use crate::method::Ends;
+use crate::method::interpolation::Ends;
+use crate::reference::quaternion::{exponential, invert, logarithm, multiply, vector};
+use crate::reference::segment::{Basis, Segment};
+use crate::reference::tangents::Track;
 
-pub(super) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
+pub(crate) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
     let basis = Basis::Knots(knots(track, ends, i));

@@ -3,13 +3,13 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::quaternion::{exponential, from_parts, invert, logarithm, multiply, vector};
-use super::segment::Segment;
-use super::tangents::Track;
-use crate::method::Ends;
+use crate::method::interpolation::Ends;
+use crate::reference::quaternion::{exponential, from_parts, invert, logarithm, multiply, vector};
+use crate::reference::segment::Segment;
+use crate::reference::tangents::Track;
 
 /// The curve of interval `i`, given the angular velocity at every key.
-pub(super) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
+pub(crate) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
     let powers = Interval::new(track, i).cubic(velocities, i).powers;
     Segment::RotationVector {
         base: track.keys[i],
@@ -19,7 +19,7 @@ pub(super) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment 
 
 /// The angular velocities at the keys (rad/s, body frame) that make the angular
 /// acceleration continuous: each in turn is moved until it is so at its key.
-pub(super) fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
+pub(crate) fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
     let secant = |i: usize| 2.0 * logarithm(track.difference(i)) / track.step(i);
     let mut velocities: Vec<DVec3> = (0..=last)

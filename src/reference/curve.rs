@@ -3,14 +3,14 @@
 
 use glam::{DQuat, DVec3, Quat};
 
-use super::b_spline::b_spline;
-use super::c2;
-use super::pace::Pace;
-use super::quaternion::{exponential, invert, logarithm, multiply};
-use super::segment::{Basis, Segment};
-use super::tangents::Track;
-use crate::method::{Ends, Interpolation, Path, Speed};
-use crate::tracks;
+use crate::method::interpolation::{Ends, Interpolation, Path, Speed};
+use crate::reference::b_spline::b_spline;
+use crate::reference::c2;
+use crate::reference::pace::Pace;
+use crate::reference::quaternion::{exponential, invert, logarithm, multiply};
+use crate::reference::segment::{Basis, Segment};
+use crate::reference::tangents::Track;
+use crate::tracks::set as tracks;
 
 /// Which textbook curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

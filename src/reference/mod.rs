@@ -4,18 +4,18 @@
 //! them, one rotation at a time, with the platform's own sine and cosine. Slow, and
 //! accurate to about 1e-15.
 
-mod b_spline;
-mod c2;
-mod curve;
-mod pace;
-mod quaternion;
-mod segment;
-mod tangents;
-mod vector;
+pub(crate) mod b_spline;
+pub(crate) mod c2;
+pub(crate) mod curve;
+pub(crate) mod pace;
+pub(crate) mod quaternion;
+pub(crate) mod segment;
+pub(crate) mod tangents;
+pub(crate) mod vector;
 
-pub use curve::{Curve, Kind};
-pub use quaternion::{
+pub use crate::reference::curve::{Curve, Kind};
+pub use crate::reference::quaternion::{
     angle_between, nlerp, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left, squad,
 };
-pub use vector::VectorCurve;
+pub use crate::reference::vector::VectorCurve;

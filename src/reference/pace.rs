@@ -1,18 +1,18 @@
 //! A curve at constant speed: how long it is, and where it is after a part of that.
 
-use super::segment::Segment;
+use crate::reference::segment::Segment;
 
 /// Panels of each segment; each is integrated by three points of Gauss.
 const PANELS: usize = 256;
 
 /// Lengths of curves, radians.
-pub(super) struct Pace {
+pub(crate) struct Pace {
     /// How far the curve has turned at the end of every panel of every segment.
     lengths: Vec<f64>,
 }
 
 impl Pace {
-    pub(super) fn new(segments: &[Segment]) -> Self {
+    pub(crate) fn new(segments: &[Segment]) -> Self {
         let mut lengths = vec![0.0];
         for segment in segments {
             for panel in 0..PANELS {
@@ -24,13 +24,13 @@ impl Pace {
         Self { lengths }
     }
 
-    pub(super) fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.lengths[self.lengths.len() - 1]
     }
 
     /// The segment, and its parameter, where the curve has turned by that part of its
     /// length, 0 to 1.
-    pub(super) fn place(&self, segments: &[Segment], part: f64) -> (usize, f64) {
+    pub(crate) fn place(&self, segments: &[Segment], part: f64) -> (usize, f64) {
         let target = part * self.total();
         let panels = self.lengths.len() - 1;
         let after = self.lengths.partition_point(|&length| length <= target);

@@ -3,35 +3,35 @@
 use glam::{DQuat, DVec3};
 
 /// The vector part.
-pub(super) fn vector(q: DQuat) -> DVec3 {
+pub(crate) fn vector(q: DQuat) -> DVec3 {
     DVec3::new(q.x, q.y, q.z)
 }
 
-pub(super) fn from_parts(w: f64, v: DVec3) -> DQuat {
+pub(crate) fn from_parts(w: f64, v: DVec3) -> DQuat {
     DQuat::from_xyzw(v.x, v.y, v.z, w)
 }
 
 /// `a b = [a_w b_w - a_v·b_v; a_w b_v + b_w a_v + a_v × b_v]`.
-pub(super) fn multiply(a: DQuat, b: DQuat) -> DQuat {
+pub(crate) fn multiply(a: DQuat, b: DQuat) -> DQuat {
     let (u, v) = (vector(a), vector(b));
     from_parts(a.w * b.w - u.dot(v), a.w * v + b.w * u + u.cross(v))
 }
 
 /// The inverse of a unit quaternion.
-pub(super) fn invert(q: DQuat) -> DQuat {
+pub(crate) fn invert(q: DQuat) -> DQuat {
     from_parts(q.w, -vector(q))
 }
 
-pub(super) fn inner(a: DQuat, b: DQuat) -> f64 {
+pub(crate) fn inner(a: DQuat, b: DQuat) -> f64 {
     a.w * b.w + vector(a).dot(vector(b))
 }
 
-pub(super) fn normalise(q: DQuat) -> DQuat {
+pub(crate) fn normalise(q: DQuat) -> DQuat {
     q * inner(q, q).sqrt().recip()
 }
 
 /// `exp(a) = [cos|a|; sin|a| a/|a|]`.
-pub(super) fn exponential(a: DVec3) -> DQuat {
+pub(crate) fn exponential(a: DVec3) -> DQuat {
     match a.length() {
         0.0 => DQuat::IDENTITY,
         angle => from_parts(angle.cos(), a * (angle.sin() / angle)),
@@ -40,7 +40,7 @@ pub(super) fn exponential(a: DVec3) -> DQuat {
 
 /// `log q = v/|v| atan2(|v|, w)`: half of the rotation vector, length 0 to pi. At
 /// -1 it has no direction of its own and takes that of `or`.
-pub(super) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
+pub(crate) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
     let v = vector(q);
     let sine = v.length();
     if sine > 0.0 {
@@ -53,12 +53,12 @@ pub(super) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
 }
 
 /// As [`logarithm_or`], without a direction at -1.
-pub(super) fn logarithm(q: DQuat) -> DVec3 {
+pub(crate) fn logarithm(q: DQuat) -> DVec3 {
     logarithm_or(q, DVec3::ZERO)
 }
 
 /// `q^s = exp(s log q)`.
-pub(super) fn power(q: DQuat, s: f64) -> DQuat {
+pub(crate) fn power(q: DQuat, s: f64) -> DQuat {
     exponential(logarithm(q) * s)
 }
 

@@ -2,13 +2,13 @@
 
 use glam::{DQuat, DVec3};
 
-use super::quaternion::{
+use crate::reference::quaternion::{
     exponential, invert, logarithm, multiply, nlerp, normalise, slerp, squad, vector,
 };
 
 /// A curve over `t` from 0 to 1.
 #[derive(Clone, Copy)]
-pub(super) enum Segment {
+pub(crate) enum Segment {
     Hold(DQuat),
     Arc(DQuat, DQuat),
     Line(DQuat, DQuat),
@@ -34,7 +34,7 @@ pub(super) enum Segment {
 
 /// Cumulative basis functions.
 #[derive(Clone, Copy)]
-pub(super) enum Basis {
+pub(crate) enum Basis {
     Bernstein,
     /// Cubic B-spline with these knots; the interval lies between the third and the
     /// fourth.
@@ -42,7 +42,7 @@ pub(super) enum Basis {
 }
 
 impl Basis {
-    pub(super) fn values(self, t: f64) -> [f64; 3] {
+    pub(crate) fn values(self, t: f64) -> [f64; 3] {
         match self {
             Self::Bernstein => [1.0 - (1.0 - t).powi(3), t * t * (3.0 - 2.0 * t), t * t * t],
             Self::Knots(knots) => {
@@ -52,7 +52,7 @@ impl Basis {
         }
     }
 
-    pub(super) fn derivatives(self, t: f64) -> [f64; 3] {
+    pub(crate) fn derivatives(self, t: f64) -> [f64; 3] {
         match self {
             Self::Bernstein => [
                 3.0 * (1.0 - t) * (1.0 - t),
@@ -93,7 +93,7 @@ fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
 }
 
 impl Segment {
-    pub(super) fn rotation(self, t: f64) -> DQuat {
+    pub(crate) fn rotation(self, t: f64) -> DQuat {
         match self {
             Self::Hold(key) => key,
             Self::Arc(from, to) => slerp(from, to, t),
@@ -124,7 +124,7 @@ impl Segment {
     }
 
     /// Twice the derivative of `t`, in the body frame.
-    pub(super) fn velocity(self, t: f64) -> DVec3 {
+    pub(crate) fn velocity(self, t: f64) -> DVec3 {
         match self {
             Self::Hold(_) => DVec3::ZERO,
             Self::Arc(from, to) => 2.0 * logarithm(multiply(invert(from), to)),
@@ -145,7 +145,7 @@ impl Segment {
     }
 
     /// Twice the second derivative of `t`, in the body frame.
-    pub(super) fn acceleration(self, t: f64) -> DVec3 {
+    pub(crate) fn acceleration(self, t: f64) -> DVec3 {
         // Central differences of the velocity: also of the formula beyond its interval.
         let velocity = |t: f64| self.velocity(t).extend(0.0);
         let slope = differences(|t| DQuat::from_vec4(velocity(t)), t, FIRST);

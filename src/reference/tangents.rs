@@ -2,27 +2,27 @@
 
 use glam::{DQuat, DVec3, Quat};
 
-use super::Kind;
-use super::quaternion::{
+use crate::method::interpolation::Path;
+use crate::reference::curve::Kind;
+use crate::reference::quaternion::{
     exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,
 };
-use crate::method::Path;
-use crate::tracks::Tcb;
+use crate::tracks::key_data::Tcb;
 
 /// Below this, a dot product's sign is the rounding of f32 keys and says nothing.
 const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
 
 /// One track in f64.
-pub(super) struct Track {
-    pub(super) times: Vec<f64>,
-    pub(super) keys: Vec<DQuat>,
-    pub(super) velocities: Vec<DVec3>,
-    pub(super) tangents: Vec<[Quat; 2]>,
-    pub(super) tcb: Vec<Tcb>,
+pub(crate) struct Track {
+    pub(crate) times: Vec<f64>,
+    pub(crate) keys: Vec<DQuat>,
+    pub(crate) velocities: Vec<DVec3>,
+    pub(crate) tangents: Vec<[Quat; 2]>,
+    pub(crate) tcb: Vec<Tcb>,
 }
 
 impl Track {
-    pub(super) fn new(path: Path, times: &[f64], keys: &[Quat]) -> Self {
+    pub(crate) fn new(path: Path, times: &[f64], keys: &[Quat]) -> Self {
         let keys: Vec<DQuat> = keys.iter().map(|key| normalise(key.as_dquat())).collect();
         let mut aligned: Vec<DQuat> = Vec::with_capacity(keys.len());
         for (i, &key) in keys.iter().enumerate() {
@@ -39,16 +39,16 @@ impl Track {
         }
     }
 
-    pub(super) fn last(&self) -> usize {
+    pub(crate) fn last(&self) -> usize {
         self.keys.len() - 1
     }
 
     /// `q_i⁻¹ q_{i+1}`.
-    pub(super) fn difference(&self, i: usize) -> DQuat {
+    pub(crate) fn difference(&self, i: usize) -> DQuat {
         multiply(invert(self.keys[i]), self.keys[i + 1])
     }
 
-    pub(super) fn step(&self, i: usize) -> f64 {
+    pub(crate) fn step(&self, i: usize) -> f64 {
         self.times[i + 1] - self.times[i]
     }
 
@@ -66,7 +66,7 @@ impl Track {
 
     /// The incoming and the outgoing handle of key `i`: `b_i = q_i exp(-in)`,
     /// `a_i = q_i exp(out)`.
-    pub(super) fn handles(&self, kind: Kind, i: usize) -> (DVec3, DVec3) {
+    pub(crate) fn handles(&self, kind: Kind, i: usize) -> (DVec3, DVec3) {
         let (before, h_before) = self.side(i, true);
         let (after, h_after) = self.side(i, false);
         let (l, r) = (logarithm(before), logarithm(after));

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::method::Ends;
+use crate::method::interpolation::Ends;
 
 /// Keys of a vector in f64, and which textbook curve joins them.
 #[derive(Debug, Clone)]

@@ -2,11 +2,10 @@
 
 use glam::{DQuat, Quat};
 
-use super::TrackError;
-use crate::cpu;
-use crate::numeric::{canonical, to_f64, unit_f32};
+use crate::math::canonical::{canonical, to_f64, unit_f32};
+use crate::tracks::error::TrackError;
 
-/// Norms further from 1 than this are refused by [`TrackSet::push`](super::TrackSet::push): such a key
+/// Norms further from 1 than this are refused by [`TrackSet::push`](crate::tracks::set::TrackSet::push): such a key
 /// is more likely a mistake than a rotation.
 pub const NORM_TOLERANCE: f64 = 0.1;
 
@@ -14,7 +13,7 @@ pub const NORM_TOLERANCE: f64 = 0.1;
 /// intervals have to each other must not overflow.
 pub(crate) const LATEST: f64 = f32::MAX as f64;
 
-pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
+pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
     if times.len() != keys {
         return Err(TrackError::LengthMismatch {
             track,
@@ -54,7 +53,7 @@ pub(super) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
 /// changes nothing: f32 rounding moves a unit quaternion's norm by at most 2 × 2^-24 or so.
 pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
-pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
+pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = to_f64(quat);
     let norm = exact.length();
     if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
@@ -66,15 +65,10 @@ pub(super) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, Tra
     Ok(unit_f32(exact))
 }
 
-/// Whether the sign of any of a track's keys is turned by the one before it, or may be.
-pub(super) fn any_turns(keys: &[Quat]) -> bool {
-    cpu::any_turns(bytemuck::cast_slice(keys))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracks::TrackSet;
+    use crate::tracks::set::TrackSet;
 
     #[test]
     fn a_set_knows_whether_a_key_is_turned_by_the_one_before_it() {

@@ -1,6 +1,6 @@
 //! Why a set refuses keys.
 
-use super::{LATEST, NORM_TOLERANCE};
+use crate::tracks::check::{LATEST, NORM_TOLERANCE};
 
 /// Why keys were refused. Places count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Quat};
 
-use super::{TrackError, TrackSet};
+use crate::tracks::error::TrackError;
+use crate::tracks::set::TrackSet;
 
 /// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 for none, mostly
 /// within -1 and 1.
@@ -26,7 +27,7 @@ impl Tcb {
 
 /// One value for each key of those tracks that have any.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct KeyData<T> {
+pub(crate) struct KeyData<T> {
     values: Vec<T>,
     /// Where each track's start.
     starts: Vec<Option<usize>>,
@@ -44,14 +45,14 @@ impl<T> Default for KeyData<T> {
 
 impl<T: Clone> KeyData<T> {
     /// The values of a track with `keys` keys; nothing where it has none.
-    pub(super) fn of(&self, track: usize, keys: usize) -> &[T] {
+    pub(crate) fn of(&self, track: usize, keys: usize) -> &[T] {
         match self.starts.get(track) {
             Some(&Some(start)) => &self.values[start..start + keys],
             _ => &[],
         }
     }
 
-    pub(super) fn set(&mut self, track: usize, values: &[T]) {
+    pub(crate) fn set(&mut self, track: usize, values: &[T]) {
         if values.is_empty() {
             return;
         }
@@ -69,7 +70,7 @@ impl<T: Clone> KeyData<T> {
 
 impl TrackSet {
     /// Gives each key of a track an angular velocity, radians per second in the body
-    /// frame: for [`HERMITE`](crate::method::HERMITE).
+    /// frame: for [`HERMITE`](crate::method::hermite::HERMITE).
     ///
     /// # Errors
     /// When there is no such track, or not one finite velocity for each of its keys.
@@ -82,7 +83,7 @@ impl TrackSet {
     }
 
     /// Gives each key of a track the tangents with which the curve arrives and leaves,
-    /// `x y z w` a second: for [`GLTF_CUBIC`](crate::method::GLTF_CUBIC).
+    /// `x y z w` a second: for [`GLTF_CUBIC`](crate::method::gltf_cubic::GLTF_CUBIC).
     ///
     /// # Errors
     /// When there is no such track, or not one finite pair for each of its keys.
@@ -95,7 +96,7 @@ impl TrackSet {
     }
 
     /// Gives each key of a track its own tension, continuity and bias: for
-    /// [`KOCHANEK_BARTELS`](crate::method::KOCHANEK_BARTELS).
+    /// [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS).
     ///
     /// # Errors
     /// When there is no such track, or not one finite triple for each of its keys.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{TrackError, TrackSet, check_times};
+use crate::tracks::check::check_times;
+use crate::tracks::error::TrackError;
+use crate::tracks::set::TrackSet;
 
 /// Keys of a translation or of a scale.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +32,7 @@ pub(crate) enum Channel {
 impl TrackSet {
     /// Gives a track translation keys, at seconds of their own, strictly increasing; with
     /// tangents (arriving, leaving; units a second) for
-    /// [`VectorMethod::GltfCubic`](crate::VectorMethod::GltfCubic), or none.
+    /// [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic), or none.
     ///
     /// # Errors
     /// When there is no such track, the lengths differ, or a number is not finite.

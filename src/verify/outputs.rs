@@ -3,15 +3,16 @@
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
 
-use crate::clock::{Frames, Timeline};
 use crate::device::Device;
-use crate::encoding::Encoding;
 use crate::engine::{Engine, Error};
-use crate::method::{Axes, Interpolation, Quantity, Speed};
-use crate::reference::{Curve, angle_between};
-use crate::rotations::{Layout, Rotations};
-use crate::skeleton::Skeleton;
-use crate::tracks::TrackSet;
+use crate::method::interpolation::{Axes, Interpolation, Quantity, Speed};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Rotations};
+use crate::pose::skeleton::Skeleton;
+use crate::reference::curve::Curve;
+use crate::reference::quaternion::angle_between;
+use crate::time::frames::{Frames, Timeline};
+use crate::tracks::set::TrackSet;
 
 /// What was found of one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +51,7 @@ const QUANTITIES: [(&str, Quantity); 4] = [
 const RATES_CHECKED: usize = 4096;
 
 /// Every output of one method.
-pub(super) fn verify(
+pub(crate) fn verify(
     engine: &Engine,
     set: &TrackSet,
     interpolation: Interpolation,
@@ -66,7 +67,7 @@ pub(super) fn verify(
         };
         let found = engine.evaluate(set, interpolation, frames)?;
         let expected = cpu.evaluate(set, interpolation, frames)?;
-        let (differing, _) = super::differences(&found, &expected);
+        let (differing, _) = crate::verify::differences(&found, &expected);
         outputs.push(OutputVerification {
             output: name.to_owned(),
             values: found.as_quats().len() as u64,

@@ -1,0 +1,191 @@
+//! The bindings of a kernel, and the functions that read one element of a buffer: of a storage
+//! buffer as it is, or of a texel buffer, texels of 16 bytes that are put together again.
+
+use std::fmt::Write;
+
+use naga::{Module, Scalar, ScalarKind, TypeInner, VectorSize};
+
+use crate::table::Read;
+
+/// WGSL that declares what a kernel reads, as storage buffers, and what it stores into.
+pub(crate) fn storage(reads: &[&Read]) -> String {
+    let mut text = String::new();
+    for (binding, read) in reads.iter().enumerate() {
+        let Read {
+            buffer,
+            element,
+            function,
+        } = read;
+        writeln!(
+            text,
+            "@group(0) @binding({binding}) var<storage, read> {buffer}: array<{element}>;
+             fn {function}(place: u32) -> {element} {{ return {buffer}[place]; }}"
+        )
+        .unwrap();
+    }
+    text + &output(reads.len())
+}
+
+/// The same with texel buffers, which WGSL knows as textures of one dimension; `module` is the
+/// kernel with storage buffers, whose types say where fields lie.
+pub(crate) fn texels(reads: &[&Read], module: &Module) -> String {
+    let mut text = String::new();
+    for (binding, read) in reads.iter().enumerate() {
+        let Read {
+            buffer,
+            element,
+            function,
+        } = read;
+        let body = reader(read, module);
+        writeln!(
+            text,
+            "@group(0) @binding({binding}) var {buffer}: texture_1d<u32>;
+             fn {function}(place: u32) -> {element} {{\n{body}}}"
+        )
+        .unwrap();
+    }
+    text + &output(reads.len())
+}
+
+fn output(binding: usize) -> String {
+    format!("@group(0) @binding({binding}) var<storage, read_write> rotations: array<Stored>;\n")
+}
+
+/// The words that an element consists of, in order.
+#[derive(Clone, Copy)]
+enum Field {
+    Scalar(ScalarKind),
+    Vector(ScalarKind),
+    /// So many vectors of four f32.
+    Vectors(u32),
+}
+
+/// The function that puts an element together from the texels that it lies in.
+fn reader(read: &Read, module: &Module) -> String {
+    let (fields, size) = fields(read, module);
+    let load = |texel: &str| format!("textureLoad({}, {texel}, 0)", read.buffer);
+    let value = |kind: ScalarKind, words: String| match kind {
+        ScalarKind::Uint => words,
+        ScalarKind::Sint => format!("bitcast<i32>({words})"),
+        _ => format!("bitcast<f32>({words})"),
+    };
+    let vector = |kind: ScalarKind, words: String| match kind {
+        ScalarKind::Uint => words,
+        _ => format!("bitcast<vec4f>({words})"),
+    };
+    let scalars = |names: &[&str]| -> String {
+        let all = fields.iter().zip(names).map(|(field, name)| match *field {
+            Field::Scalar(kind) => value(kind, (*name).to_owned()),
+            _ => panic!("{}: only scalars may lie across texels", read.element),
+        });
+        let all: Vec<String> = all.collect();
+        match &*all {
+            [one] if fields.len() == 1 => one.clone(),
+            _ => format!("{}({})", read.element, all.join(", ")),
+        }
+    };
+    let own = read.buffer;
+    match size {
+        4 => format!(
+            "let four = {};
+             let two = select(four.xy, four.zw, (place & 2u) == 2u);
+             return {};\n",
+            load("place / 4u"),
+            scalars(&["select(two.x, two.y, (place & 1u) == 1u)"])
+        ),
+        8 => format!(
+            "let two = {};
+             let own = select(two.xy, two.zw, (place & 1u) == 1u);
+             return {};\n",
+            load("place / 2u"),
+            scalars(&["own.x", "own.y"])
+        ),
+        // A texel and a half.
+        24 => format!(
+            "let texel = (3u * place) / 2u;
+             let first = {};
+             let second = {};
+             let is_odd = (place & 1u) == 1u;
+             let head = select(first, vec4u(first.zw, second.xy), is_odd);
+             let tail = select(second.xy, second.zw, is_odd);
+             return {};\n",
+            load("texel"),
+            load("texel + 1u"),
+            scalars(&["head.x", "head.y", "head.z", "head.w", "tail.x", "tail.y"])
+        ),
+        16 if fields.len() == 4 => {
+            let Field::Scalar(kind) = fields[0] else {
+                panic!("{own}: four fields of four bytes are scalars");
+            };
+            let words = vector(kind, load("place"));
+            let (element, all) = (read.element, ["all.x", "all.y", "all.z", "all.w"]);
+            format!(
+                "let all = {words};\nreturn {element}({});\n",
+                all.join(", ")
+            )
+        }
+        16 if fields.len() == 1 => match fields[0] {
+            Field::Vector(kind) => format!("return {};\n", vector(kind, load("place"))),
+            _ => panic!("{own}: no reader for one field of 16 bytes"),
+        },
+        _ if size.is_multiple_of(16) => {
+            let texels = size / 16;
+            let mut next = 0;
+            let mut texel = || {
+                let own = load(&match next {
+                    0 => "first".to_owned(),
+                    _ => format!("first + {next}u"),
+                });
+                next += 1;
+                vector(ScalarKind::Float, own)
+            };
+            let all = fields.iter().map(|field| match *field {
+                Field::Vector(_) => texel(),
+                Field::Vectors(count) => {
+                    let each: Vec<String> = (0..count).map(|_| texel()).collect();
+                    format!("array({})", each.join(", "))
+                }
+                Field::Scalar(_) => panic!("{own}: scalars beside vectors have no reader"),
+            });
+            let all: Vec<String> = all.collect();
+            assert_eq!(next, texels, "{own}: fields fill all texels");
+            let element = read.element;
+            format!(
+                "let first = {texels}u * place;\nreturn {element}({});\n",
+                all.join(", ")
+            )
+        }
+        _ => panic!("{own}: no reader for elements of {size} bytes; write one"),
+    }
+}
+
+/// The fields of an element, and its size in bytes.
+fn fields(read: &Read, module: &Module) -> (Vec<Field>, u32) {
+    let variable = module
+        .global_variables
+        .iter()
+        .find(|(_, variable)| variable.name.as_deref() == Some(read.buffer))
+        .map(|(_, variable)| variable.ty)
+        .unwrap_or_else(|| panic!("{}: no such buffer", read.buffer));
+    let TypeInner::Array { base, stride, .. } = module.types[variable].inner else {
+        panic!("{}: not an array", read.buffer);
+    };
+    let field = |ty: naga::Handle<naga::Type>| match module.types[ty].inner {
+        TypeInner::Scalar(Scalar { kind, .. }) => Field::Scalar(kind),
+        TypeInner::Vector {
+            size: VectorSize::Quad,
+            scalar,
+        } => Field::Vector(scalar.kind),
+        TypeInner::Array {
+            size: naga::ArraySize::Constant(count),
+            stride: 16,
+            ..
+        } => Field::Vectors(count.get()),
+        ref other => panic!("{}: no reader for {other:?}", read.element),
+    };
+    let fields = match &module.types[base].inner {
+        TypeInner::Struct { members, .. } => members.iter().map(|m| field(m.ty)).collect(),
+        _ => vec![field(base)],
+    };
+    (fields, stride)
+}

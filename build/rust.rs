@@ -1,0 +1,295 @@
+//! What Rust gets of the shaders: their constants, the structs that buffers hold, and the
+//! kernels by name.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use naga::{
+    AddressSpace, ArraySize, Handle, Literal, Module, Scalar, ScalarKind, Type, TypeInner,
+    VectorSize,
+};
+
+use crate::table::{FORMS, LISTS, STORES};
+
+/// Everything that the kernels declare, each once: two that differ end the build.
+#[derive(Default)]
+pub(crate) struct Declared {
+    constants: BTreeMap<String, String>,
+    structs: BTreeMap<String, Layout>,
+}
+
+/// A struct as it lies in a buffer.
+struct Layout {
+    /// The members with their offsets, as text: what must be the same wherever it is declared.
+    fields: Vec<String>,
+    /// Rust's declaration; none of a struct that no buffer holds.
+    rust: Option<String>,
+}
+
+impl Declared {
+    pub(crate) fn collect(&mut self, kernel: &str, module: &Module) {
+        for (_, constant) in module.constants.iter() {
+            let (Some(name), naga::Expression::Literal(literal)) =
+                (&constant.name, &module.global_expressions[constant.init])
+            else {
+                continue;
+            };
+            let value = match literal {
+                Literal::F32(value) => format!("f32 = {value:?}"),
+                Literal::U32(value) => format!("u32 = {value}"),
+                Literal::I32(value) => format!("i32 = {value}"),
+                _ => continue,
+            };
+            let other = self.constants.insert(name.clone(), value.clone());
+            assert!(
+                other.as_ref().is_none_or(|other| *other == value),
+                "{kernel}: the constant {name} is {value} here, and {other:?} elsewhere"
+            );
+        }
+        let shared = shared_structs(module);
+        for (ty, declared) in module.types.iter() {
+            let (Some(name), TypeInner::Struct { members, .. }) = (&declared.name, &declared.inner)
+            else {
+                continue;
+            };
+            let fields: Vec<String> = members
+                .iter()
+                .map(|m| {
+                    let name = m.name.as_deref().unwrap_or_default();
+                    format!("{name} at {}: {}", m.offset, described(module, m.ty))
+                })
+                .collect();
+            let rust = shared.contains(&ty).then(|| declaration(module, ty, name));
+            match self.structs.get_mut(name) {
+                Some(other) => {
+                    assert!(
+                        other.fields == fields,
+                        "{kernel}: two structs `{name}` differ:\n  {:?}\n  {fields:?}",
+                        other.fields
+                    );
+                    other.rust = other.rust.take().or(rust);
+                }
+                None => {
+                    self.structs.insert(name.clone(), Layout { fields, rust });
+                }
+            }
+        }
+    }
+
+    /// Constants and structs as Rust.
+    pub(crate) fn rust(&self) -> String {
+        let mut text = String::new();
+        for (name, value) in &self.constants {
+            writeln!(text, "pub(crate) const {name}: {value};").unwrap();
+        }
+        for rust in self.structs.values().filter_map(|own| own.rust.as_ref()) {
+            text.push_str(rust);
+        }
+        text
+    }
+}
+
+/// A type in words that are the same in every module.
+fn described(module: &Module, ty: Handle<Type>) -> String {
+    match module.types[ty].inner {
+        TypeInner::Array { base, size, stride } => {
+            format!("[{}; {size:?}] by {stride}", described(module, base))
+        }
+        TypeInner::Struct { .. } => module.types[ty].name.clone().unwrap_or_default(),
+        ref other => format!("{other:?}"),
+    }
+}
+
+/// Structs that lie in a buffer, or come with a dispatch.
+fn shared_structs(module: &Module) -> Vec<Handle<Type>> {
+    let variables = module.global_variables.iter();
+    let shared = variables.filter(|(_, variable)| {
+        matches!(
+            variable.space,
+            AddressSpace::Storage { .. } | AddressSpace::Immediate
+        )
+    });
+    shared
+        .map(|(_, variable)| match module.types[variable.ty].inner {
+            TypeInner::Array { base, .. } => base,
+            _ => variable.ty,
+        })
+        .collect()
+}
+
+fn declaration(module: &Module, ty: Handle<Type>, name: &str) -> String {
+    let TypeInner::Struct { members, span } = &module.types[ty].inner else {
+        unreachable!("a struct");
+    };
+    let docs = module.doc_comments.as_deref();
+    let mut text = String::new();
+    doc(&mut text, docs.and_then(|docs| docs.types.get(&ty)));
+    text.push_str(
+        "#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n#[repr(C)]\n",
+    );
+    writeln!(text, "pub(crate) struct {name} {{").unwrap();
+    let (mut end, mut asserts) = (0, String::new());
+    for (i, member) in members.iter().enumerate() {
+        let field = member.name.as_deref().expect("members have names");
+        padding(&mut text, member.offset - end, i);
+        doc(
+            &mut text,
+            docs.and_then(|docs| docs.struct_members.get(&(ty, i))),
+        );
+        let (rust, size) = rust_type(module, member.ty);
+        writeln!(text, "    pub(crate) {field}: {rust},").unwrap();
+        let offset = member.offset;
+        writeln!(
+            asserts,
+            "    assert!(std::mem::offset_of!({name}, {field}) == {offset});"
+        )
+        .unwrap();
+        end = offset + size;
+    }
+    padding(&mut text, span - end, members.len());
+    writeln!(
+        text,
+        "}}\nconst _: () = {{\n    assert!(size_of::<{name}>() == {span});"
+    )
+    .unwrap();
+    text + &asserts + "};\n"
+}
+
+fn padding(text: &mut String, bytes: u32, place: usize) {
+    if bytes > 0 {
+        let words = bytes / 4;
+        writeln!(text, "    pub(crate) padding_{place}: [u32; {words}],").unwrap();
+    }
+}
+
+fn doc(text: &mut String, lines: Option<&Vec<String>>) {
+    for line in lines.into_iter().flatten() {
+        writeln!(text, "{line}").unwrap();
+    }
+}
+
+/// A type of a member in Rust, and its size.
+fn rust_type(module: &Module, ty: Handle<Type>) -> (String, u32) {
+    let scalar = |Scalar { kind, width }: Scalar| match (kind, width) {
+        (ScalarKind::Float, 4) => "f32",
+        (ScalarKind::Uint, 4) => "u32",
+        (ScalarKind::Sint, 4) => "i32",
+        other => panic!("no Rust type for {other:?}"),
+    };
+    match module.types[ty].inner {
+        TypeInner::Scalar(own) => (scalar(own).to_owned(), 4),
+        TypeInner::Vector { size, scalar: own } => {
+            let count = match size {
+                VectorSize::Bi => 2,
+                VectorSize::Tri => 3,
+                VectorSize::Quad => 4,
+            };
+            (format!("[{}; {count}]", scalar(own)), 4 * count)
+        }
+        TypeInner::Array {
+            base,
+            size: ArraySize::Constant(count),
+            stride,
+        } => {
+            let (element, size) = rust_type(module, base);
+            assert_eq!(size, stride, "arrays without gaps");
+            (format!("[{element}; {count}]"), stride * count.get())
+        }
+        ref other => panic!("no Rust type for {other:?}"),
+    }
+}
+
+/// A kernel that was compiled: its name, how many bindings it has, and whether there is one that
+/// reads texels.
+pub(crate) struct Compiled {
+    pub(crate) name: String,
+    pub(crate) bindings: usize,
+    pub(crate) has_texels: bool,
+}
+
+/// The kernels by name: an enum, their code, and which serves a form, a list and a store.
+pub(crate) fn kernels(all: &[Compiled]) -> String {
+    let mut text = String::from(
+        "/// A kernel, by its name.\n\
+         #[derive(Debug, Clone, Copy, PartialEq, Eq)]\npub(crate) enum Kernel {\n",
+    );
+    for kernel in all {
+        writeln!(text, "    {},", variant(&kernel.name)).unwrap();
+    }
+    text.push_str("}\n");
+    for (what, names) in [
+        (
+            "How the work over segments is listed.",
+            ("List", LISTS.map(|list| list.0).to_vec()),
+        ),
+        (
+            "What a kernel stores a rotation as.",
+            ("Store", STORES.map(|store| store.0).to_vec()),
+        ),
+    ] {
+        let (name, variants) = names;
+        let variants: Vec<String> = variants.into_iter().map(variant).collect();
+        let variants = variants.join(", ");
+        writeln!(
+            text,
+            "/// {what}\n#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]\n\
+             pub(crate) enum {name} {{ {variants} }}"
+        )
+        .unwrap();
+    }
+    writeln!(
+        text,
+        "impl Kernel {{\n    /// The kernel for a form of segments, a list and a store.\n    \
+         pub(crate) fn over_segments(form: Form, list: List, store: Store) -> Self {{\n        \
+         match (form, list, store) {{"
+    )
+    .unwrap();
+    for (form, _) in FORMS {
+        for (list, _, _) in LISTS {
+            for (store, _) in STORES {
+                writeln!(
+                    text,
+                    "            (Form::{}, List::{}, Store::{}) => Self::{},",
+                    variant(form),
+                    variant(list),
+                    variant(store),
+                    variant(&format!("{form}_{list}_{store}"))
+                )
+                .unwrap();
+            }
+        }
+    }
+    text.push_str("        }\n    }\n}\n");
+    writeln!(
+        text,
+        "pub(crate) static KERNELS: [KernelCode; {}] = [",
+        all.len()
+    )
+    .unwrap();
+    for kernel in all {
+        let code = |name: &str| {
+            format!("(\"{name}\", include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")))")
+        };
+        let texels = match kernel.has_texels {
+            true => format!("Some({})", code(&format!("{}_texels", kernel.name))),
+            false => "None".to_owned(),
+        };
+        writeln!(
+            text,
+            "    KernelCode {{ storage: {}, texels: {texels}, bindings: {} }},",
+            code(&kernel.name),
+            kernel.bindings
+        )
+        .unwrap();
+    }
+    text + "];\n"
+}
+
+/// `arc_frames_f32` as `ArcFramesF32`.
+fn variant(name: &str) -> String {
+    let words = name.split('_').map(|word| {
+        let (first, rest) = word.split_at(1);
+        first.to_uppercase() + rest
+    });
+    words.collect()
+}

@@ -1,0 +1,170 @@
+//! The table of kernels: which files of `shaders/` each is joined from, and what it reads.
+//!
+//! To add a kernel, write its file and name it in [`kernels`]. The rest of the build walks the
+//! table: it writes the bindings and the functions that read them, compiles each kernel, and
+//! gives Rust an enum of them, their layouts and their constants.
+
+/// A buffer that a kernel reads, and the WGSL function that reads one element of it.
+pub(crate) struct Read {
+    pub(crate) buffer: &'static str,
+    pub(crate) element: &'static str,
+    pub(crate) function: &'static str,
+}
+
+const fn read(buffer: &'static str, element: &'static str, function: &'static str) -> Read {
+    Read {
+        buffer,
+        element,
+        function,
+    }
+}
+
+/// One kernel, before it is joined.
+pub(crate) struct Kernel {
+    /// `arc_frames_f32`; the enum's variant is `ArcFramesF32`.
+    pub(crate) name: String,
+    /// Files below `shaders/`, without `.wgsl`, in the order in which they are joined.
+    pub(crate) files: Vec<&'static str>,
+    /// Bound in this order, from 0 on; then comes the buffer that `store` writes. A kernel that
+    /// declares its own bindings has none here, and exists for storage buffers alone.
+    pub(crate) reads: Vec<&'static Read>,
+}
+
+/// The forms of segments, each with what its formula needs.
+pub(crate) const FORMS: [(&str, &[&str]); 2] = [
+    ("arc", &["math/sine_cosine", "forms/evaluate_arc"]),
+    (
+        "polynomial",
+        &["math/polynomial", "forms/evaluate_polynomial"],
+    ),
+];
+
+/// How the work over segments is listed: the entry point with the files that it needs, and what
+/// it reads beside segments and constants.
+pub(crate) const LISTS: [(&str, &[&str], &[Read]); 3] = [
+    (
+        "frames",
+        &["runs", "lists/frame_distance"],
+        &[read("items", "Item", "item_at")],
+    ),
+    (
+        "times",
+        &["runs", "lists/time_distance"],
+        &[
+            read("items", "Item", "item_at"),
+            read("distances", "f32", "distance_at"),
+        ],
+    ),
+    (
+        "samples",
+        &["samples"],
+        &[read("samples", "ListedSample", "sample_at")],
+    ),
+];
+
+/// What a rotation is stored as: a file of `shaders/stores` each, with what it needs.
+pub(crate) const STORES: [(&str, &[&str]); 8] = [
+    ("f32", &[]),
+    ("f16", &[]),
+    ("snorm16", &[]),
+    ("axis_angle", &["math/arc_tangent"]),
+    ("matrix3x3", &["stores/matrix"]),
+    ("matrix3x4", &["stores/matrix"]),
+    ("euler", &["math/arc_tangent"]),
+    ("vector", &[]),
+];
+
+static CLIP: [Read; 2] = [
+    read("segments", "Segment", "segment_at"),
+    read("constants", "vec4f", "constant_at"),
+];
+
+static KEYS: [Read; 3] = [
+    read("keys", "vec4u", "key_at"),
+    read("samples", "KeySample", "sample_at"),
+    read("weights", "TangentWeights", "weights_at"),
+];
+
+/// Kernels that evaluate samples straight from keys, each with the files that it needs.
+const FROM_KEYS: [(&str, &[&str], usize); 3] = [
+    (
+        "arcs",
+        &[
+            "math/sine_cosine",
+            "forms/evaluate_arc",
+            "from_keys/arc_between",
+        ],
+        2,
+    ),
+    (
+        "two_keys",
+        &[
+            "math/sine_cosine",
+            "math/polynomial",
+            "forms/evaluate_arc",
+            "from_keys/arc_between",
+            "from_keys/constant_velocity",
+        ],
+        2,
+    ),
+    ("cubics", &["from_keys/small_angle"], 3),
+];
+
+/// Kernels over poses that are there already.
+const POSES: [&str; 4] = ["poses/add", "poses/blend", "poses/mix", "poses/world"];
+
+/// What the self-test of a device computes with.
+const SELF_TEST: [&str; 3] = ["math/sine_cosine", "math/arc_tangent", "self_test"];
+
+/// The store that takes the place of `f32` where kernels read texel buffers: those devices store
+/// words of 64 bits.
+pub(crate) const WIDE_STORE: [&str; 2] = ["math/wide", "stores/f32_wide"];
+
+/// Every kernel.
+pub(crate) fn kernels() -> Vec<Kernel> {
+    let mut kernels = vec![Kernel {
+        name: "self_test".to_owned(),
+        files: SELF_TEST.to_vec(),
+        reads: Vec::new(),
+    }];
+    for (form, formula) in FORMS {
+        for (list, entry, listed) in LISTS {
+            for (store, needed) in STORES {
+                let mut files = vec!["math/canonical", "lists/dispatch"];
+                files.extend([formula, entry, needed].concat());
+                files.push(Box::leak(format!("stores/{store}").into_boxed_str()));
+                kernels.push(Kernel {
+                    name: format!("{form}_{list}_{store}"),
+                    files,
+                    reads: CLIP.iter().chain(listed).collect(),
+                });
+            }
+        }
+    }
+    for (name, needed, reads) in FROM_KEYS {
+        let own = Box::leak(format!("from_keys/{name}").into_boxed_str());
+        let mut files = vec!["math/canonical", "from_keys"];
+        files.extend(needed);
+        files.extend([&*own, "stores/f32"]);
+        kernels.push(Kernel {
+            name: format!("from_keys_{name}"),
+            files,
+            reads: KEYS[..reads].iter().collect(),
+        });
+    }
+    for file in POSES {
+        let shared = [
+            "math/canonical",
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "poses",
+        ];
+        kernels.push(Kernel {
+            name: file.replace('/', "_"),
+            files: shared.into_iter().chain([file]).collect(),
+            reads: Vec::new(),
+        });
+    }
+    kernels
+}

@@ -1,0 +1,25 @@
+// The arc form: constant angular velocity along a great circle, written about the middle of the
+// arc, so that the angle never passes half of the arc.
+// Twin: src/twin/evaluate_arc.rs.
+
+/// A great-circle arc about its middle.
+struct ArcSegment {
+    /// The rotation half way along the arc.
+    middle: vec4f,
+    /// Its derivative there: orthogonal to it in the plane of the arc, and as long as the arc's
+    /// angle in R⁴.
+    tangent: vec4f,
+}
+
+alias Segment = ArcSegment;
+
+// `parameter` runs from -1/2 to 1/2 over the segment.
+fn evaluate(segment: Segment, parameter: f32) -> vec4f {
+    let z = parameter * parameter * norm_squared(segment.tangent);
+    let turn = sine_cosm1_quarter(parameter, z);
+    return segment.middle + (segment.middle * turn.y + segment.tangent * turn.x);
+}
+
+fn norm_squared(q: vec4f) -> f32 {
+    return q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+}

@@ -1,0 +1,79 @@
+// Entry point: an invocation evaluates one sample of up to four tracks straight from the keys
+// beside it, for sets with fewer samples than keys; no segment is prepared.
+// The build joins it with a file of `from_keys/` (`Hoisted` and `hoisted`, what is worked out
+// once for all rows, and `rotation_between`), with the functions that read (`key_at`,
+// `sample_at`) and a `store`.
+
+/// Where a sample lies among the keys of its row.
+struct KeySample {
+    /// The key before it; the rotation itself, where this carries IS_KEY.
+    key: u32,
+    /// From -1/2 at that key to 1/2 at the next.
+    parameter: f32,
+}
+
+/// The shape of what is evaluated: rows are tracks whose samples lie alike among their keys, or
+/// all samples of any tracks are one row.
+struct RowShape {
+    /// Samples of each row.
+    samples: u32,
+    /// Keys of each row.
+    keys: u32,
+    /// How many rows.
+    count: u32,
+}
+
+const FROM_KEYS_WORKGROUP: u32 = 64;
+const ROWS_PER_INVOCATION: u32 = 4;
+
+// Set in a sample's `key`.
+const IS_KEY: u32 = 0x80000000;
+
+// Set in a key's x: sign continuation over the track turns the key's sign. The bit is free, for
+// it makes a float at least 2, and no component of a rotation is that large.
+const SIGN_TURNED: u32 = 0x40000000;
+
+var<immediate> rows: RowShape;
+
+@compute @workgroup_size(FROM_KEYS_WORKGROUP)
+fn main(@builtin(global_invocation_id) invocation: vec3u) {
+    if invocation.x >= rows.samples {
+        return;
+    }
+    let sample = sample_at(invocation.x);
+    let is_key = (sample.key & IS_KEY) != 0u;
+    let first = sample.key & ~IS_KEY;
+    // The last key has none after it, and is its own neighbour.
+    let next = select(1u, 0u, is_key);
+    let all_rows = hoisted(first, first + next, sample.parameter);
+    let row = invocation.y * ROWS_PER_INVOCATION;
+    let is_last = rows.count < row + ROWS_PER_INVOCATION;
+    let count = select(ROWS_PER_INVOCATION, rows.count - row, is_last);
+    let keys = rows.keys;
+    let samples = rows.samples;
+    var key = row * keys + first;
+    var place = row * samples + invocation.x;
+    for (var j = 0u; j < count; j++) {
+        let stored = key_at(key);
+        let own = canonical(rotation_between(key, continued(stored), key + next, all_rows));
+        store(place, select(own, as_given(stored), is_key));
+        key += keys;
+        place += samples;
+    }
+}
+
+// A key with the sign that it was given.
+fn as_given(stored: vec4u) -> vec4f {
+    return bitcast<vec4f>(vec4u(stored.x & ~SIGN_TURNED, stored.yzw));
+}
+
+// A key with the sign that continues the keys before it.
+fn continued(stored: vec4u) -> vec4f {
+    let turned = stored.x & SIGN_TURNED;
+    let sign = turned << 1u;
+    return bitcast<vec4f>(stored ^ vec4u(turned | sign, vec3u(sign)));
+}
+
+fn continued_key_at(key: u32) -> vec4f {
+    return continued(key_at(key));
+}

@@ -1,0 +1,26 @@
+// What the host says of one dispatch over segments, and which invocation does what.
+
+/// What the host says of one dispatch over segments.
+struct Dispatch {
+    /// The first work item, or listed sample, of this dispatch.
+    first_item: u32,
+    /// How many of them it does.
+    item_count: u32,
+    /// Distance in the result between neighbouring samples of a track, in rotations.
+    stride: u32,
+    /// What the store has to know beside the rotation: the order of a matrix, the axes of angles.
+    detail: u32,
+    /// Where the first listed sample is stored; the others follow.
+    first_output: u32,
+}
+
+const WORKGROUP: u32 = 64;
+
+// Set in a `source`: it is the index of a constant that is stored as it is, not of a segment.
+const IS_CONSTANT: u32 = 0x80000000;
+
+var<immediate> dispatch: Dispatch;
+
+fn invocation_index(invocation: vec3u, groups: vec3u) -> u32 {
+    return invocation.y * (groups.x * WORKGROUP) + invocation.x;
+}

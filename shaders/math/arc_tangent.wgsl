@@ -1,0 +1,80 @@
+// Reciprocal, square root and arc tangent, from operations that every driver rounds alike: a
+// first guess by integer arithmetic on the bits, and Newton's steps. Arguments are 0 or at least
+// 2^-60 in magnitude, so that no square is subnormal; `flushed` makes them so.
+// Twin: src/twin/arc_tangent.rs.
+
+const RECIPROCAL_SEED: u32 = 0x7ef311c7;
+const ROOT_SEED: u32 = 0x5f3759df;
+// 2^-60.
+const FLUSHED_BITS: u32 = 0x21800000;
+
+// (atan(t)/t - 1)/t² in powers of t², for 0 <= t <= 1; within 6e-8.
+const ARC_0: f32 = -0.3333333134651184;
+const ARC_1: f32 = 0.19999739527702332;
+const ARC_2: f32 = -0.1427856832742691;
+const ARC_3: f32 = 0.11033764481544495;
+const ARC_4: f32 = -0.08656880259513855;
+const ARC_5: f32 = 0.0625016912817955;
+const ARC_6: f32 = -0.035871539264917374;
+const ARC_7: f32 = 0.01350777130573988;
+const ARC_8: f32 = -0.0023869972210377455;
+
+// pi/2 and pi, each as the sum of two f32.
+const HALF_PI: f32 = 1.5707963705062866;
+const HALF_PI_LOW: f32 = -4.371138828673793e-8;
+const PI: f32 = 3.1415927410125732;
+const PI_LOW: f32 = -8.742277657347586e-8;
+const DEGREES: f32 = 57.295780181884766;
+
+// 0 where the magnitude is below 2^-60.
+fn flushed(x: f32) -> f32 {
+    return select(x, 0.0, (bitcast<u32>(x) & 0x7fffffffu) < FLUSHED_BITS);
+}
+
+fn magnitude(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) & 0x7fffffffu);
+}
+
+// 1/x for x > 0.
+fn reciprocal(x: f32) -> f32 {
+    let seed = bitcast<f32>(RECIPROCAL_SEED - bitcast<u32>(x));
+    let first = seed * (2.0 - x * seed);
+    let second = first * (2.0 - x * first);
+    let third = second * (2.0 - x * second);
+    return third * (2.0 - x * third);
+}
+
+// 1/√x for x > 0; large at 0.
+fn reciprocal_root(x: f32) -> f32 {
+    let seed = bitcast<f32>(ROOT_SEED - (bitcast<u32>(x) >> 1u));
+    let half = 0.5 * x;
+    let first = seed * (1.5 - half * seed * seed);
+    let second = first * (1.5 - half * first * first);
+    return second * (1.5 - half * second * second);
+}
+
+fn root(x: f32) -> f32 {
+    let near = x * reciprocal_root(x);
+    // One more of Newton's steps, on the root itself.
+    return near + (x - near * near) * (0.5 * reciprocal_root(x));
+}
+
+// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+fn arc_tangent(y: f32, x: f32) -> f32 {
+    let up = magnitude(y);
+    let along = magnitude(x);
+    let steep = up > along;
+    let large = select(along, up, steep);
+    let small = select(up, along, steep);
+    let divisor = select(large, 1.0, large == 0.0);
+    let inverse = reciprocal(divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
+    let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
+    let flat = tail * (z * t) + t;
+    let acute = select(flat, (HALF_PI - flat) + HALF_PI_LOW, steep);
+    let turned = select(acute, (PI - acute) + PI_LOW, x < 0.0);
+    return select(turned, -turned, y < 0.0);
+}

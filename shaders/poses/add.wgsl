@@ -1,0 +1,18 @@
+// Adds a layer of rotations to a base: the part `weight` of the layer's rotation from its
+// reference follows the base's rotation.
+// Twin: src/twin/pose_add.rs.
+
+@group(0) @binding(0) var<storage, read> base: array<vec4f>;
+@group(0) @binding(1) var<storage, read> layer: array<vec4f>;
+// A reference for each value of the layer, and behind them the weight.
+@group(0) @binding(2) var<storage, read> reference: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> added: array<vec4f>;
+
+const IDENTITY: vec4f = vec4f(0.0, 0.0, 0.0, 1.0);
+
+fn pose(place: u32) {
+    let own = reference[place];
+    let inverse = vec4f(-own.x, -own.y, -own.z, own.w);
+    let turn = slerp(IDENTITY, product(inverse, layer[place]), reference[dispatch.count].x);
+    added[place] = canonical(normalised(product(base[place], turn)));
+}

@@ -1,0 +1,43 @@
+// Walks a skeleton from the roots down: rotations in their parents' frames become rotations and
+// positions in the world, R = R_parent q and p = p_parent + R_parent offset.
+// Twin: src/twin/pose_world.rs.
+
+/// A track's place in a skeleton.
+struct Link {
+    /// Where the track hangs, in its parent's frame; a root's, in the world.
+    offset: vec3f,
+    /// Its index among the tracks.
+    track: u32,
+    /// Its parent's index, or ROOT.
+    parent: u32,
+}
+
+const ROOT: u32 = 0xffffffff;
+
+// [frame][track]
+@group(0) @binding(0) var<storage, read> local: array<vec4f>;
+// Parents before their children.
+@group(0) @binding(1) var<storage, read> links: array<Link>;
+// [frame][track]: the rotation, then the position.
+@group(0) @binding(2) var<storage, read_write> world: array<vec4f>;
+
+// `place` is the frame, `dispatch.detail` the number of tracks.
+fn pose(place: u32) {
+    let tracks = dispatch.detail;
+    let first = place * tracks;
+    for (var i = 0u; i < tracks; i++) {
+        let link = links[i];
+        let own = local[first + link.track];
+        var rotation = own;
+        var position = link.offset;
+        if link.parent != ROOT {
+            let parent = 2u * (first + link.parent);
+            let above = world[parent];
+            rotation = normalised(product(above, own));
+            position = world[parent + 1u].xyz + rotated(above, link.offset);
+        }
+        let there = 2u * (first + link.track);
+        world[there] = canonical(rotation);
+        world[there + 1u] = canonical(vec4f(position, 0.0));
+    }
+}

@@ -1,0 +1,20 @@
+// Stores rotations as axis and angle: a unit vector, and degrees from 0 to 360. The axis of no
+// rotation is x.
+// Twin: src/twin/axis_angle.rs.
+
+alias Stored = vec4f;
+
+fn axis_angle(rotation: vec4f) -> vec4f {
+    let x = flushed(rotation.x);
+    let y = flushed(rotation.y);
+    let z = flushed(rotation.z);
+    let square = x * x + y * y + z * z;
+    let scale = reciprocal_root(square);
+    let angle = arc_tangent(root(square), flushed(rotation.w)) * (2.0 * DEGREES);
+    let turned = vec4f(x * scale, y * scale, z * scale, angle);
+    return select(turned, vec4f(1.0, 0.0, 0.0, angle), square == 0.0);
+}
+
+fn store(place: u32, rotation: vec4f) {
+    rotations[place] = canonical(axis_angle(rotation));
+}

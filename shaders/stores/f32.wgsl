@@ -1,0 +1,7 @@
+// Stores rotations as they are: x y z w, f32.
+
+alias Stored = vec4f;
+
+fn store(place: u32, rotation: vec4f) {
+    rotations[place] = rotation;
+}

@@ -1,9 +1,0 @@
-//! Twin of `shaders/pose_mix.wgsl`: the same names, the same order.
-
-use super::evaluate::canonical;
-use super::quaternion::slerp;
-
-#[inline(always)]
-pub(super) fn pose(from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
-    slerp(from, to, weight).map(canonical)
-}

@@ -1,0 +1,89 @@
+//! What preparing needs, kept from call to call: to make it takes as long as to prepare a
+//! hundred keys.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::method::interpolation::Interpolation;
+use crate::prepare::Prepared;
+use crate::prepare::set::Preparation;
+use crate::time::frames::Timeline;
+use crate::tracks::set::TrackSet;
+
+/// What one thread needs.
+pub(crate) struct Memory {
+    interpolation: Interpolation,
+    pub(crate) prepared: Prepared,
+    pub(crate) preparation: Preparation,
+}
+
+/// So many ways to interpolate are asked for in turns; transforms alone take three.
+const KEPT_EACH: usize = 4;
+
+/// What threads have given back, the latest last.
+#[derive(Default)]
+pub(crate) struct Memories(Mutex<Vec<Memory>>);
+
+impl Memories {
+    /// For the samples of one timeline.
+    pub(crate) fn take(
+        &self,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        set: &TrackSet,
+    ) -> Memory {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let suits = |memory: &Memory| memory.interpolation == *interpolation;
+        let own = (kept.iter().rposition(suits)).map(|place| kept.remove(place));
+        drop(kept);
+        let mut memory = own.unwrap_or_else(|| Memory {
+            interpolation: *interpolation,
+            prepared: Prepared::new(interpolation),
+            preparation: Preparation::new(interpolation),
+        });
+        memory.preparation.only_for(timeline, set);
+        memory
+    }
+
+    /// Only after success: what failed may be half way.
+    pub(crate) fn give_back(&self, memory: Memory) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
+            kept.remove(0);
+        }
+        kept.push(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Device;
+    use crate::engine::Engine;
+    use crate::method;
+    use crate::time::frames::Frames;
+    use crate::tracks::set::swinging;
+
+    /// Catches what is made anew where two methods take turns, and memory without end.
+    #[test]
+    fn each_way_to_interpolate_finds_its_memory_again() {
+        let set = swinging(4, 26, false);
+        let clip = (Engine::new(Device::Cpu).unwrap())
+            .upload(&set, method::SLERP)
+            .unwrap();
+        let timeline = clip.timeline(&Frames::fps(60)).unwrap();
+        let memories = Memories::default();
+        let take = |own| memories.take(&Interpolation::from(own), &timeline, &set);
+        let kept = || memories.0.lock().unwrap().len();
+        for own in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            memories.give_back(take(own));
+        }
+        assert_eq!(kept(), 2);
+        let first = take(method::SLERP);
+        assert_eq!(kept(), 1);
+        memories.give_back(first);
+        for _ in 0..9 * rayon::current_num_threads() {
+            memories.give_back(Memories::default().take(&method::SLERP.into(), &timeline, &set));
+        }
+        assert_eq!(kept(), KEPT_EACH * rayon::current_num_threads());
+    }
+}

@@ -1,0 +1,137 @@
+//! A few explicit times of each of many tracks, as a crowd's poses are: a sample to a lane,
+//! and no run for each.
+
+use crate::cpu::evaluate::{Affine, one};
+use crate::curve::segment::Segments;
+use crate::math::canonical::round_f32;
+use crate::prepare::clip_data::{ClipData, PartRef};
+use crate::shader::{ArcSegment, PolynomialSegment};
+use crate::simd::dispatch::InLanes;
+use crate::simd::lanes::{Lanes, canonical};
+use crate::time::runs::{Distance, RunSource};
+use crate::time::window::Window;
+use crate::twin::evaluate_arc::{on_arc, square};
+
+/// Samples worked out together.
+const LANES: usize = 64;
+
+/// What a window of a clip is made of, where that is told by looking.
+pub(crate) struct FewTimes<'a> {
+    pub(crate) clip: &'a ClipData,
+    /// Sample `k` of track `t` lies at `times[t × stride + k]`.
+    pub(crate) times: &'a [f64],
+    pub(crate) stride: usize,
+    pub(crate) window: &'a Window,
+    /// `[track][sample]`.
+    pub(crate) output: &'a mut [[f32; 4]],
+    /// Places of the tracks in the window that are left to do.
+    pub(crate) others: Vec<usize>,
+}
+
+/// Samples of arcs that wait.
+struct Block {
+    middles: [[f32; 4]; LANES],
+    tangents: [[f32; 4]; LANES],
+    parameters: [f32; LANES],
+    /// In the output.
+    places: [usize; LANES],
+    count: usize,
+}
+
+/// What gives one sample.
+enum One<'a> {
+    Constant([f32; 4]),
+    Arc(&'a ArcSegment, f32),
+    Polynomial(&'a PolynomialSegment, Affine, f32),
+}
+
+impl InLanes for FewTimes<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let samples = self.window.samples.clone();
+        let mut block = Block {
+            middles: [[0.0; 4]; LANES],
+            tangents: [[0.0; 4]; LANES],
+            parameters: [0.0; LANES],
+            places: [0; LANES],
+            count: 0,
+        };
+        for (i, track) in self.window.tracks.clone().enumerate() {
+            let Some(part) = self.clip.only_part(track) else {
+                self.others.push(i);
+                continue;
+            };
+            let times = &self.times[track * self.stride..][samples.clone()];
+            for (k, &time) in times.iter().enumerate() {
+                let place = i * samples.len() + k;
+                match part.at_time(time) {
+                    Some(One::Constant(rotation)) => self.output[place] = rotation,
+                    Some(One::Polynomial(segment, affine, distance)) => {
+                        self.output[place] = one(segment, affine, distance);
+                    }
+                    Some(One::Arc(segment, parameter)) => {
+                        block.middles[block.count] = segment.middle;
+                        block.tangents[block.count] = segment.tangent;
+                        block.parameters[block.count] = parameter;
+                        block.places[block.count] = place;
+                        block.count += 1;
+                        if block.count == LANES {
+                            block.flush::<L>(self.output);
+                        }
+                    }
+                    None => {
+                        self.others.push(i);
+                        break;
+                    }
+                }
+            }
+        }
+        block.flush::<L>(self.output);
+    }
+}
+
+impl Block {
+    #[inline(always)]
+    fn flush<L: Lanes>(&mut self, output: &mut [[f32; 4]]) {
+        let mut rotations = [[0.0; 4]; LANES];
+        for j in (0..self.count).step_by(L::COUNT) {
+            let middle = L::load_rotations(&self.middles[j..]);
+            let tangent = L::load_rotations(&self.tangents[j..]);
+            let parameter = L::load(&self.parameters[j..]);
+            let found = on_arc(middle, tangent, square(tangent), parameter);
+            L::store_rotations(canonical(found), &mut rotations[j..j + L::COUNT]);
+        }
+        for (&place, rotation) in self.places[..self.count].iter().zip(rotations) {
+            output[place] = rotation;
+        }
+        self.count = 0;
+    }
+}
+
+impl<'a> PartRef<'a> {
+    /// What gives the rotation at a time; nothing where that takes more than to look.
+    #[inline(always)]
+    fn at_time(self, time: f64) -> Option<One<'a>> {
+        let PartRef { prepared, part } = self;
+        let (index, middle, affine) = match prepared.source_at(part, time)? {
+            RunSource::Constant(index) => {
+                return Some(One::Constant(prepared.constants[index as usize]));
+            }
+            RunSource::Segment {
+                index,
+                distance: Distance::Seconds { middle },
+                scale,
+                offset,
+            } => (index as usize, middle, Affine { scale, offset }),
+            _ => return None,
+        };
+        let distance = round_f32(time - middle);
+        match &prepared.segments {
+            Segments::Arc(arcs) => {
+                let parameter = distance * affine.scale + affine.offset;
+                Some(One::Arc(&arcs[index], parameter))
+            }
+            Segments::Polynomial(all) => Some(One::Polynomial(&all[index], affine, distance)),
+        }
+    }
+}

@@ -1,0 +1,450 @@
+//! Long results go to memory past the caches, where a processor gains by it: whole cache lines
+//! as they are made. What is not whole yet, and what is not made in order, lies on a stage,
+//! memory that stays in the first cache.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::cpu::destination::Places;
+use crate::cpu::evaluate::{Affine, Evaluate, FEW, frames, frames_past_caches};
+use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
+use crate::simd::lanes::Lanes;
+
+/// Bytes of a result of which caches keep so little that its reader misses nothing.
+const LONG: usize = 32 << 20;
+
+/// Samples of a row with which what a stage costs is less than what it saves.
+const ROW: usize = 64;
+
+/// Four rotations, a cache line of most processors.
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(C, align(64))]
+pub(crate) struct Line([[f32; 4]; EACH]);
+
+/// Rotations of a line.
+pub(crate) const EACH: usize = 4;
+
+/// Lines of a stage.
+const LINES: usize = 512;
+
+/// Rows one behind the other: where they are made, and where they go.
+pub(crate) struct Stage<'o> {
+    width: VectorWidth,
+    place: Place<'o>,
+    /// `None` where rows are made in their places.
+    lines: Option<Box<[Line; LINES]>>,
+    /// Rotations on the stage, from the start of its first line on.
+    filled: usize,
+}
+
+/// What has not been stored to.
+struct Place<'o> {
+    /// Everything where there is no stage; else what lies before the first whole line, whose
+    /// rotations are the last ones of the stage's first line.
+    before: &'o mut [[f32; 4]],
+    lines: &'o mut [Line],
+    after: &'o mut [[f32; 4]],
+    /// Lines of the stage that are stored.
+    stored: usize,
+}
+
+impl<'o> Stage<'o> {
+    /// For `output`, rows of so many `samples`, a part of a result of so many `rotations`. How
+    /// many samples a run has on average is only asked where all else is long enough.
+    pub(crate) fn new(
+        width: VectorWidth,
+        rotations: usize,
+        samples: usize,
+        samples_of_a_run: impl FnOnce() -> usize,
+        output: &'o mut [[f32; 4]],
+    ) -> Self {
+        #[cfg(test)]
+        if tests::IS_STAGED.get() {
+            return Self::with(width, true, output);
+        }
+        let is_staged = rotations >= LONG / size_of::<[f32; 4]>()
+            && samples >= ROW
+            && streaming_stores_from().is_some_and(|from| width.narrowed() >= from)
+            && samples_of_a_run() > FEW;
+        Self::with(width, is_staged, output)
+    }
+
+    fn with(width: VectorWidth, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
+        // Where rotations may lie across lines they are made in their places.
+        let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
+        if !is_staged || !is_aligned {
+            let place = Place {
+                before: output,
+                lines: &mut [],
+                after: &mut [],
+                stored: 0,
+            };
+            return Self {
+                width,
+                place,
+                lines: None,
+                filled: 0,
+            };
+        }
+        let (before, lines, after) = bytemuck::pod_align_to_mut(output);
+        let filled = before.len().wrapping_neg() % EACH;
+        let place = Place {
+            before,
+            lines,
+            after,
+            stored: 0,
+        };
+        Self {
+            width,
+            place,
+            lines: Some(bytemuck::zeroed_box()),
+            filled,
+        }
+    }
+
+    /// Makes the next row, some samples at a time.
+    pub(crate) fn row<E>(
+        &mut self,
+        count: usize,
+        mut make: impl FnMut(Range<usize>, &mut Output<'_, 'o>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut first = 0;
+        while first < count {
+            if self.filled + count - first > EACH * LINES {
+                self.clear();
+            }
+            let Some(lines) = &mut self.lines else {
+                let all = std::mem::take(&mut self.place.before);
+                let (row, others) = all.split_at_mut(count);
+                self.place.before = others;
+                return make(0..count, &mut Output::Here(row));
+            };
+            let piece = (count - first).min(EACH * LINES - self.filled);
+            let mut output = Output::Staged(Staged {
+                lines: &mut lines[..],
+                start: self.filled,
+                end: self.filled + piece,
+                made: self.filled,
+                place: &mut self.place,
+            });
+            make(first..first + piece, &mut output)?;
+            self.filled += piece;
+            first += piece;
+        }
+        Ok(())
+    }
+
+    /// When all rows are made.
+    pub(crate) fn finish(mut self) {
+        self.clear();
+        if let Some(lines) = &self.lines {
+            let rest = &lines[0].0[..self.filled];
+            self.place.after.copy_from_slice(rest);
+        }
+    }
+
+    /// Stores the whole lines of the stage; the rest moves to its start.
+    fn clear(&mut self) {
+        let Some(lines) = &mut self.lines else {
+            return;
+        };
+        let whole = self.filled / EACH;
+        let mut store = Store {
+            lines: &lines[..whole],
+            place: &mut self.place,
+        };
+        in_lanes_of(self.width, &mut store);
+        if whole < LINES {
+            lines[0] = lines[whole];
+        }
+        self.filled %= EACH;
+        self.place.stored = 0;
+    }
+}
+
+impl Drop for Stage<'_> {
+    fn drop(&mut self) {
+        if self.lines.is_some() {
+            fence();
+        }
+    }
+}
+
+impl<'o> Place<'o> {
+    /// Stores the first lines of the stage, but for those that are stored.
+    #[inline(always)]
+    fn store<L: Lanes>(&mut self, lines: &[Line]) {
+        if let [first, ..] = lines
+            && !self.before.is_empty()
+        {
+            let before = std::mem::take(&mut self.before);
+            before.copy_from_slice(&first.0[EACH - before.len()..]);
+            self.stored = 1;
+        }
+        if lines.len() > self.stored {
+            let lines = &lines[self.stored..];
+            let places = bytemuck::cast_slice_mut(self.next(lines.len()));
+            for (block, place) in bytemuck::cast_slice(lines).iter().zip(places) {
+                L::of_block(block).store_past_caches(place);
+            }
+        }
+    }
+
+    /// The places of the next lines, which are stored there.
+    #[inline(always)]
+    fn next(&mut self, count: usize) -> &'o mut [Line] {
+        let (lines, others) = std::mem::take(&mut self.lines).split_at_mut(count);
+        self.lines = others;
+        self.stored += count;
+        lines
+    }
+}
+
+struct Store<'s, 'o> {
+    lines: &'s [Line],
+    place: &'s mut Place<'o>,
+}
+
+impl InLanes for Store<'_, '_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        self.place.store::<L>(self.lines);
+    }
+}
+
+/// Where some samples of a row are made.
+pub(crate) enum Output<'s, 'o> {
+    /// Where they stay.
+    Here(&'s mut [[f32; 4]]),
+    Staged(Staged<'s, 'o>),
+}
+
+/// Samples on a stage.
+pub(crate) struct Staged<'s, 'o> {
+    /// All of it.
+    lines: &'s mut [Line],
+    /// The first of the samples, and their end.
+    start: usize,
+    end: usize,
+    /// What of the stage is made, without a gap.
+    made: usize,
+    place: &'s mut Place<'o>,
+}
+
+impl Output<'_, '_> {
+    pub(crate) fn samples(&mut self) -> &mut [[f32; 4]] {
+        match self {
+            Self::Here(samples) => samples,
+            Self::Staged(staged) => staged.samples(),
+        }
+    }
+}
+
+/// [`Output`] with nothing to tell apart for each run.
+pub(crate) trait Samples {
+    fn samples(&mut self) -> &mut [[f32; 4]];
+
+    /// Makes `count` samples from `start` on, frames of a segment, the first at that distance
+    /// from its middle.
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+    );
+
+    /// Some of them are made, and do not change any more.
+    fn made(&mut self, samples: Range<usize>);
+}
+
+impl Samples for [[f32; 4]] {
+    #[inline(always)]
+    fn samples(&mut self) -> &mut [[f32; 4]] {
+        self
+    }
+
+    #[inline(always)]
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+    ) {
+        frames::<L, S>(segment, affine, first, count, &mut self[start..]);
+    }
+
+    #[inline(always)]
+    fn made(&mut self, _: Range<usize>) {}
+}
+
+impl Samples for Staged<'_, '_> {
+    #[inline(always)]
+    fn samples(&mut self) -> &mut [[f32; 4]] {
+        let stage: &mut [[f32; 4]] = bytemuck::cast_slice_mut(self.lines);
+        &mut stage[self.start..self.end]
+    }
+
+    #[inline(always)]
+    fn frames<L: Lanes, S: Evaluate>(
+        &mut self,
+        segment: &S,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+    ) {
+        let own = self.start + start;
+        let (line, end) = (own / EACH, own + count);
+        let is_next = self.made == own;
+        if is_next && count > FEW && end / EACH < LINES {
+            // What lies before them and waits.
+            self.place.store::<L>(&self.lines[..line]);
+            if self.place.before.is_empty() {
+                let places = Places {
+                    begun: (self.lines[line], own % EACH),
+                    whole: self.place.next(end / EACH - line),
+                    rest: &mut self.lines[end / EACH],
+                };
+                frames_past_caches::<L, S>(segment, affine, first, count, places);
+                self.made = end;
+                return;
+            }
+        }
+        frames::<L, S>(segment, affine, first, count, &mut self.samples()[start..]);
+        if is_next {
+            self.made = end;
+        }
+    }
+
+    #[inline(always)]
+    fn made(&mut self, samples: Range<usize>) {
+        if self.start + samples.start <= self.made {
+            self.made = self.made.max(self.start + samples.end);
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::cell::Cell;
+    use std::convert::Infallible;
+
+    use glam::Quat;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::device::{Device, EngineOptions};
+    use crate::engine::Engine;
+    use crate::method;
+    use crate::method::interpolation::Interpolation;
+    use crate::output::rotations::Layout;
+    use crate::simd::dispatch::VectorWidth;
+    use crate::time::frames::Frames;
+    use crate::time::wrap::Outside;
+    use crate::tracks::set::swinging;
+
+    thread_local! {
+        /// Whether this thread makes all rows on a stage.
+        pub(crate) static IS_STAGED: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Catches lines stored before they are whole, to another place or not at all, and what
+    /// is left between rows, wherever the output starts.
+    #[test]
+    fn rows_come_to_their_places() {
+        let run = |rows: Vec<(usize, usize)>, shift: usize, width| {
+            let all: usize = rows.iter().map(|row| row.0).sum();
+            let mut memory = vec![Quat::from_array([-1.0; 4]); shift + all + 9];
+            let memory: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut memory);
+            let mut stage = Stage::with(width, true, &mut memory[shift..shift + all]);
+            let mut next = 0.0;
+            for (count, each) in rows {
+                let row = stage.row(count, |samples, output| {
+                    assert_eq!(output.samples().len(), samples.len());
+                    for from in (0..samples.len()).step_by(each) {
+                        let to = (from + each).min(samples.len());
+                        for place in &mut output.samples()[from..to] {
+                            *place = [next; 4];
+                            next += 1.0;
+                        }
+                        // Some are not told of at once.
+                        if let Output::Staged(staged) = output
+                            && from % 3 != 1
+                        {
+                            staged.made(from..to);
+                        }
+                    }
+                    Ok::<(), Infallible>(())
+                });
+                let Ok(()) = row;
+            }
+            stage.finish();
+            let expected = (0..all).map(|k| [k as f32; 4]);
+            assert!(memory[shift..shift + all].iter().copied().eq(expected));
+            let (before, after) = (&memory[..shift], &memory[shift + all..]);
+            assert!(before.iter().chain(after).all(|rest| *rest == [-1.0; 4]));
+        };
+        let row = (1usize..5000, 1usize..99);
+        let widths = proptest::sample::select(VectorWidth::available());
+        let strategy = (proptest::collection::vec(row, 1..9), 0usize..8, widths);
+        proptest!(|((rows, shift, width) in strategy)| run(rows, shift, width));
+    }
+
+    /// Frames, times in any order, and copies of a track, by arcs and by polynomials, with
+    /// vectors of every width; from a clip and from keys.
+    #[test]
+    fn rows_on_a_stage_have_the_bits_of_others() {
+        let widths = VectorWidth::available().into_iter();
+        for (width, uneven) in widths.flat_map(|width| [(width, true), (width, false)]) {
+            let set = swinging(4, 26, uneven);
+            let options = EngineOptions {
+                vector_width: Some(width),
+                ..EngineOptions::default()
+            };
+            let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+            for (method, after) in [
+                (method::SLERP, Outside::Hold),
+                (method::BESSEL_OVERHAUSER, Outside::Hold),
+                (method::BESSEL_OVERHAUSER, Outside::Loop),
+            ] {
+                let interpolation = Interpolation {
+                    after,
+                    ..method.into()
+                };
+                let clip = engine.upload(&set, interpolation).unwrap();
+                let times = (0..2500).map(|k| f64::from(k * 617 % 2500) * 0.01 - 2.0);
+                for frames in [
+                    Frames::fps(60),
+                    Frames::fps(24).between(3.01, 17.0),
+                    Frames::fps(120).between(-3.0, 25.0),
+                    Frames::at(times.collect()),
+                ] {
+                    let expected = clip.evaluate(&frames).unwrap();
+                    let expected = bytemuck::cast_slice::<Quat, u32>(expected.as_quats());
+                    let count = expected.len() / 4;
+                    // So few are evaluated on this thread.
+                    assert!(count <= 16 * 1024);
+                    for shift in 0..4 {
+                        let mut found = vec![Quat::IDENTITY; count + 3];
+                        let found = &mut found[shift..][..count];
+                        let layout = Layout::TrackMajor;
+                        IS_STAGED.set(true);
+                        let done = if shift % 2 == 0 {
+                            clip.evaluate_into(&frames, layout, found)
+                        } else {
+                            engine.evaluate_into(&set, interpolation, &frames, layout, found)
+                        };
+                        IS_STAGED.set(false);
+                        done.unwrap();
+                        assert_eq!(expected, bytemuck::cast_slice::<Quat, u32>(found));
+                    }
+                }
+            }
+        }
+    }
+}

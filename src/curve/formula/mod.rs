@@ -1,0 +1,101 @@
+//! Formulas: what lies between two keys, in f64, as a function of the parameter from 0
+//! to 1. A formula takes [`NUMBERS`] of its own making; methods say what they are.
+//!
+//! Kernels do not evaluate formulas: they evaluate the polynomials that are fitted to
+//! them, the same form for all.
+
+pub(crate) mod de_casteljau;
+pub(crate) mod hermite;
+pub(crate) mod line;
+pub(crate) mod product;
+pub(crate) mod rotation_vector;
+pub(crate) mod squad;
+
+use crate::math::dual::Scalar;
+
+/// How many numbers a formula may take.
+pub(crate) const NUMBERS: usize = 25;
+
+/// The numbers of one curve.
+pub(crate) type Numbers = [f64; NUMBERS];
+
+/// A curve in the rotations.
+pub(crate) trait Formula: 'static {
+    /// The rotation at `t`; `#[inline(always)]` and without branches. A vector of times takes
+    /// vectors of numbers.
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4];
+}
+
+/// The quaternion that starts at a place among the numbers.
+#[inline(always)]
+fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize) -> [S; 4] {
+    [
+        S::constant(numbers[place]),
+        S::constant(numbers[place + 1]),
+        S::constant(numbers[place + 2]),
+        S::constant(numbers[place + 3]),
+    ]
+}
+
+/// The vector that starts at a place among the numbers, times `k`.
+#[inline(always)]
+fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize, k: S) -> [S; 3] {
+    [
+        S::constant(numbers[place]) * k,
+        S::constant(numbers[place + 1]) * k,
+        S::constant(numbers[place + 2]) * k,
+    ]
+}
+
+/// The Hamilton product `a b`.
+#[inline(always)]
+fn product<S: Scalar>(a: [S; 4], b: [S; 4]) -> [S; 4] {
+    [
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    ]
+}
+
+/// The exponential of a half-rotation vector.
+#[inline(always)]
+fn exp<S: Scalar>([x, y, z]: [S; 3]) -> [S; 4] {
+    let (sinc, cosine) = (x * x + y * y + z * z).waves();
+    [sinc * x, sinc * y, sinc * z, cosine]
+}
+
+/// `q / |q|`.
+#[inline(always)]
+fn normalised<S: Scalar>([x, y, z, w]: [S; 4]) -> [S; 4] {
+    let scale = (x * x + y * y + z * z + w * w).reciprocal_root();
+    [x * scale, y * scale, z * scale, w * scale]
+}
+
+/// `a u + b v`.
+#[inline(always)]
+fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
+    [
+        a[0] * u + b[0] * v,
+        a[1] * u + b[1] * v,
+        a[2] * u + b[2] * v,
+        a[3] * u + b[3] * v,
+    ]
+}
+
+/// Slerp, the arc that the signs give: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`
+/// (Shoemake 1985), but for a factor; its ends may depend on time too.
+///
+/// The sines are written `x sinc(x²)` and the angle by its square, which is smooth in
+/// the chord between the ends: there is no special case for a small angle.
+#[inline(always)]
+fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
+    let minus = S::all(-1.0);
+    let [x, y, z, w] = weighted(b, S::all(1.0), a, minus);
+    let chord = (x * x + y * y + z * z + w * w) * S::all(0.25);
+    let square = chord.arc_square();
+    let rest = S::all(1.0) - t;
+    let (to_b, _) = (t * t * square).waves();
+    let (to_a, _) = (rest * rest * square).waves();
+    normalised(weighted(a, rest * to_a, b, t * to_b))
+}

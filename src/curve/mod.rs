@@ -1,0 +1,4 @@
+//! TODO-DOC
+
+pub(crate) mod formula;
+pub(crate) mod segment;

@@ -1,0 +1,214 @@
+//! Twin of `shaders/sampled_arcs.wgsl` and `shaders/sampled_pairs.wgsl`: samples by two
+//! keys, in lanes.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
+
+use crate::math::canonical::canonical;
+use crate::prepare::arcs::arc_lanes;
+use crate::prepare::arcs::arc_lanes::{LANES as ARC_LANES, arc_anyhow, arc_in_lanes, whole};
+use crate::prepare::constant_velocity::arc_component;
+use crate::shader::Form;
+use crate::shader::IS_KEY;
+use crate::shader::KeySample;
+use crate::simd::dispatch::InLanes;
+use crate::simd::lanes::{self, Lanes, Number};
+use crate::twin::evaluate_arc::{on_arc, square};
+use crate::twin::evaluate_polynomial::polynomial;
+
+/// Samples, or intervals, worked out together.
+pub(crate) const LANES: usize = ARC_LANES;
+
+/// Samples that wait, one behind the other in the result.
+pub(crate) struct SampleBlock {
+    pub(crate) form: Form,
+    /// The keys beside each; the same one twice where the sample is that key.
+    pub(crate) from: [[f32; 4]; LANES],
+    pub(crate) to: [[f32; 4]; LANES],
+    pub(crate) signs: [f32; LANES],
+    pub(crate) parameters: [f32; LANES],
+    pub(crate) count: usize,
+    pub(crate) rotations: [[f32; 4]; LANES],
+}
+
+impl SampleBlock {
+    pub(crate) fn new(form: Form) -> Self {
+        let identity = [0.0, 0.0, 0.0, 1.0];
+        Self {
+            form,
+            from: [identity; LANES],
+            to: [identity; LANES],
+            signs: [1.0; LANES],
+            parameters: [0.0; LANES],
+            count: 0,
+            rotations: [identity; LANES],
+        }
+    }
+}
+
+impl InLanes for SampleBlock {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
+        // Their signs are as stored.
+        match self.form {
+            Form::Arc => self.arcs::<L>(),
+            Form::Polynomial => self.polynomials::<L>(),
+        }
+    }
+}
+
+impl SampleBlock {
+    #[inline(always)]
+    fn arcs<L: Lanes>(&mut self) {
+        let mut arcs = Arcs::<L>::new();
+        for first in (0..self.count).step_by(VECTORS * L::COUNT) {
+            let end = self.count.min(first + VECTORS * L::COUNT);
+            for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                let from = L::load_rotations(&self.from[j..]);
+                arcs.put(vector, from, L::load_rotations(&self.to[j..]));
+            }
+            for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                let (sign, parameter) = (L::load(&self.signs[j..]), L::load(&self.parameters[j..]));
+                let rotations = &mut self.rotations[j..j + L::COUNT];
+                L::store_rotations(arcs.at(vector, sign, parameter), rotations);
+            }
+        }
+        if arcs.any_in_doubt {
+            for lane in 0..self.count {
+                let (arc, _) = arc_anyhow(self.from[lane], self.to[lane]);
+                let (sign, parameter) = (self.signs[lane], self.parameters[lane]);
+                self.rotations[lane] = at(arc.middle, arc.tangent, sign, parameter);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn polynomials<L: Lanes>(&mut self) {
+        let arcs = arc_lanes::arcs::<L>(&self.from, &self.to, self.count);
+        let squares = arcs.squares();
+        let mut found = [[0.0; LANES]; 4];
+        for c in 0..4 {
+            let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
+            for j in 0..LANES {
+                let own = arc_component(middle[j], tangent[j], squares[j]);
+                lanes[j] = canonical(polynomial(own, self.parameters[j]));
+            }
+        }
+        self.keep(&found);
+    }
+
+    /// Components side by side to rotations.
+    #[inline(always)]
+    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
+        let mut rotations = [[0.0; 4]; LANES];
+        for j in 0..whole(self.count) {
+            rotations[j] = [x[j], y[j], z[j], w[j]];
+        }
+        self.rotations = rotations;
+    }
+}
+
+/// Vectors of arcs that are made before the first is evaluated: a processor looks ahead a
+/// vector or two, and one that goes all the way is a long chain to wait for.
+const VECTORS: usize = 8;
+
+/// Arcs in vectors.
+struct Arcs<L> {
+    middles: [[L; 4]; VECTORS],
+    tangents: [[L; 4]; VECTORS],
+    any_in_doubt: bool,
+}
+
+impl<L: Lanes> Arcs<L> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            middles: [[L::all(0.0); 4]; VECTORS],
+            tangents: [[L::all(0.0); 4]; VECTORS],
+            any_in_doubt: false,
+        }
+    }
+
+    /// The arcs of a vector.
+    #[inline(always)]
+    fn put(&mut self, vector: usize, from: [L; 4], to: [L; 4]) {
+        let arcs = arc_in_lanes(from, to);
+        self.middles[vector % VECTORS] = arcs.middle;
+        self.tangents[vector % VECTORS] = arcs.tangent;
+        self.any_in_doubt |= arcs.any_in_doubt;
+    }
+
+    /// Their rotations.
+    #[inline(always)]
+    fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
+        let (middle, tangent) = (
+            self.middles[vector % VECTORS],
+            self.tangents[vector % VECTORS],
+        );
+        at(middle, tangent, sign, parameter)
+    }
+}
+
+/// A rotation of an arc whose first key has that sign.
+#[inline(always)]
+fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
+    let [x, y, z, w] = on_arc(middle, tangent, square(tangent), parameter);
+    // With the other sign, every operation gives what it gives, with the other sign.
+    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
+}
+
+/// Samples of one track on arcs, in one sign, straight into the result.
+pub(crate) struct ArcRun<'a> {
+    pub(crate) samples: &'a [KeySample],
+    pub(crate) keys: &'a [[f32; 4]],
+    pub(crate) sign: f32,
+    pub(crate) output: &'a mut [[f32; 4]],
+    /// How many are worked out: whole vectors.
+    pub(crate) done: usize,
+}
+
+impl InLanes for ArcRun<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let whole = self.samples.len() / L::COUNT * L::COUNT;
+        let samples = self.samples[..whole].chunks(LANES);
+        let mut arcs = Arcs::<L>::new();
+        let (mut from, mut to, mut parameters) = ([0; LANES], [0; LANES], [0.0; LANES]);
+        for (samples, rotations) in samples.zip(self.output.chunks_mut(LANES)) {
+            let count = samples.len();
+            let mut any = 0;
+            for (j, sample) in samples.iter().enumerate() {
+                any |= sample.key;
+                from[j] = sample.key & !IS_KEY;
+                // Behind the last key there is none.
+                to[j] = from[j] + u32::from(sample.key & IS_KEY == 0);
+                parameters[j] = sample.parameter;
+            }
+            arcs.any_in_doubt = false;
+            let sign = L::all(self.sign);
+            for first in (0..count).step_by(VECTORS * L::COUNT) {
+                let end = count.min(first + VECTORS * L::COUNT);
+                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                    let start = L::gather_rotations(self.keys, &from[j..]);
+                    arcs.put(vector, start, L::gather_rotations(self.keys, &to[j..]));
+                }
+                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
+                    let found = arcs.at(vector, sign, L::load(&parameters[j..]));
+                    L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
+                }
+            }
+            if arcs.any_in_doubt || any & IS_KEY != 0 {
+                for j in 0..count {
+                    let (start, end) = (self.keys[from[j] as usize], self.keys[to[j] as usize]);
+                    if from[j] == to[j] {
+                        rotations[j] = start;
+                    } else if arcs.any_in_doubt {
+                        let (arc, _) = arc_anyhow(start, end);
+                        rotations[j] = at(arc.middle, arc.tangent, self.sign, parameters[j]);
+                    }
+                }
+            }
+        }
+        self.done = whole;
+    }
+}

@@ -1,0 +1,157 @@
+//! Twin of `shaders/sampled_cubics.wgsl`: cubics with fewer samples than keys, in lanes.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
+
+use crate::from_keys::arcs::LANES;
+use crate::math::canonical::canonical;
+use crate::prepare::arcs::arc_lanes::whole;
+use crate::prepare::tangent_weights::UNKNOWN;
+use crate::shader::TangentWeights;
+use crate::simd::dispatch::InLanes;
+use crate::simd::lanes::Lanes;
+use crate::twin::small_angle::{signed, small_angle_cubic};
+
+/// Samples that wait, one behind the other in the result.
+pub(crate) struct CubicBlock {
+    /// The four keys about each, in the signs that those before them give, but for one
+    /// that they share.
+    pub(crate) keys: [[[f32; 4]; LANES]; 4],
+    pub(crate) signs: [f32; LANES],
+    /// Of the two keys beside it.
+    pub(crate) weights: [[TangentWeights; LANES]; 2],
+    pub(crate) parameters: [f32; LANES],
+    /// 1 where the sample is the key before it.
+    pub(crate) held: [f32; LANES],
+    pub(crate) count: usize,
+    /// 0 where the curve turns too much.
+    pub(crate) rotations: [[f32; 4]; LANES],
+    /// How many of those there were.
+    pub(crate) wild: usize,
+}
+
+impl CubicBlock {
+    pub(crate) fn new() -> Self {
+        let identity = [0.0, 0.0, 0.0, 1.0];
+        Self {
+            keys: [[identity; LANES]; 4],
+            signs: [1.0; LANES],
+            weights: [[UNKNOWN; LANES]; 2],
+            parameters: [0.0; LANES],
+            held: [0.0; LANES],
+            count: 0,
+            rotations: [identity; LANES],
+            wild: 0,
+        }
+    }
+}
+
+impl InLanes for CubicBlock {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
+        let mut wild = 0;
+        let [before, start, end, after] = &self.keys;
+        let [first, last] = &self.weights;
+        for j in 0..whole(self.count) {
+            let sign = self.signs[j];
+            let keys = [
+                signed(before[j], sign),
+                signed(start[j], sign),
+                signed(end[j], sign),
+                signed(after[j], sign),
+            ];
+            let curve = small_angle_cubic(keys, first[j], last[j]);
+            let c = &curve.powers;
+            let s = self.parameters[j];
+            let t = s * s;
+            let is_held = self.held[j] == 1.0;
+            let found = if curve.holds { 1.0 } else { 0.0 };
+            macro_rules! component {
+                ($c:literal) => {{
+                    let third = c[3][$c] * s + c[2][$c];
+                    let high = c[6][$c] * t + (c[5][$c] * s + c[4][$c]);
+                    let gain = high * (t * t) + (third * t + c[1][$c] * s);
+                    let own = canonical(c[0][$c] + gain);
+                    let own = if curve.holds { own } else { 0.0 };
+                    if is_held { start[j][$c] } else { own }
+                }};
+            }
+            (x[j], y[j], z[j], w[j]) = (component!(0), component!(1), component!(2), component!(3));
+            wild += u32::from(found + self.held[j] == 0.0);
+        }
+        for j in 0..whole(self.count) {
+            self.rotations[j] = [x[j], y[j], z[j], w[j]];
+        }
+        self.wild += wild as usize;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::prepare::tangent_weights::WeightRule;
+    use crate::simd::dispatch::in_lanes;
+    use crate::simd::dispatch::tests::at_every_width;
+
+    /// Catches a wrong digit in a coefficient, which both twins would share, and an
+    /// instruction set whose code fuses: what turns evenly stays even.
+    #[test]
+    fn constant_velocity_stays_constant_at_every_width() {
+        let axis = DVec3::new(0.48, -0.6, 0.64);
+        let key = |turn: f64| {
+            let rotation = DQuat::from_xyzw(0.1, 0.7, -0.5, 0.5).normalize();
+            rotation * DQuat::from_axis_angle(axis, turn)
+        };
+        let results = at_every_width(|| {
+            let mut block = CubicBlock::new();
+            block.count = LANES;
+            for lane in 0..LANES {
+                let turn = 0.1 * lane as f64 / LANES as f64;
+                for (place, keys) in block.keys.iter_mut().enumerate() {
+                    keys[lane] = key(turn * (place as f64 - 1.5)).as_quat().to_array();
+                }
+                let joint = WeightRule::ByTime.between(1.0, 1.0);
+                block.weights = [[joint; LANES]; 2];
+                block.parameters[lane] = (lane as f32 * 0.618).fract() - 0.5;
+            }
+            in_lanes(&mut block);
+            block
+        });
+        let (_, expected) = &results[0];
+        for (width, found) in &results {
+            assert_eq!(found.wild, 0, "{width:?}");
+            for lane in 0..LANES {
+                let [one, other] = [expected, found].map(|all| all.rotations[lane]);
+                assert_eq!(one.map(f32::to_bits), other.map(f32::to_bits), "{width:?}");
+                let turn = 0.1 * lane as f64 / LANES as f64;
+                let exact = key(turn * f64::from(found.parameters[lane])).to_array();
+                for (c, exact) in exact.into_iter().enumerate() {
+                    assert!((f64::from(one[c]) - exact).abs() < 1.5e-7, "{lane}");
+                }
+            }
+        }
+    }
+
+    /// Catches a curve that is evaluated where the series does not hold.
+    #[test]
+    fn what_turns_too_much_is_left_out() {
+        let mut block = CubicBlock::new();
+        block.count = 3;
+        let joint = WeightRule::Alike.between(1.0, 1.0);
+        block.weights = [[joint; LANES]; 2];
+        let turned = |turn: f32| glam::Quat::from_rotation_z(turn).to_array();
+        for (place, keys) in block.keys.iter_mut().enumerate() {
+            keys[0] = turned(0.1 * place as f32);
+            keys[1] = turned(0.2 * place as f32);
+            keys[2] = turned(0.1 * place as f32);
+        }
+        block.weights[0][2] = UNKNOWN;
+        block.held[3..].fill(1.0);
+        in_lanes(&mut block);
+        assert_eq!(block.wild, 2);
+        assert_ne!(block.rotations[0], [0.0; 4]);
+        assert_eq!(block.rotations[1..3], [[0.0; 4]; 2]);
+    }
+}

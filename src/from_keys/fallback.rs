@@ -1,0 +1,186 @@
+//! Samples that were left out because their curves turn too much to be made straight from
+//! the keys: their intervals alone are prepared.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::cpu::engine::CpuEngine;
+use crate::cpu::scratch::Memory;
+use crate::cpu::streaming::Output;
+use crate::engine::Error;
+use crate::method::interpolation::{Interpolation, Path};
+use crate::prepare::clip_data::PartRef;
+use crate::prepare::set::BATCH;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::wrap::Cycle;
+use crate::tracks::set::TrackSet;
+use crate::tracks::signs::flip;
+
+/// What stands for a sample that was left out: no rotation is 0.
+pub(crate) const LEFT_OUT: [f32; 4] = [0.0; 4];
+
+/// Intervals between two that are wanted, up to which they are one piece.
+const APART: usize = 2;
+
+/// Some samples of a track.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'a> {
+    pub(crate) set: &'a TrackSet,
+    pub(crate) index: usize,
+    pub(crate) interpolation: &'a Interpolation,
+    pub(crate) timeline: &'a Timeline,
+    /// The first of them.
+    pub(crate) first: usize,
+    /// A key that none of them lies before, and its sign.
+    pub(crate) key: usize,
+    pub(crate) sign: f32,
+}
+
+/// Samples that were left out, and those between them.
+struct Piece {
+    intervals: Range<usize>,
+    samples: Range<usize>,
+    sign: f32,
+}
+
+/// Pieces that are prepared together, with their places in the result, and the sign of
+/// their first keys.
+type Batch<'o> = (Vec<(Piece, &'o mut [[f32; 4]])>, f32);
+
+impl CpuEngine {
+    /// Works out what was left out of a row.
+    pub(crate) fn mend(&self, row: Row<'_>, mut output: &mut [[f32; 4]]) -> Result<(), Error> {
+        let pieces = row.pieces(output);
+        let mut from = row.first;
+        let mut work = Vec::with_capacity(pieces.len());
+        for piece in pieces {
+            let others = &mut output[piece.samples.start - from..];
+            let (own, others) = others.split_at_mut(piece.samples.len());
+            (from, output) = (piece.samples.end, others);
+            work.push((piece, own));
+        }
+        let track = row.set.track(row.index);
+        let mend = |(batch, sign): Batch<'_>| -> Result<(), Error> {
+            let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
+            let Memory {
+                prepared,
+                preparation,
+                ..
+            } = &mut memory;
+            prepared.clear();
+            let intervals = batch.iter().map(|(piece, _)| piece.intervals.clone());
+            preparation.push_pieces(prepared, track, row.index, intervals)?;
+            if sign < 0.0 {
+                prepared.negate(row.interpolation);
+            }
+            for (part, (piece, own)) in prepared.parts.iter().zip(batch) {
+                let part = PartRef { prepared, part };
+                let own = &mut Output::Here(own);
+                self.part(part, row.timeline, &Cycle::own(piece.samples), own)?;
+            }
+            self.memories.give_back(memory);
+            Ok(())
+        };
+        let (turned, others): (Vec<_>, Vec<_>) =
+            work.into_iter().partition(|(piece, _)| piece.sign < 0.0);
+        let mut batches: Vec<Batch<'_>> = Vec::new();
+        for (work, sign) in [(turned, -1.0), (others, 1.0)] {
+            let mut intervals = BATCH;
+            for (piece, own) in work {
+                if intervals >= BATCH {
+                    batches.push((Vec::new(), sign));
+                    intervals = 0;
+                }
+                intervals += piece.intervals.len();
+                if let Some((batch, _)) = batches.last_mut() {
+                    batch.push((piece, own));
+                }
+            }
+        }
+        batches.into_par_iter().try_for_each(mend)
+    }
+}
+
+impl<'a> Row<'a> {
+    /// All samples of a track.
+    pub(crate) fn whole(
+        set: &'a TrackSet,
+        index: usize,
+        interpolation: &'a Interpolation,
+        timeline: &'a Timeline,
+    ) -> Self {
+        Self {
+            set,
+            index,
+            interpolation,
+            timeline,
+            first: 0,
+            key: 0,
+            sign: 1.0,
+        }
+    }
+
+    fn pieces(&self, output: &[[f32; 4]]) -> Vec<Piece> {
+        let (times, _) = self.set.times_and_keys(self.index);
+        let last = times.len() - 1;
+        let mut pieces: Vec<Piece> = Vec::new();
+        let Ticks::Frames { rate, start } = self.timeline.ticks else {
+            // They may be in any order.
+            if output.contains(&LEFT_OUT) {
+                pieces.push(Piece {
+                    intervals: 0..last,
+                    samples: self.first..self.first + output.len(),
+                    sign: 1.0,
+                });
+            }
+            return pieces;
+        };
+        let clock = FrameClock::new(rate, start, times[last]);
+        for (sample, rotation) in (self.first..).zip(output) {
+            if *rotation != LEFT_OUT {
+                continue;
+            }
+            let time = self.timeline.time(self.index, sample);
+            let after = times.partition_point(|&key| key <= time);
+            let mut interval = after.saturating_sub(1).clamp(self.key, last - 1);
+            // A sample within rounding of a key is that key.
+            while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
+                interval += 1;
+            }
+            while interval > self.key && clock.first_frame(times[interval]) > sample as f64 {
+                interval -= 1;
+            }
+            match pieces.last_mut() {
+                Some(Piece {
+                    intervals, samples, ..
+                }) if interval <= intervals.end + APART && intervals.len() < BATCH => {
+                    (intervals.end, samples.end) = (interval + 1, sample + 1);
+                }
+                _ => pieces.push(Piece {
+                    intervals: interval..interval + 1,
+                    samples: sample..sample + 1,
+                    sign: 1.0,
+                }),
+            }
+        }
+        if self.interpolation.path == Path::Shortest {
+            self.align(&mut pieces);
+        }
+        pieces
+    }
+
+    /// The signs of the first keys of pieces.
+    fn align(&self, pieces: &mut [Piece]) {
+        let keys: &[[f32; 4]] = bytemuck::cast_slice(self.set.times_and_keys(self.index).1);
+        let (mut key, mut sign) = (self.key, self.sign);
+        for piece in pieces {
+            while key < piece.intervals.start {
+                sign *= flip(keys[key], keys[key + 1]);
+                key += 1;
+            }
+            piece.sign = sign;
+        }
+    }
+}

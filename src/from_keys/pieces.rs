@@ -1,0 +1,315 @@
+//! Sets with fewer samples than keys on a Vulkan device: keys go there as they are stored,
+//! with where the samples lie among them, some tracks at a time. Nothing is prepared.
+
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::CpuEngine;
+use crate::engine::Error;
+use crate::from_keys::evaluate::{Straight, straight};
+use crate::from_keys::fallback::{LEFT_OUT, Row};
+use crate::method::interpolation::{Ends, Interpolation, Path};
+use crate::output::rotations::Layout;
+use crate::prepare::tangent_weights::WeightRule;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::key_samples::Stretch;
+use crate::tracks::set::TrackSet;
+
+use crate::from_keys::upload::turned;
+
+/// Rows of one piece: workgroups along y.
+const ROWS: usize = 65_535;
+
+/// Keys that one thread brings at once.
+const TASK_KEYS: usize = 16 * 1024;
+
+/// What is to be evaluated.
+pub(crate) struct KeyJob<'a> {
+    pub(crate) set: &'a TrackSet,
+    pub(crate) tracks: Range<usize>,
+    pub(crate) interpolation: &'a Interpolation,
+    pub(crate) timeline: &'a Timeline,
+    /// What its samples are made of.
+    pub(crate) straight: Straight,
+}
+
+impl<'a> KeyJob<'a> {
+    /// Nothing where a device needs segments. It gets about `most` keys and samples at
+    /// once.
+    pub(crate) fn new(
+        set: &'a TrackSet,
+        tracks: Range<usize>,
+        interpolation: &'a Interpolation,
+        timeline: &'a Timeline,
+        layout: Layout,
+        most: usize,
+    ) -> Option<Self> {
+        let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
+        let straight = straight(set, interpolation, timeline)?;
+        // Arcs of more than half a turn need segments.
+        let is_shortest = interpolation.path == Path::Shortest;
+        // Where samples are explicit times, a track is not cut.
+        let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
+        let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
+        let suits = is_row && by_pieces && is_shortest;
+        suits.then_some(Self {
+            set,
+            tracks,
+            interpolation,
+            timeline,
+            straight,
+        })
+    }
+
+    /// Those of cubics; arcs have none.
+    pub(crate) fn weights(&self) -> Option<WeightRule> {
+        match self.straight {
+            Straight::Cubics(weights) => Some(weights),
+            Straight::Arcs | Straight::Pairs => None,
+        }
+    }
+
+    /// All keys of the set, where kernels can read them as they are stored: weights lie as
+    /// the keys of a piece do.
+    pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
+        self.weights().is_none().then_some(self.set.keys())
+    }
+
+    /// Works out on the CPU what the device left 0, because it turns too much.
+    pub(crate) fn mend(&self, output: &mut [[f32; 4]]) -> Result<(), Error> {
+        let left_out = |some: &[[f32; 4]]| some.contains(&LEFT_OUT);
+        if self.weights().is_none() || !output.par_chunks(TASK_KEYS).any(left_out) {
+            return Ok(());
+        }
+        let engine = CpuEngine::widest();
+        let rows = output.par_chunks_mut(self.timeline.len());
+        (rows.zip(self.tracks.clone())).try_for_each(|(row, index)| {
+            let whole = Row::whole(self.set, index, self.interpolation, self.timeline);
+            engine.mend(whole, row)
+        })
+    }
+
+    /// The pieces of it, which lie in the result one behind the other.
+    pub(crate) fn pieces(&self) -> KeyPieces<'a, '_> {
+        KeyPieces {
+            job: self,
+            next: self.tracks.start,
+            long: None,
+        }
+    }
+}
+
+/// Some samples of a track, and the keys that they lie among.
+pub(crate) struct Part<'a> {
+    pub(crate) stretch: Stretch<'a>,
+    pub(crate) window: Range<usize>,
+    /// The sign of its first key.
+    pub(crate) sign: f32,
+}
+
+/// What a device gets at once.
+pub(crate) struct KeyPiece<'a, 'j> {
+    pub(crate) job: &'j KeyJob<'a>,
+    pub(crate) tasks: Vec<Task<'a>>,
+    /// Rows, all of whose samples lie alike among their keys.
+    pub(crate) rows: usize,
+    pub(crate) keys: usize,
+    /// Samples of which the kernel is told where they lie: those of one row.
+    pub(crate) samples: usize,
+}
+
+/// What one thread writes of a piece.
+pub(crate) struct Task<'a> {
+    pub(crate) what: What<'a>,
+    pub(crate) keys: usize,
+    pub(crate) samples: usize,
+}
+
+pub(crate) enum What<'a> {
+    /// All of some tracks.
+    Tracks(Range<usize>),
+    Part(Part<'a>),
+}
+
+/// Walks over a job.
+pub(crate) struct KeyPieces<'a, 'j> {
+    pub(crate) job: &'j KeyJob<'a>,
+    /// The next track.
+    next: usize,
+    /// The rest of a track that is more than a piece: what is left of it, from the key,
+    /// whose sign is known, and the sample on.
+    long: Option<Long>,
+}
+
+#[derive(Clone, Copy)]
+struct Long {
+    track: usize,
+    key: usize,
+    pub(crate) sign: f32,
+    sample: usize,
+}
+
+impl<'a, 'j> KeyPieces<'a, 'j> {
+    /// The next piece, of about so many keys and so many samples at most.
+    pub(crate) fn next(&mut self, most: usize) -> Result<Option<KeyPiece<'a, 'j>>, Error> {
+        let job = self.job;
+        if let Some(piece) = self.next_of_long(most) {
+            return Ok(Some(piece));
+        }
+        let (set, samples, first) = (job.set, job.timeline.len(), self.next);
+        let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
+        // The first track of `tracks` that is not among those with so many keys together.
+        let within = |tracks: Range<usize>, most: usize| {
+            let (mut low, mut high) = (tracks.start, tracks.end);
+            while low < high {
+                let middle = low.midpoint(high);
+                if set.keys_of(tracks.start..middle + 1) <= most {
+                    low = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
+            low
+        };
+        let rows = most / samples.max(1);
+        let end = within(first..job.tracks.end, most).min(first.saturating_add(rows));
+        let is_long = end == first;
+        self.next = job.tracks.end.min(end.max(first + 1));
+        job.check(first..self.next)?;
+        if first == self.next {
+            return Ok(None);
+        }
+        if is_long && in_frames {
+            self.long = Some(Long {
+                track: first,
+                key: 0,
+                sign: 1.0,
+                sample: 0,
+            });
+            return Ok(self.next_of_long(most));
+        }
+        let mut tasks = Vec::new();
+        let mut start = first;
+        while start < self.next {
+            let end = within(start..self.next, TASK_KEYS).max(start + 1);
+            tasks.push(Task {
+                what: What::Tracks(start..end),
+                keys: set.keys_of(start..end),
+                samples: (end - start) * samples,
+            });
+            start = end;
+        }
+        let times = |track| set.times_and_keys(track).0;
+        let tracks = self.next - first;
+        let alike = in_frames
+            && tracks <= ROWS
+            && (first..self.next).all(|track| std::ptr::eq(times(first), times(track)));
+        let rows = if alike { tracks } else { 1 };
+        Ok(Some(KeyPiece {
+            job,
+            tasks,
+            rows,
+            keys: set.keys_of(first..self.next),
+            samples: tracks / rows * samples,
+        }))
+    }
+
+    /// The next piece of a track that is more than a piece: parts for as many threads.
+    fn next_of_long(&mut self, most: usize) -> Option<KeyPiece<'a, 'j>> {
+        let mut piece = KeyPiece {
+            job: self.job,
+            tasks: Vec::new(),
+            rows: 1,
+            keys: 0,
+            samples: 0,
+        };
+        let each = most.min(TASK_KEYS);
+        while let Some(long) = self.long {
+            let is_full = piece.keys.max(piece.samples) + each > most;
+            if is_full && !piece.tasks.is_empty() {
+                break;
+            }
+            let part = self.part_of(long, each);
+            let (keys, samples) = (part.stretch.keys.len(), part.window.len());
+            piece.keys += keys;
+            piece.samples += samples;
+            piece.tasks.push(Task {
+                what: What::Part(part),
+                keys,
+                samples,
+            });
+        }
+        (!piece.tasks.is_empty()).then_some(piece)
+    }
+
+    /// A stretch of a track that is more than a piece, and what of it is left.
+    fn part_of(&mut self, long: Long, most: usize) -> Part<'a> {
+        let whole = Stretch::whole(self.job.set, long.track);
+        let times = whole.times;
+        let samples = self.job.timeline.len();
+        let last = whole.all - 1;
+        let last_key = (long.key + most - 1).min(last);
+        let end = match self.job.clock(times) {
+            Some(clock) if last_key < last => clock.first_frame(times[last_key]) as usize,
+            _ => samples,
+        };
+        let end = end.clamp(long.sample, samples);
+        let sample = end.min(long.sample + most);
+        self.long = if sample < end {
+            Some(Long { sample, ..long })
+        } else if sample < samples {
+            let sign = turned(&whole.between(long.key, last_key), long.sign, |_| {});
+            Some(Long {
+                key: last_key,
+                sign,
+                sample,
+                ..long
+            })
+        } else {
+            None
+        };
+        // Cubics look at the keys beside their own too.
+        let beside = usize::from(self.job.weights().is_some());
+        let first = long.key.saturating_sub(beside);
+        let before = whole.between(first, long.key);
+        Part {
+            stretch: whole.between(first, (last_key + beside).min(last)),
+            window: long.sample..sample,
+            sign: long.sign * turned(&before, 1.0, |_| {}),
+        }
+    }
+}
+
+impl<'a> KeyJob<'a> {
+    /// Refuses tracks that do not end as they must.
+    fn check(&self, tracks: Range<usize>) -> Result<(), Error> {
+        let ends = self.interpolation.ends;
+        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
+            for track in tracks {
+                ends.check(self.set.times_and_keys(track).1, track)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All of a track.
+    pub(crate) fn track(&self, index: usize) -> Part<'a> {
+        Part {
+            stretch: Stretch::whole(self.set, index),
+            window: 0..self.timeline.len(),
+            sign: 1.0,
+        }
+    }
+
+    fn clock(&self, times: &[f64]) -> Option<FrameClock> {
+        match self.timeline.ticks {
+            Ticks::Frames { rate, start } => {
+                Some(FrameClock::new(rate, start, times[times.len() - 1]))
+            }
+            Ticks::Times { .. } => None,
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! What a kernel reads of a piece: its keys with their signs, where the samples lie, and weights.
+
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::from_keys::pieces::{KeyJob, KeyPiece, Part, What};
+use crate::prepare::tangent_weights::TrackWeights;
+use crate::shader::{IS_KEY, SIGN_TURNED};
+use crate::shader::{KeySample, RowShape, TangentWeights};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{FramesError, Ticks};
+use crate::time::key_samples::{FramePlan, Stretch, TimeLanes, key_before};
+use crate::tracks::set::TrackSet;
+use crate::tracks::signs::any_turns;
+use crate::tracks::signs::flip;
+
+impl KeyPiece<'_, '_> {
+    pub(crate) fn rows(&self) -> RowShape {
+        RowShape {
+            samples: self.samples as u32,
+            keys: (self.keys / self.rows) as u32,
+            count: self.rows as u32,
+        }
+    }
+
+    /// Rotations that it becomes.
+    pub(crate) fn rotation_count(&self) -> usize {
+        self.samples * self.rows
+    }
+
+    /// Bytes of its keys, the samples, the rotations and the weights.
+    pub(crate) fn bytes(&self) -> [usize; 4] {
+        let weights = match self.job.weights() {
+            Some(_) => self.keys / self.rows,
+            None => 0,
+        };
+        [
+            self.keys * size_of::<Quat>(),
+            self.samples * size_of::<KeySample>(),
+            self.rotation_count() * size_of::<Quat>(),
+            weights * size_of::<TangentWeights>(),
+        ]
+    }
+
+    /// Writes what the kernel reads; false, and nothing that counts, where keys are lent of
+    /// which one is turned by those before it, or may be.
+    pub(crate) fn write(
+        &self,
+        keys: Keys<'_>,
+        mut samples: &mut [KeySample],
+        mut weights: &mut [TangentWeights],
+    ) -> Result<bool, FramesError> {
+        let (mut keys, lent) = match keys {
+            Keys::Copied(keys) => (keys, None),
+            Keys::Lent(first) => (&mut [][..], Some(first)),
+        };
+        let mut first_key = 0;
+        let mut places = Vec::with_capacity(self.tasks.len());
+        for task in &self.tasks {
+            // Where all rows are alike only the first one's are told.
+            let (told, joined) = match self.rows {
+                1 => (task.samples, task.keys.min(weights.len())),
+                _ => (samples.len(), weights.len()),
+            };
+            let (own_keys, other_keys) = keys.split_at_mut(task.keys.min(keys.len()));
+            let (own_samples, other_samples) = samples.split_at_mut(told);
+            let (own_joints, other_joints) = weights.split_at_mut(joined);
+            (keys, samples, weights) = (other_keys, other_samples, other_joints);
+            let written = Written {
+                keys: own_keys,
+                samples: own_samples,
+                weights: own_joints,
+                next_key: first_key,
+                lent,
+            };
+            places.push((task, written));
+            first_key += task.keys;
+        }
+        let ends = self.job.interpolation.ends;
+        let rule = self.job.weights();
+        let new = || Known {
+            frames: FramePlan::new(),
+            weights: rule.map(|rule| TrackWeights::new(rule, ends)),
+        };
+        let written =
+            places
+                .into_par_iter()
+                .try_for_each_init(new, |known, (task, mut written)| {
+                    let tracks = match &task.what {
+                        What::Part(part) => return self.write_part(part, known, &mut written),
+                        What::Tracks(tracks) => tracks.clone(),
+                    };
+                    if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
+                        let mut of_tracks = TimesOfTracks {
+                            set: self.job.set,
+                            tracks: tracks.clone(),
+                            times,
+                            stride: *stride,
+                            each: self.job.timeline.len(),
+                            first_key: written.place_of(self.job.set, tracks.start, 0),
+                            samples: std::mem::take(&mut written.samples),
+                            looks: written.lent.is_some() && self.job.set.turns(),
+                            turns: false,
+                        };
+                        in_lanes(&mut of_tracks);
+                        if written.lent.is_some() {
+                            return if of_tracks.turns {
+                                Err(Stop::Turned)
+                            } else {
+                                Ok(())
+                            };
+                        }
+                    }
+                    tracks.into_iter().try_for_each(|index| {
+                        self.write_part(&self.job.track(index), known, &mut written)
+                    })
+                });
+        match written {
+            Ok(()) => Ok(true),
+            Err(Stop::Turned) => Ok(false),
+            Err(Stop::Frames(error)) => Err(error),
+        }
+    }
+
+    fn write_part<'p>(
+        &self,
+        part: &Part<'p>,
+        known: &mut Known<'p>,
+        written: &mut Written<'_>,
+    ) -> Result<(), Stop> {
+        let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
+        let first_key = written.place_of(self.job.set, part.stretch.index, part.stretch.first_key);
+        if written.lent.is_none() {
+            let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
+            own.copy_from_slice(keys);
+            turned(&part.stretch, part.sign, |key| own[key][0] |= SIGN_TURNED);
+            written.keys = others;
+        } else if part.sign < 0.0 || part.stretch.turns() {
+            return Err(Stop::Turned);
+        }
+        if !written.samples.is_empty() {
+            let all = std::mem::take(&mut written.samples);
+            let (own, others) = all.split_at_mut(part.window.len());
+            self.write_frames(part, first_key as u32, own, known)?;
+            written.samples = others;
+        }
+        if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
+            let all = std::mem::take(&mut written.weights);
+            let (own, others) = all.split_at_mut(keys.len());
+            let Stretch {
+                times,
+                first_key,
+                all,
+                ..
+            } = part.stretch;
+            own.copy_from_slice(weights.of(times, first_key, all));
+            written.weights = others;
+        }
+        written.next_key += keys.len();
+        Ok(())
+    }
+
+    /// Where the samples of a part lie, but those at explicit times.
+    fn write_frames<'p>(
+        &self,
+        part: &Part<'p>,
+        first_key: u32,
+        samples: &mut [KeySample],
+        known: &mut Known<'p>,
+    ) -> Result<(), FramesError> {
+        let KeyJob { set, timeline, .. } = self.job;
+        let Ticks::Frames { rate, start } = timeline.ticks else {
+            return Ok(());
+        };
+        let all = set.times_and_keys(part.stretch.index).0;
+        let clock = FrameClock::new(rate, start, all[all.len() - 1]);
+        let found = known.frames.samples(part.stretch, clock, &part.window)?;
+        for (sample, found) in samples.iter_mut().zip(found) {
+            *sample = KeySample {
+                key: found.key + first_key,
+                ..*found
+            };
+        }
+        Ok(())
+    }
+}
+
+/// Explicit times of some tracks, which may be many with a sample each.
+struct TimesOfTracks<'a> {
+    set: &'a TrackSet,
+    tracks: Range<usize>,
+    /// As in [`Ticks::Times`].
+    times: &'a [f64],
+    stride: usize,
+    /// Samples of each track.
+    each: usize,
+    /// The place of the tracks' first key.
+    first_key: usize,
+    samples: &'a mut [KeySample],
+    /// Whether to look for keys that those before them turn.
+    looks: bool,
+    /// Whether there are any, or may be.
+    turns: bool,
+}
+
+impl InLanes for TimesOfTracks<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (mut first_key, mut done) = (self.first_key as u32, 0);
+        let mut found = TimeLanes::new();
+        for index in self.tracks.clone() {
+            let (starts, keys) = self.set.times_and_keys(index);
+            if self.looks && any_turns(bytemuck::cast_slice(keys)) {
+                self.turns = true;
+                return;
+            }
+            let mut near = 0;
+            for &time in &self.times[index * self.stride..][..self.each] {
+                let key = key_before(starts, time, near);
+                near = (key & !IS_KEY) as usize;
+                let (start, end) = match key & IS_KEY {
+                    0 => (starts[near], starts[near + 1]),
+                    _ => (0.0, 1.0),
+                };
+                found.push(key + first_key, time, start, end);
+                if found.count == TimeLanes::LEN {
+                    done += found.write(&mut self.samples[done..]);
+                }
+            }
+            first_key += keys.len() as u32;
+        }
+        found.write(&mut self.samples[done..]);
+    }
+}
+
+impl TimeLanes {
+    /// Writes the samples that wait; how many.
+    #[inline(always)]
+    fn write(&mut self, samples: &mut [KeySample]) -> usize {
+        let count = std::mem::take(&mut self.count);
+        let parameters = self.parameters();
+        for (lane, sample) in samples[..count].iter_mut().enumerate() {
+            *sample = KeySample {
+                key: self.sources[lane],
+                parameter: parameters[lane],
+            };
+        }
+        count
+    }
+}
+
+/// Where a kernel reads the keys of a piece.
+pub(crate) enum Keys<'w> {
+    /// Here, with their signs.
+    Copied(&'w mut [[u32; 4]]),
+    /// Where they are stored; the set's first one has this place. None is turned.
+    Lent(usize),
+}
+
+/// What a thread finds out, and keeps for the next track.
+struct Known<'p> {
+    frames: FramePlan<'p>,
+    /// Those of cubics.
+    weights: Option<TrackWeights<'p>>,
+}
+
+/// What a thread has still to write.
+struct Written<'w> {
+    keys: &'w mut [[u32; 4]],
+    samples: &'w mut [KeySample],
+    weights: &'w mut [TangentWeights],
+    /// The place of the next key among the piece's.
+    next_key: usize,
+    /// The place of the set's first key, where keys are read as they are stored.
+    lent: Option<usize>,
+}
+
+impl Written<'_> {
+    /// The place of a track's key, which is the next one where keys are copied.
+    fn place_of(&self, set: &TrackSet, track: usize, key: usize) -> usize {
+        self.lent
+            .map_or(self.next_key, |first| first + set.keys_of(0..track) + key)
+    }
+}
+
+/// Why a thread writes no more.
+enum Stop {
+    /// A key that is lent is turned.
+    Turned,
+    Frames(FramesError),
+}
+
+impl From<FramesError> for Stop {
+    fn from(error: FramesError) -> Self {
+        Self::Frames(error)
+    }
+}
+
+/// Calls `turn` for each key whose sign those before it turn, where the first one's is
+/// given; the sign of the last.
+pub(crate) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
+    if first > 0.0 && !stretch.turns() {
+        return first;
+    }
+    let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
+    let mut sign = first;
+    for (i, key) in keys.iter().enumerate() {
+        if i > 0 {
+            sign *= flip(keys[i - 1], *key);
+        }
+        if sign < 0.0 {
+            turn(i);
+        }
+    }
+    sign
+}

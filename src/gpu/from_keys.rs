@@ -1,0 +1,247 @@
+//! Fewer samples than keys, straight from keys: two pieces are in flight, the
+//! host brings the keys of one while the device works on the other.
+
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
+
+use glam::Quat;
+
+use crate::engine::Error;
+use crate::from_keys::evaluate::Straight;
+use crate::from_keys::pieces::{KeyJob, KeyPiece};
+use crate::from_keys::upload::Keys;
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::engine::{SLOTS, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::gpu::imported_memory::Lent;
+use crate::gpu::in_flight::{Slot, Stopwatch, Target, copy};
+use crate::gpu::pipeline::Pipeline;
+use crate::gpu::submission::{Access, Binding, Submission};
+use crate::shader::Kernel;
+use crate::shader::{FROM_KEYS_WORKGROUP, ROWS_PER_INVOCATION};
+
+/// What one piece in flight needs; the submission comes first, so that it is waited for
+/// before its buffers go.
+pub(crate) struct KeySlot {
+    submission: Submission,
+    keys: Option<Buffer>,
+    samples: Option<Buffer>,
+    rotations: Option<Buffer>,
+    weights: Option<Buffer>,
+    /// Where the result of the piece in flight goes, bytes.
+    output: Range<usize>,
+    /// As [`Slot::compiled`].
+    compiled: bool,
+}
+
+/// Memory of the caller's.
+struct Borrowed<'a> {
+    /// The set's keys, where kernels may read them there.
+    keys: Option<Lent<'a>>,
+    target: Target<'a>,
+}
+
+impl Borrowed<'_> {
+    /// See [`Lent::has_come_back`].
+    fn has_come_back(&mut self) {
+        if let Some(keys) = &mut self.keys {
+            keys.has_come_back();
+        }
+        if let Target::Lent(output) = &mut self.target {
+            output.has_come_back();
+        }
+    }
+}
+
+impl VulkanEngine {
+    /// Evaluates a job, whose result `output` fits.
+    pub(crate) fn evaluate_keys(
+        &self,
+        job: &KeyJob<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), Error> {
+        let mut slots = self
+            .key_slots
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        while slots.len() < SLOTS {
+            slots.push(KeySlot::new(&self.device)?);
+        }
+        let each = size_of::<Quat>();
+        // A piece's result may begin anywhere.
+        let alignment = self
+            .device
+            .physical
+            .info
+            .min_storage_buffer_offset_alignment;
+        let lends = self.lends && alignment <= each as u64;
+        let output = bytemuck::cast_slice_mut(output);
+        let mut lent = Borrowed {
+            keys: (job.keys().filter(|_| lends && self.device.reads_texels))
+                .and_then(|keys| Lent::to_read(&self.device, bytemuck::cast_slice(keys)))
+                .filter(|keys| keys.start().is_multiple_of(each)),
+            target: match lends {
+                true => Lent::to_write(&self.device, output, each)
+                    .map_or_else(Target::Slice, Target::Lent),
+                false => Target::Slice(output),
+            },
+        };
+        let mut stopwatch = Stopwatch::default();
+        let mut next = 0;
+        let mut result = self.submit_pieces(job, &mut slots, &mut next, &mut lent, &mut stopwatch);
+        // Also after an error: what was submitted uses the slots' buffers.
+        for i in 1..=SLOTS {
+            let finished = slots[(next + i) % SLOTS].finish(&mut lent.target, &mut stopwatch);
+            result = result.and(finished.map_err(Error::from));
+        }
+        if result.is_ok() {
+            lent.has_come_back();
+        }
+        if stopwatch.is_slow() {
+            self.halve_windows(); // those of the next call
+        }
+        if result.is_err() {
+            slots.clear(); // a fence or a recording may be half way
+        }
+        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
+        result
+    }
+
+    fn submit_pieces(
+        &self,
+        job: &KeyJob<'_>,
+        slots: &mut [KeySlot],
+        next: &mut usize,
+        lent: &mut Borrowed<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), Error> {
+        let kernel = match job.straight {
+            Straight::Arcs => Kernel::FromKeysArcs,
+            Straight::Pairs => Kernel::FromKeysTwoKeys,
+            Straight::Cubics(_) => Kernel::FromKeysCubics,
+        };
+        let pipeline = self.pipeline(kernel)?;
+        let mut pieces = job.pieces();
+        let mut start = 0;
+        loop {
+            if stopwatch.is_slow() {
+                self.halve_windows();
+            }
+            let Some(piece) = pieces.next(self.window())? else {
+                return Ok(());
+            };
+            *next = (*next + 1) % SLOTS;
+            let slot = &mut slots[*next];
+            slot.finish(&mut lent.target, stopwatch)?;
+            let writing = Instant::now();
+            let own = start..start + piece.rotation_count() * size_of::<Quat>();
+            slot.start(&self.device, &pipeline, &piece, lent, own.clone())?;
+            stopwatch.timings.work_lists += writing.elapsed();
+            start = own.end;
+        }
+    }
+}
+
+impl KeySlot {
+    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            submission: Submission::new(device)?,
+            keys: None,
+            samples: None,
+            rotations: None,
+            weights: None,
+            output: 0..0,
+            compiled: false,
+        })
+    }
+
+    /// Submits one piece, whose result is that stretch of all, bytes.
+    fn start(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        pipeline: &Pipeline,
+        piece: &KeyPiece<'_, '_>,
+        lent: &Borrowed<'_>,
+        output: Range<usize>,
+    ) -> Result<(), Error> {
+        let [key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
+        let place = match &lent.target {
+            Target::Lent(memory) if !output.is_empty() => {
+                rotation_bytes = 0;
+                let start = memory.start() + output.start;
+                let size = output.len() as u64;
+                Some(Binding::stretch(memory.raw(), start as u64, size))
+            }
+            _ => None,
+        };
+        let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
+            Slot::grow(device, buffer, bytes as u64, residence)
+        };
+        room(&mut self.samples, sample_bytes, Residence::Upload)?;
+        room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
+        room(&mut self.weights, joint_bytes.max(1), Residence::Upload)?;
+        let (Some(samples), Some(rotations), Some(weights)) =
+            (&mut self.samples, &self.rotations, &mut self.weights)
+        else {
+            unreachable!("grown above");
+        };
+        let mut write = |keys: Keys<'_>| {
+            piece.write(
+                keys,
+                bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
+                bytemuck::cast_slice_mut(weights.bytes_mut(0..joint_bytes)),
+            )
+        };
+        let keys = match &lent.keys {
+            Some(keys) if write(Keys::Lent(keys.start() / size_of::<Quat>()))? => keys.binding(),
+            _ => {
+                room(&mut self.keys, key_bytes, Residence::Upload)?;
+                let Some(keys) = &mut self.keys else {
+                    unreachable!("grown above");
+                };
+                let copied = bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes));
+                write(Keys::Copied(copied))?;
+                Binding::whole(keys)
+            }
+        };
+        let mut bindings = vec![keys, Binding::whole(samples)];
+        if joint_bytes > 0 {
+            bindings.push(Binding::whole(weights));
+        }
+        bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));
+        let rows = piece.rows();
+        let groups = [
+            rows.samples.div_ceil(FROM_KEYS_WORKGROUP),
+            rows.count.div_ceil(ROWS_PER_INVOCATION),
+        ];
+        self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
+        self.submission.begin(1)?;
+        self.submission
+            .dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
+        self.submission.barrier(Access::Kernel, Access::Host);
+        self.submission.submit()?;
+        self.output = output;
+        Ok(())
+    }
+
+    /// Waits for the piece in flight, if any, and brings its results home.
+    fn finish(
+        &mut self,
+        target: &mut Target<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError> {
+        if let Some(spent) = self.submission.wait()? {
+            stopwatch.ran(spent, self.compiled);
+        }
+        let copying = Instant::now();
+        let own = std::mem::take(&mut self.output);
+        if let (Target::Slice(output), Some(rotations)) = (target, &self.rotations) {
+            copy(&mut output[own.clone()], rotations.bytes(0..own.len()));
+        }
+        stopwatch.timings.read_back += copying.elapsed();
+        Ok(())
+    }
+}

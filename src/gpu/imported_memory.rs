@@ -1,0 +1,115 @@
+//! The caller's own memory, which software devices work on without a copy.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::gpu::buffer::Buffer;
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::submission::Binding;
+
+/// Less than this is copied sooner than lent.
+const LEAST: usize = 1 << 20;
+
+/// What is lent consists of whole pages, which are at least this large.
+const PAGE: usize = 4096;
+
+/// Memory that a device may read or write as long as this lives.
+pub(crate) struct Lent<'a> {
+    device: Arc<LogicalDevice>,
+    /// The pages that it lies in.
+    buffer: Buffer,
+    /// Where it starts in them.
+    start: usize,
+    memory: NonNull<u8>,
+    size: usize,
+    /// All that was submitted has ended.
+    is_idle: bool,
+    lender: PhantomData<&'a mut [u8]>,
+}
+
+impl<'a> Lent<'a> {
+    /// For kernels to write results of `each` bytes; the memory itself where they cannot.
+    pub(crate) fn to_write(
+        device: &Arc<LogicalDevice>,
+        bytes: &'a mut [u8],
+        each: usize,
+    ) -> Result<Self, &'a mut [u8]> {
+        let (size, start) = (bytes.len(), bytes.as_ptr().addr() % PAGE);
+        let alignment = device.physical.info.min_storage_buffer_offset_alignment as usize;
+        let is_aligned = |offset: usize| offset.is_multiple_of(alignment.max(1));
+        // A binding may begin at any result, or there is one before it at which it may.
+        let binds = is_aligned(start) && is_aligned(each) || start.is_multiple_of(each);
+        let lent = binds.then(|| Self::new(device, NonNull::from(&mut *bytes).cast(), size));
+        lent.flatten().ok_or(bytes)
+    }
+
+    /// For kernels to read.
+    pub(crate) fn to_read(device: &Arc<LogicalDevice>, bytes: &'a [u8]) -> Option<Self> {
+        Self::new(device, NonNull::from(bytes).cast(), bytes.len())
+    }
+
+    fn new(device: &Arc<LogicalDevice>, memory: NonNull<u8>, size: usize) -> Option<Self> {
+        let alignment = usize::try_from(device.physical.lent_alignment?).ok()?;
+        let start = memory.addr().get() % PAGE;
+        let pages = (start + size).next_multiple_of(PAGE);
+        let limit = device.physical.info.max_memory_allocation_size;
+        if size < LEAST || !PAGE.is_multiple_of(alignment) || pages as u64 > limit {
+            return None;
+        }
+        let first = NonNull::new(memory.as_ptr().wrapping_sub(start))?;
+        // SAFETY: pages that hold a byte of the process's memory are its own as a whole, and
+        // this keeps the memory borrowed until nothing works on it any more.
+        let buffer = unsafe { Buffer::around(device, "tumble lent", first, pages as u64) }?;
+        Some(Self {
+            device: Arc::clone(device),
+            buffer,
+            start,
+            memory,
+            size,
+            is_idle: false,
+            lender: PhantomData,
+        })
+    }
+
+    /// Where it starts in its buffer, bytes.
+    pub(crate) fn start(&self) -> usize {
+        self.start
+    }
+
+    /// The buffer around it.
+    pub(crate) fn raw(&self) -> vk::Buffer {
+        self.buffer.raw
+    }
+
+    /// All of that buffer.
+    pub(crate) fn binding(&self) -> Binding {
+        Binding::whole(&self.buffer)
+    }
+
+    /// Some of its bytes, to write: what no kernel works on.
+    pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
+        assert!(range.start <= range.end && range.end <= self.size);
+        // SAFETY: it is borrowed as a whole, and the range lies within it.
+        unsafe {
+            std::slice::from_raw_parts_mut(self.memory.as_ptr().add(range.start), range.len())
+        }
+    }
+
+    /// Says that all that was submitted has ended.
+    pub(crate) fn has_come_back(&mut self) {
+        self.is_idle = true;
+    }
+}
+
+impl Drop for Lent<'_> {
+    fn drop(&mut self) {
+        // After an error, or in a panic, something may be under way still.
+        if !self.is_idle {
+            self.device.wait_in_any_case();
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! What one window in flight needs, and what is done when it has been computed.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ash::vk;
+use rayon::prelude::*;
+
+use crate::device::Timings;
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::engine::EvaluateError;
+use crate::gpu::error::VulkanError;
+use crate::gpu::imported_memory::Lent;
+use crate::gpu::sample_list::Singles;
+use crate::gpu::submission::{Spent, Submission};
+use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};
+use crate::output::encoding::Encoding;
+use crate::prepare::clip_data::ClipData;
+use crate::shader::List;
+use crate::shader::{Item, ListedSample};
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::window::Window;
+
+/// What one window needs; the submission comes first, so that it is waited for
+/// before its buffers go.
+pub(crate) struct Slot {
+    pub(crate) submission: Submission,
+    /// Items and distances, as the host writes them.
+    pub(crate) items: Buffer,
+    pub(crate) distances: Buffer,
+    /// The same in the device's own memory, where that is not the host's.
+    pub(crate) device_items: Option<Buffer>,
+    pub(crate) device_distances: Option<Buffer>,
+    /// A window's rotations: where the kernel writes, and where the host reads.
+    pub(crate) rotations: Option<Buffer>,
+    pub(crate) readback: Option<Buffer>,
+    pub(crate) done: Option<Finish>,
+    /// Work lists to fill again.
+    pub(crate) spare: Vec<WorkChunk>,
+    /// The kernel has run before: some drivers compile at the first dispatch.
+    pub(crate) compiled: bool,
+}
+
+/// What is left to do when a window has been computed.
+pub(crate) struct Finish {
+    pub(crate) window: Window,
+    pub(crate) patches: Vec<Patch>,
+}
+
+/// Adds up where the time of an evaluation goes.
+#[derive(Default)]
+pub(crate) struct Stopwatch {
+    pub(crate) timings: Timings,
+    /// When the last window was seen to have ended: windows overlap, their times
+    /// must not count twice.
+    last: Option<Instant>,
+    /// A window took longer than [`LONG`].
+    slow: bool,
+}
+
+/// Systems take a device away from whoever keeps it busy for seconds (Windows after 2 s);
+/// other programs' pictures stand still long before that.
+const LONG: Duration = Duration::from_millis(100);
+
+impl Stopwatch {
+    pub(crate) fn ran(&mut self, spent: Spent, compiled: bool) {
+        let start = self
+            .last
+            .map_or(spent.submitted, |l| l.max(spent.submitted));
+        let waited = spent.finished - start;
+        let took = if spent.on_device.is_zero() {
+            waited
+        } else {
+            spent.on_device
+        };
+        self.slow |= compiled && took > LONG;
+        self.timings.submit_to_fence += waited;
+        self.timings.on_device += spent.on_device;
+        self.last = Some(spent.finished);
+    }
+
+    /// Whether a window took too long since this was last asked.
+    pub(crate) fn is_slow(&mut self) -> bool {
+        std::mem::take(&mut self.slow)
+    }
+}
+
+/// Where results go.
+pub(crate) enum Target<'a> {
+    /// Straight into a mapped buffer.
+    Buffer(&'a mut Buffer),
+    /// Straight into the caller's memory.
+    Lent(Lent<'a>),
+    /// Through a window's own buffer into the caller's memory.
+    Slice(&'a mut [u8]),
+    /// Into a buffer of the caller's.
+    External(External),
+}
+
+/// A stretch of a buffer that somebody else made on this device.
+#[derive(Clone, Copy)]
+pub(crate) struct External {
+    pub(crate) raw: vk::Buffer,
+    /// Where it starts, bytes.
+    pub(crate) offset: u64,
+}
+
+impl Slot {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            submission: Submission::new(device)?,
+            items: Buffer::new(device, "tumble items", 0, Residence::Upload)?,
+            distances: Buffer::new(device, "tumble distances", 0, Residence::Upload)?,
+            device_items: None,
+            device_distances: None,
+            rotations: None,
+            readback: None,
+            done: None,
+            spare: Vec::new(),
+            compiled: false,
+        })
+    }
+
+    /// Makes sure of a buffer of at least `size` bytes.
+    pub(crate) fn grow(
+        device: &Arc<LogicalDevice>,
+        buffer: &mut Option<Buffer>,
+        size: u64,
+        residence: Residence,
+    ) -> Result<(), VulkanError> {
+        if buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
+            *buffer = None; // before the new one, so that both need not fit
+            *buffer = Some(Buffer::new(device, "tumble window", size, residence)?);
+        }
+        Ok(())
+    }
+
+    /// Lists the work of a window where the device reads it, that of all groups one behind
+    /// the other; `shift` is added to every place in the output.
+    pub(crate) fn list(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        shift: u32,
+    ) -> Result<Work, EvaluateError> {
+        if let Some(singles) = Singles::new(clip, timeline, window) {
+            let bytes = singles.count() * size_of::<ListedSample>();
+            let list = room(device, &mut self.items, "tumble items", bytes)?;
+            return Ok(singles.write(bytemuck::cast_slice_mut(list), shift)?);
+        }
+        let lists = work(clip, timeline, window, shift, &mut self.spare)?;
+        let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
+        let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
+        let item_bytes = item_count * size_of::<Item>();
+        let items = room(device, &mut self.items, "tumble items", item_bytes)?;
+        let distance_bytes = distance_count * size_of::<f32>();
+        let distances = room(
+            device,
+            &mut self.distances,
+            "tumble distances",
+            distance_bytes,
+        )?;
+        write(
+            &lists,
+            bytemuck::cast_slice_mut(items),
+            bytemuck::cast_slice_mut(distances),
+        );
+        let mut work = Work {
+            list: match timeline.ticks {
+                Ticks::Frames { .. } => List::Frames,
+                Ticks::Times { .. } => List::Times,
+            },
+            groups: Vec::new(),
+            patches: Vec::new(),
+        };
+        for list in lists {
+            work.groups.push(GroupItems {
+                group: list.group,
+                items: list.item_count() as u32,
+                first_output: 0,
+            });
+            for mut chunk in list.chunks {
+                work.patches.append(&mut chunk.patches);
+                self.spare.push(chunk.cleared());
+            }
+        }
+        Ok(work)
+    }
+
+    /// Waits for the window in flight, if any, and brings its results home.
+    pub(crate) fn finish(
+        &mut self,
+        encoding: Encoding,
+        target: &mut Target<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError> {
+        if let Some(spent) = self.submission.wait()? {
+            stopwatch.ran(spent, self.compiled);
+        }
+        let copying = Instant::now();
+        let Some(Finish { window, patches }) = self.done.take() else {
+            return Ok(());
+        };
+        let rotation = encoding.bytes();
+        let all = window.start * rotation..(window.start + window.len()) * rotation;
+        let output: &mut [u8] = match target {
+            Target::Buffer(buffer) => buffer.bytes_mut(all),
+            Target::Lent(memory) => memory.bytes_mut(all),
+            Target::External(_) => &mut [],
+            Target::Slice(slice) => {
+                let output = &mut slice[all];
+                let written = self.readback.as_ref().or(self.rotations.as_ref());
+                let bytes = 0..output.len();
+                copy(
+                    output,
+                    written.map_or(&[][..], |buffer| buffer.bytes(bytes)),
+                );
+                output
+            }
+        };
+        for (place, value) in patches {
+            let place = place * rotation;
+            encoding.encode(&[value], &mut output[place..place + rotation]);
+        }
+        stopwatch.timings.read_back += copying.elapsed();
+        Ok(())
+    }
+}
+
+/// Room for so many bytes, where the host writes them.
+fn room<'b>(
+    device: &Arc<LogicalDevice>,
+    buffer: &'b mut Buffer,
+    name: &'static str,
+    bytes: usize,
+) -> Result<&'b mut [u8], VulkanError> {
+    if buffer.size() < bytes as u64 {
+        *buffer = Buffer::new(device, name, bytes as u64, Residence::Upload)?;
+    }
+    Ok(buffer.bytes_mut(0..bytes))
+}
+
+/// Writes the work lists of all groups, one behind the other.
+fn write(lists: &[GroupWork], mut items: &mut [Item], mut distances: &mut [f32]) {
+    let mut next_distance = 0;
+    let mut places = Vec::new();
+    for chunk in lists.iter().flat_map(|list| &list.chunks) {
+        let (own_items, other_items) = items.split_at_mut(chunk.items.len());
+        let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
+        (items, distances) = (other_items, others);
+        places.push((chunk, own_items, own_distances, next_distance));
+        next_distance += chunk.distances.len() as i32;
+    }
+    places
+        .into_par_iter()
+        .for_each(|(chunk, items, distances, first)| {
+            items.copy_from_slice(&chunk.items);
+            distances.copy_from_slice(&chunk.distances);
+            if !distances.is_empty() {
+                for item in items {
+                    item.first += first;
+                }
+            }
+        });
+}
+
+/// Bytes of a result that one thread copies at once.
+const COPIED: usize = 1 << 20;
+
+/// Copies a result, on all threads where it is long.
+pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
+    if to.len() <= COPIED {
+        return to.copy_from_slice(from);
+    }
+    let pieces = to.par_chunks_mut(COPIED).zip(from.par_chunks(COPIED));
+    pieces.for_each(|(to, from)| to.copy_from_slice(from));
+}

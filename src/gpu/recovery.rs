@@ -1,0 +1,179 @@
+//! An opened device that is kept at work: opened again when it is lost, asked for less at
+//! once when it has not the memory.
+
+use std::sync::{Arc, PoisonError, RwLock};
+
+use crate::device::EngineOptions;
+use crate::engine::Error;
+use crate::gpu::engine::{ClipBuffers, EvaluateError, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
+use crate::gpu::self_test::CanaryReport;
+use crate::prepare::clip_data::ClipData;
+
+/// How often a lost device is opened again for one call.
+const REOPENINGS: usize = 3;
+
+/// An open Vulkan device, and what is known of it.
+pub(crate) struct Opened {
+    /// Replaced when the device is lost.
+    current: RwLock<Arc<VulkanEngine>>,
+    options: EngineOptions,
+    pub(crate) canaries: Vec<CanaryReport>,
+    pub(crate) info: DeviceInfo,
+}
+
+/// What an error says of the device.
+pub(crate) trait OfDevice: From<VulkanError> {
+    fn vulkan(&self) -> Option<&VulkanError>;
+}
+
+impl OfDevice for VulkanError {
+    fn vulkan(&self) -> Option<&VulkanError> {
+        Some(self)
+    }
+}
+
+impl OfDevice for EvaluateError {
+    fn vulkan(&self) -> Option<&VulkanError> {
+        match self {
+            Self::Vulkan(error) => Some(error),
+            Self::Frames(_) => None,
+        }
+    }
+}
+
+impl OfDevice for Error {
+    fn vulkan(&self) -> Option<&VulkanError> {
+        match self {
+            Self::Vulkan(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl Opened {
+    /// Opens a device and runs the canaries; refuses one that fails them, unless told
+    /// otherwise.
+    pub(crate) fn new(
+        physical: &PhysicalDevice,
+        options: &EngineOptions,
+    ) -> Result<Self, VulkanError> {
+        let mut losses = 0;
+        loop {
+            let opened = VulkanEngine::new(physical.clone(), options)
+                .and_then(|engine| Self::trusted(engine, options));
+            match opened {
+                Err(error) if error.is_lost() && losses < REOPENINGS => losses += 1,
+                opened => return opened,
+            }
+        }
+    }
+
+    /// As [`Opened::new`], a device that is open.
+    pub(crate) fn trusted(
+        engine: VulkanEngine,
+        options: &EngineOptions,
+    ) -> Result<Self, VulkanError> {
+        Ok(Self {
+            canaries: trust(&engine, options)?,
+            info: engine.info().clone(),
+            current: RwLock::new(Arc::new(engine)),
+            options: options.clone(),
+        })
+    }
+
+    pub(crate) fn engine(&self) -> Arc<VulkanEngine> {
+        Arc::clone(&self.current.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Does some work, again on the same device opened anew when it is lost, at most
+    /// three times. What is done twice gives the same bits.
+    pub(crate) fn attempt<T, E: OfDevice>(
+        &self,
+        mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
+    ) -> Result<T, E> {
+        for _ in 0..REOPENINGS {
+            let engine = self.engine();
+            match work(&engine) {
+                Err(error) if error.vulkan().is_some_and(VulkanError::is_lost) => {
+                    match self.reopen(&engine) {
+                        Ok(true) => {}
+                        Err(again) if again.is_lost() => {}
+                        Ok(false) => return Err(error),
+                        Err(other) => return Err(other.into()),
+                    }
+                }
+                done => return done,
+            }
+        }
+        work(&self.engine())
+    }
+
+    /// Brings a clip's segments to the device; where memory is short, with what is kept for
+    /// the next evaluation given back.
+    pub(crate) fn upload(
+        &self,
+        clip: &ClipData,
+        mut spare: Option<ClipBuffers>,
+    ) -> Result<ClipBuffers, VulkanError> {
+        self.attempt(|engine| match engine.upload(clip, spare.take()) {
+            Err(error) if error.is_out_of_memory() && engine.give_back() => {
+                engine.upload(clip, None)
+            }
+            done => done,
+        })
+    }
+
+    /// As [`Opened::attempt`]; where memory runs out, in pieces half as large, down to
+    /// 1 MiB.
+    pub(crate) fn attempt_smaller<T, E: OfDevice>(
+        &self,
+        mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
+    ) -> Result<T, E> {
+        loop {
+            let done = self.attempt(&mut work);
+            let short = |error: &E| error.vulkan().is_some_and(VulkanError::is_out_of_memory);
+            match done {
+                Err(error) if short(&error) && self.shrink() => {}
+                done => return done,
+            }
+        }
+    }
+
+    /// Whether there is anything to be gained from another attempt.
+    fn shrink(&self) -> bool {
+        let engine = self.engine();
+        engine.give_back();
+        engine.halve_windows()
+    }
+
+    /// Puts the device opened anew in the place of one that is lost; false for an
+    /// application's own, which is the application's to open.
+    fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
+        let mut current = (self.current.write()).unwrap_or_else(PoisonError::into_inner);
+        if !Arc::ptr_eq(&current, lost) {
+            return Ok(true); // another thread was faster
+        }
+        let Some(engine) = lost.reopened(&self.options)? else {
+            return Ok(false);
+        };
+        trust(&engine, &self.options)?;
+        *current = Arc::new(engine);
+        Ok(true)
+    }
+}
+
+fn trust(engine: &VulkanEngine, options: &EngineOptions) -> Result<Vec<CanaryReport>, VulkanError> {
+    let canaries = engine.canaries()?;
+    let failed = canaries.iter().find(|canary| canary.differing > 0);
+    if let (Some(canary), false) = (failed, options.allow_inexact) {
+        return Err(VulkanError::Inexact {
+            device: engine.info().name.clone(),
+            canary: canary.name,
+            differing: canary.differing,
+            total: canary.total,
+        });
+    }
+    Ok(canaries)
+}

@@ -1,0 +1,402 @@
+//! The work of windows with no more samples than spans, as those of dense keys, and with few
+//! explicit times of each track, as a crowd's poses: each sample is told by itself, in the
+//! place where it is stored.
+
+use rayon::prelude::*;
+
+use crate::cpu::evaluate::FEW;
+use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
+use crate::math::canonical::round_f32;
+use crate::output::rotations::Layout;
+use crate::prepare::clip_data::ClipData;
+use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::shader::IS_CONSTANT;
+use crate::shader::List;
+use crate::shader::ListedSample;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::interval_block::{SpanBlock, SpanBlocks};
+use crate::time::key_samples::TimeLanes;
+use crate::time::runs::{Distance, Run, RunSource, runs_after, runs_before};
+use crate::time::window::Window;
+use crate::time::wrap::Cycle;
+
+/// A window whose samples are told one by one.
+pub(crate) struct Singles<'a> {
+    timeline: &'a Timeline,
+    window: &'a Window,
+    /// Of each group that has any, in the order in which their samples lie.
+    groups: Vec<GroupParts<'a>>,
+}
+
+struct GroupParts<'a> {
+    group: usize,
+    prepared: &'a Prepared,
+    parts: &'a [Part],
+    /// Where the first one's samples begin in the window.
+    first: usize,
+}
+
+impl<'a> Singles<'a> {
+    /// Nothing where a window's work is listed by runs.
+    pub(crate) fn new(
+        clip: &'a ClipData,
+        timeline: &'a Timeline,
+        window: &'a Window,
+    ) -> Option<Self> {
+        let samples = window.samples.len();
+        let are_rows = window.layout == Layout::TrackMajor || samples == 1;
+        if !are_rows || clip.interpolation.sides().repeats() {
+            return None;
+        }
+        let (mut spans, mut parts, mut groups) = (0, 0, Vec::new());
+        for (group, prepared) in clip.groups.iter().enumerate() {
+            let own = parts_in(prepared, window);
+            if own.is_empty() {
+                continue;
+            }
+            // Parts have about as many spans each, which need not lie in their order.
+            spans += prepared.spans.starts.len() * own.len() / prepared.parts.len();
+            parts += own.len();
+            groups.push((group, prepared, own));
+        }
+        let is_dense = timeline.len().saturating_mul(window.tracks.len()) <= spans;
+        let are_told = match timeline.ticks {
+            Ticks::Frames { .. } => is_dense,
+            // Times of a track in several parts may go back and forth between them.
+            Ticks::Times { .. } => parts == window.tracks.len() && (is_dense || samples <= FEW),
+        };
+        if !are_told {
+            return None;
+        }
+        let mut all = Self {
+            timeline,
+            window,
+            groups: Vec::with_capacity(groups.len()),
+        };
+        let mut before: Option<&Part> = None;
+        for (group, prepared, parts) in groups {
+            let first = all.start(prepared, &parts[0], before);
+            before = parts.last();
+            all.groups.push(GroupParts {
+                group,
+                prepared,
+                parts,
+                first,
+            });
+        }
+        let starts = all.groups.iter().map(|group| group.first);
+        (starts.clone().next() == Some(0) && starts.is_sorted()).then_some(all)
+    }
+
+    /// Samples that are told.
+    pub(crate) fn count(&self) -> usize {
+        self.window.len()
+    }
+
+    /// Where the samples of a part begin in the window, if that part is before it.
+    fn start(&self, prepared: &Prepared, part: &Part, before: Option<&Part>) -> usize {
+        let Window {
+            samples, tracks, ..
+        } = self.window;
+        let row = (part.track as usize - tracks.start) * samples.len();
+        let Ticks::Frames { rate, start } = self.timeline.ticks else {
+            return row;
+        };
+        if before.is_none_or(|before| before.track != part.track) {
+            return row;
+        }
+        let starts = &prepared.spans.starts[part.spans.clone()];
+        let clock = FrameClock::new(rate, start, part.end);
+        let first = clock.first_frame(starts.first().copied().unwrap_or(part.end));
+        row + (first as usize).clamp(samples.start, samples.end) - samples.start
+    }
+
+    /// Writes them; `shift` is added to every place in the output.
+    pub(crate) fn write(
+        &self,
+        mut singles: &mut [ListedSample],
+        shift: u32,
+    ) -> Result<Work, FramesError> {
+        let mut pieces = Vec::new();
+        let mut groups = Vec::new();
+        for (i, own) in self.groups.iter().enumerate() {
+            let end = (self.groups.get(i + 1)).map_or(self.window.len(), |next| next.first);
+            groups.push(GroupItems {
+                group: own.group,
+                items: (end - own.first) as u32,
+                first_output: own.first as u32 + shift,
+            });
+            let each = parts_per_chunk(self.window);
+            let mut first = own.first;
+            for from in (0..own.parts.len()).step_by(each) {
+                let (parts, others) = own.parts[from..].split_at(each.min(own.parts.len() - from));
+                let next = match others.first() {
+                    Some(next) => self.start(own.prepared, next, parts.last()).max(first),
+                    None => end,
+                };
+                let next = next.min(end);
+                let (own_singles, other_singles) = singles.split_at_mut(next - first);
+                singles = other_singles;
+                pieces.push(Piece {
+                    all: self,
+                    prepared: own.prepared,
+                    parts,
+                    first,
+                    singles: own_singles,
+                    told: 0,
+                    patches: Vec::new(),
+                    result: Ok(()),
+                });
+                first = next;
+            }
+        }
+        let pieces: Vec<_> = pieces
+            .into_par_iter()
+            .map(|mut piece| {
+                in_lanes(&mut piece);
+                piece.result.map(|()| piece.patches)
+            })
+            .collect();
+        let mut patches = Vec::new();
+        for own in pieces {
+            patches.append(&mut own?);
+        }
+        Ok(Work {
+            list: List::Samples,
+            groups,
+            patches,
+        })
+    }
+}
+
+/// What one thread writes.
+struct Piece<'a> {
+    all: &'a Singles<'a>,
+    prepared: &'a Prepared,
+    parts: &'a [Part],
+    /// The place of its first sample in the window.
+    first: usize,
+    singles: &'a mut [ListedSample],
+    /// How many of them are written.
+    told: usize,
+    patches: Vec<Patch>,
+    result: Result<(), FramesError>,
+}
+
+impl InLanes for Piece<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Singles {
+            timeline, window, ..
+        } = *self.all;
+        let (prepared, samples) = (self.prepared, window.samples.clone());
+        if let Ticks::Times { times, stride } = &timeline.ticks
+            && samples.len() <= FEW
+        {
+            return self.tell_few(times, *stride);
+        }
+        for part in self.parts {
+            let track = part.track as usize;
+            if let Ticks::Frames { rate, start } = timeline.ticks
+                && self.tell_spans(part, FrameClock::new(rate, start, part.end))
+            {
+                continue;
+            }
+            let cycle = Cycle::own(samples.clone());
+            let told = prepared.runs(part, timeline, &cycle, &mut |run| self.tell(track, run));
+            if told.is_err() {
+                self.result = told;
+                return;
+            }
+        }
+        self.singles[self.told..].fill(NOTHING);
+    }
+}
+
+/// A sample that nothing gives, or the host.
+const NOTHING: ListedSample = held(0);
+
+/// A constant.
+const fn held(constant: u32) -> ListedSample {
+    ListedSample {
+        source: constant | IS_CONSTANT,
+        parameter: 0.0,
+    }
+}
+
+impl Piece<'_> {
+    /// Tells the samples of a part, where all are near enough to their segments' middles:
+    /// without runs, of which most would be one sample.
+    #[inline(always)]
+    fn tell_spans(&mut self, part: &Part, clock: FrameClock) -> bool {
+        let (prepared, window) = (self.prepared, self.all.window);
+        let (track, samples) = (part.track as usize, &window.samples);
+        runs_before(prepared, part, clock, samples, &mut |run| {
+            self.tell(track, run);
+        });
+        let row = window.place(track, samples.start);
+        let mut spans = SpanBlocks::new(prepared, part, clock, samples.clone());
+        let mut block = SpanBlock::new();
+        while let Some(own) = spans.fill(&mut block) {
+            if !block.are_near {
+                return false;
+            }
+            let sources = &prepared.spans.sources[own.clone()];
+            let keys = &prepared.spans.keys[own];
+            for j in block.occupied {
+                let (first, last) = (block.first[j], block.first[j + 1]);
+                let is_held = keys[j] != NONE && block.is_held[j] == 1;
+                let place = row + first - samples.start;
+                let (Source::Segment(index), true) = (sources[j], place == self.first + self.told)
+                else {
+                    return false;
+                };
+                let Some(singles) = self.singles[self.told..].get_mut(..last - first) else {
+                    return false;
+                };
+                let mut distance = block.distance[j];
+                for single in &mut *singles {
+                    *single = ListedSample {
+                        source: index,
+                        parameter: distance * block.scale[j] + block.offset[j],
+                    };
+                    distance += 1.0;
+                }
+                if is_held {
+                    singles[0] = held(keys[j]);
+                }
+                self.told += last - first;
+            }
+        }
+        runs_after(part, clock, samples, &mut |run| self.tell(track, run));
+        true
+    }
+
+    /// Tells the samples of a run, as far as they are this piece's and not told yet.
+    #[inline(always)]
+    fn tell(&mut self, track: usize, run: Run) {
+        let Singles {
+            timeline, window, ..
+        } = *self.all;
+        let place = window.place(track, run.sample);
+        // Where two parts meet, each settles by itself whose a sample is that is theirs but
+        // for rounding.
+        let skipped = (self.first + self.told).saturating_sub(place);
+        let from = (place + skipped - self.first).min(self.singles.len());
+        let to = (place + run.count)
+            .saturating_sub(self.first)
+            .min(self.singles.len());
+        if from >= to {
+            return;
+        }
+        if self.told < from {
+            self.singles[self.told..from].fill(NOTHING);
+        }
+        self.told = to;
+        let own = &mut self.singles[from..to];
+        let first_sample = run.sample + skipped;
+        match run.source {
+            RunSource::Constant(constant) => own.fill(held(constant)),
+            RunSource::Segment {
+                index,
+                distance,
+                scale,
+                offset,
+            } => {
+                for (j, single) in own.iter_mut().enumerate() {
+                    let distance = match distance {
+                        Distance::Frames { first } => {
+                            first.wrapping_add((skipped + j) as i32) as f32
+                        }
+                        Distance::Seconds { middle } => {
+                            round_f32(timeline.time(track, first_sample + j) - middle)
+                        }
+                    };
+                    *single = ListedSample {
+                        source: index,
+                        parameter: distance * scale + offset,
+                    };
+                }
+            }
+            RunSource::Exact { index, parameter } => {
+                own.fill(NOTHING);
+                for sample in first_sample..first_sample + own.len() {
+                    let value = self
+                        .prepared
+                        .exact(index, parameter, timeline, track, sample);
+                    self.patches.push((window.place(track, sample), value));
+                }
+            }
+        }
+    }
+
+    /// Tells few explicit times of each track: what is looked up, then what is worked out, of
+    /// some of them together.
+    #[inline(always)]
+    fn tell_few(&mut self, times: &[f64], stride: usize) {
+        let samples = self.all.window.samples.clone();
+        let mut found = TimeLanes::new();
+        for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
+            found.count = 0;
+            for part in parts {
+                let own = &times[part.track as usize * stride..];
+                for sample in samples.clone() {
+                    let (source, start, end) = self.look_up(part, own, sample);
+                    found.push(source, own[sample], start, end);
+                }
+            }
+            let parameters = found.parameters();
+            let own = &mut self.singles[self.told..][..found.count];
+            for (lane, single) in own.iter_mut().enumerate() {
+                *single = ListedSample {
+                    source: found.sources[lane],
+                    parameter: parameters[lane],
+                };
+            }
+            self.told += found.count;
+        }
+    }
+
+    /// What gives a sample of a part, and from when till when.
+    #[inline(always)]
+    fn look_up(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
+        let (prepared, time) = (self.prepared, times[sample]);
+        if let Some((span, end)) = prepared.span_at(part, time) {
+            let (start, key) = (prepared.spans.starts[span], prepared.spans.keys[span]);
+            match prepared.spans.sources[span] {
+                _ if time == start && key != NONE => return (key | IS_CONSTANT, 0.0, 1.0),
+                Source::Segment(index) => return (index, start, end),
+                Source::Constant(constant) => return (constant | IS_CONSTANT, 0.0, 1.0),
+                Source::Exact(_) => {}
+            }
+        }
+        (
+            self.tell_outside(part, times, sample) | IS_CONSTANT,
+            0.0,
+            1.0,
+        )
+    }
+
+    /// The constant that gives a sample where that takes more than to look, or the host does.
+    /// Apart, so that what is usual stays small.
+    #[inline(never)]
+    fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
+        let (all, track) = (self.all, part.track as usize);
+        // Replaced: every time lies somewhere in a whole track, or outside.
+        let mut source = RunSource::Constant(0);
+        let mut found = |run: Run| source = run.source;
+        (self.prepared).time_runs(part, times, sample..sample + 1, &mut found);
+        match source {
+            RunSource::Constant(constant) => constant,
+            RunSource::Segment { .. } => unreachable!("outside a track no segment goes on"),
+            RunSource::Exact { index, parameter } => {
+                let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);
+                self.patches.push((all.window.place(track, sample), exact));
+                0
+            }
+        }
+    }
+}

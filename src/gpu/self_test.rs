@@ -1,0 +1,257 @@
+//! Canaries: before a device is trusted it computes a fixed set of inputs, and
+//! every bit is compared with the CPU.
+
+use crate::gpu::engine::EvaluateError;
+use crate::shader::Kernel;
+use std::sync::Arc;
+
+use glam::{DVec3, Quat};
+
+use crate::cpu::engine::CpuEngine;
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::engine::{Job, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::gpu::submission::{Access, Binding, Submission};
+use crate::math::canonical::round_quat;
+use crate::math::quaternion::exp;
+use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
+use crate::method::slerp::SLERP;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::shader::WORKGROUP;
+use crate::shader::{Dispatch, Probe, Reply};
+use crate::simd::dispatch::VectorWidth;
+use crate::time::frames::Frames;
+use crate::time::window::Window;
+use crate::tracks::set::TrackSet;
+use crate::twin::self_test::reply;
+
+/// How a device did on one canary.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct CanaryReport {
+    /// What it looks for.
+    pub name: &'static str,
+    /// Results compared.
+    pub total: usize,
+    /// Results with other bits than the CPU's.
+    pub differing: usize,
+}
+
+/// Runs every canary on a device.
+pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanError> {
+    let mut reports = expressions(engine.device(), Exactness::Demanded)?;
+    for (name, method) in [
+        ("arc kernel", SLERP),
+        ("polynomial kernel", BESSEL_OVERHAUSER),
+    ] {
+        let set = hostile_set();
+        let wanted = Wanted::all(&set, Some(engine.group_bytes()));
+        let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
+        let cpu = CpuEngine::new(VectorWidth::Baseline, None).expect("no threads of its own");
+        let buffers = engine.upload(&clip, None)?;
+        let mut report = CanaryReport {
+            name,
+            total: 0,
+            differing: 0,
+        };
+        for frames in [
+            Frames::fps(24),
+            Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001]),
+        ] {
+            let timeline = frames
+                .resolve(clip.track_count(), clip.time_span())
+                .expect("a few frames");
+            let whole = Window::whole(clip.track_count(), timeline.len(), Layout::TrackMajor);
+            let mut expected = vec![Quat::IDENTITY; whole.len()];
+            let mut found = expected.clone();
+            cpu.evaluate(&clip, &timeline, &whole, &mut expected)
+                .expect("short gaps");
+            let job = Job {
+                clip: &clip,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding: Encoding::F32,
+            };
+            engine
+                .evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found))
+                .map_err(|error| match error {
+                    EvaluateError::Vulkan(error) => error,
+                    EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),
+                })?;
+            report.total += whole.len();
+            report.differing += differing(&expected, &found);
+        }
+        reports.push(report);
+    }
+    Ok(reports)
+}
+
+/// Rotations whose bits differ.
+fn differing(a: &[Quat], b: &[Quat]) -> usize {
+    let bits = |q: &Quat| q.to_array().map(f32::to_bits);
+    a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count()
+}
+
+/// Two seconds of uneven keys on several axes, from tiny to half-turn steps.
+fn hostile_set() -> TrackSet {
+    let mut set = TrackSet::new();
+    let times = [0.0, 0.04, 1.0, 1.25, 2.5, 4.0, 5.0];
+    for (track, size) in [1e-20, 1e-7, 0.02, 0.8, 1.5].into_iter().enumerate() {
+        let keys: Vec<Quat> = (0..times.len())
+            .map(|i| {
+                let turn = (i * i + track) as f64 * size;
+                let axis = DVec3::new(1.0, track as f64 - 1.5, (i % 3) as f64 * 0.3);
+                Quat::from_array(round_quat(exp((axis * (turn / 2.0)).to_array())))
+            })
+            .collect();
+        set.push("", &times, &keys).expect("unit keys");
+    }
+    set
+}
+
+/// One of a reply's results.
+type Value = fn(&Reply) -> f32;
+
+/// The single expressions of `canary.wgsl`.
+fn expressions(
+    device: &Arc<LogicalDevice>,
+    exactness: Exactness,
+) -> Result<Vec<CanaryReport>, VulkanError> {
+    let probes = probes();
+    let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
+    let reply_bytes = probes.len() * size_of::<Reply>();
+    let pipeline = Pipeline::new(device, Kernel::SelfTest, exactness)?;
+    let mut input = Buffer::new(
+        device,
+        "tumble probes",
+        probe_bytes.len() as u64,
+        Residence::Upload,
+    )?;
+    let output = Buffer::new(
+        device,
+        "tumble replies",
+        reply_bytes as u64,
+        Residence::Readback,
+    )?;
+    input
+        .bytes_mut(0..probe_bytes.len())
+        .copy_from_slice(probe_bytes);
+    let mut submission = Submission::new(device)?;
+    submission.begin(1)?;
+    let dispatch = Dispatch {
+        first_item: 0,
+        item_count: probes.len() as u32,
+        stride: 1,
+        detail: 0,
+        first_output: 0,
+    };
+    submission.dispatch(
+        &pipeline,
+        &[Binding::whole(&input), Binding::whole(&output)],
+        bytemuck::bytes_of(&dispatch),
+        [(probes.len() as u32).div_ceil(WORKGROUP), 1],
+    )?;
+    submission.barrier(Access::Kernel, Access::Host);
+    submission.submit()?;
+    submission.wait()?;
+    let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
+
+    let canaries: [(&str, Value); 10] = [
+        ("contraction", |reply| reply.contraction),
+        ("re-association of a sum", |reply| reply.reassociation),
+        ("rounding to nearest even", |reply| reply.rounding),
+        ("re-association of a product", |reply| reply.association),
+        ("conversion of integers", |reply| reply.conversion),
+        ("cancellation", |reply| reply.cancellation),
+        ("sine", |reply| reply.sine),
+        ("cosine", |reply| reply.cosine),
+        ("root", |reply| reply.root),
+        ("arc tangent", |reply| reply.arc_tangent),
+    ];
+    let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
+    let count = |value: Value| {
+        let pairs = expected.iter().zip(replies);
+        pairs
+            .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
+            .count()
+    };
+    Ok(canaries
+        .into_iter()
+        .map(|(name, value)| CanaryReport {
+            name,
+            total: probes.len(),
+            differing: count(value),
+        })
+        .collect())
+}
+
+/// Values of ordinary size in no order, and sums that lie half way between floats.
+fn probes() -> Vec<Probe> {
+    let mut state = 1u32;
+    let mut next = || {
+        // Numerical Recipes' linear congruential generator: any spread will do.
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0 // exact, in [-1, 1)
+    };
+    let mut probes: Vec<Probe> = (0..1000)
+        .map(|i| Probe {
+            a: next() * 4.0,
+            b: next(),
+            c: next() * std::f32::consts::FRAC_PI_2,
+            n: (next() * 2.0f32.powi(8 + i % 23)) as i32,
+        })
+        .collect();
+    let half_ulp = f32::EPSILON / 2.0;
+    for (a, c) in [
+        (1.0, half_ulp),
+        (1.0 + f32::EPSILON, half_ulp),
+        (-1.0, -half_ulp),
+    ] {
+        probes.push(Probe {
+            a,
+            b: half_ulp,
+            c,
+            n: (1 << 24) + 1,
+        });
+    }
+    probes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Reads;
+    use crate::gpu::physical::{DeviceKind, list};
+
+    /// A comparison that cannot fail proves nothing: without the decorations
+    /// lavapipe folds `(a + b) - a`, and its canary must sing.
+    #[test]
+    fn canaries_fail_on_a_driver_that_is_left_free() {
+        let devices = list(false).unwrap_or_default();
+        let lavapipe = devices
+            .into_iter()
+            .find(|d| d.info.kind == DeviceKind::Cpu && d.info.name.starts_with("llvmpipe"));
+        let Some(lavapipe) = lavapipe else {
+            assert!(std::env::var_os("CI").is_none(), "CI must have lavapipe");
+            eprintln!("NO LAVAPIPE: the negative control did not run");
+            return;
+        };
+        let device = LogicalDevice::new(lavapipe, Reads::Automatic).unwrap();
+        let differing = |exactness| {
+            let reports = expressions(&device, exactness).unwrap();
+            reports
+                .iter()
+                .map(|report| (report.name, report.differing))
+                .collect::<Vec<_>>()
+        };
+        assert!(differing(Exactness::Demanded).iter().all(|(_, n)| *n == 0));
+        let free = differing(Exactness::LeftToTheDriver);
+        let (name, wrong) = free[1];
+        assert_eq!(name, "re-association of a sum");
+        assert!(wrong > 100, "{free:?}");
+    }
+}

@@ -1,0 +1,82 @@
+//! Rounding on the way to a kernel, the same on every machine: everything a kernel
+//! reads passes through [`canonical`], so that no driver ever meets a subnormal.
+
+use glam::{DQuat, Quat};
+
+use crate::math::quaternion::Quaternion;
+use crate::shader::TINY_BITS;
+
+/// The value with every magnitude below 2^-64 replaced by +0, in inputs and in outputs:
+/// drivers may flush subnormals, and nothing within 2^62 of one remains.
+/// Twin: `shaders/math/canonical.wgsl`.
+#[inline(always)]
+pub(crate) fn canonical(value: f32) -> f32 {
+    let magnitude = value.to_bits() & 0x7fff_ffff;
+    if magnitude < TINY_BITS { 0.0 } else { value }
+}
+
+/// In a sum with it what lies behind the point is rounded away.
+const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+
+/// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
+/// rounded away in the sum. A call to `round` costs more than all else here.
+#[inline(always)]
+pub(crate) fn nearest_whole(x: f64) -> f64 {
+    (x + SHIFT) - SHIFT
+}
+
+/// A whole number below 2^51 as an integer: a conversion that saturates takes branches.
+#[inline(always)]
+pub(crate) fn whole_number(x: f64) -> i64 {
+    (x + SHIFT).to_bits() as i64 - SHIFT.to_bits() as i64
+}
+
+/// As [`whole_number`], of any whole number; one that is farther away than any frame is 2^50
+/// or -2^50.
+#[inline(always)]
+pub(crate) fn frame_number(x: f64) -> i64 {
+    const FAR: f64 = (1u64 << 50) as f64;
+    let below = if x < FAR { x } else { FAR };
+    whole_number(if below > -FAR { below } else { -FAR })
+}
+
+/// Rounds to f32 and makes the result canonical.
+#[inline(always)]
+pub(crate) fn round_f32(value: f64) -> f32 {
+    canonical(value as f32)
+}
+
+/// Rounds each component to f32, `x y z w`.
+#[inline(always)]
+pub(crate) fn round_quat(q: Quaternion) -> [f32; 4] {
+    q.map(round_f32)
+}
+
+/// The unit quaternion nearest to `q`, in f32.
+pub(crate) fn unit_f32(q: DQuat) -> Quat {
+    let norm = dot(q, q).sqrt();
+    Quat::from_array(q.to_array().map(|component| round_f32(component / norm)))
+}
+
+/// `q` in f64, not normalised.
+pub(crate) fn to_f64(q: Quat) -> DQuat {
+    DQuat::from_array(q.to_array().map(f64::from))
+}
+
+/// The inner product in R⁴.
+pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {
+    crate::math::quaternion::dot(a.to_array(), b.to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_values_become_positive_zero() {
+        assert_eq!(canonical(-0.0).to_bits(), 0);
+        let tiny = f32::from_bits(TINY_BITS);
+        assert_eq!(canonical(tiny.next_down()).to_bits(), 0);
+        assert_eq!(canonical(-tiny), -tiny);
+    }
+}

@@ -1,0 +1,300 @@
+//! What a curve's formula can be evaluated in: a plain number, or one that carries its
+//! first two derivatives. Formulas are written once, for either.
+
+use std::ops::{Add, Mul, Sub};
+
+use crate::math::quaternion::{Real, arc_tangent, sine_cosine};
+use crate::math::ranges::{near_arc_square, near_waves};
+
+/// A number that depends on time.
+pub(crate) trait Scalar:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// What does not depend on it: f64, or a vector of them.
+    type Constant: Real;
+    /// A number that does not depend on time.
+    fn constant(value: Self::Constant) -> Self;
+    /// The same for all.
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        Self::constant(Self::Constant::all(value))
+    }
+    /// `sin(x)/x` and `cos(x)`, given `x²`: both are smooth in it, also at 0.
+    fn waves(self) -> (Self, Self);
+    /// `x²`, given `sin²(x/2)`, 0 to 1: for `x` up to pi.
+    fn arc_square(self) -> Self;
+    /// `1/√x`, for `x > 0`.
+    fn reciprocal_root(self) -> Self;
+}
+
+impl Scalar for f64 {
+    type Constant = Self;
+
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn waves(self) -> (f64, f64) {
+        let angle = self.sqrt();
+        let (sine, cosine) = sine_cosine(angle);
+        // sin(x)/x is 1 to f64 rounding below 1e-9.
+        (if angle > 1e-9 { sine / angle } else { 1.0 }, cosine)
+    }
+
+    #[inline(always)]
+    fn arc_square(self) -> f64 {
+        let rest = if self < 1.0 { 1.0 - self } else { 0.0 };
+        let far = self > rest;
+        let (small, large) = if far { (rest, self) } else { (self, rest) };
+        let half = arc_tangent((small / large).sqrt());
+        let angle = if far {
+            std::f64::consts::PI - 2.0 * half
+        } else {
+            2.0 * half
+        };
+        angle * angle
+    }
+
+    #[inline(always)]
+    fn reciprocal_root(self) -> f64 {
+        reciprocal_root(self)
+    }
+}
+
+/// `1/√x`; what is no curve any more shall still be a number.
+#[inline(always)]
+fn reciprocal_root<R: Real>(x: R) -> R {
+    R::all(1.0) / x.root().larger(R::all(1e-150))
+}
+
+/// By polynomials alone, without a range reduction, a root or a division for each angle.
+/// NaN, which stays, where an angle is more than pi/2.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near<R>(pub(crate) R);
+
+impl<R: Real> Add for Near<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0)
+    }
+}
+
+impl<R: Real> Sub for Near<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0)
+    }
+}
+
+impl<R: Real> Mul for Near<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0)
+    }
+}
+
+impl<R: Real> Scalar for Near<R> {
+    type Constant = R;
+
+    #[inline(always)]
+    fn constant(value: R) -> Self {
+        Self(value)
+    }
+
+    #[inline(always)]
+    fn waves(self) -> (Self, Self) {
+        let (sinc, cosine) = near_waves(self.0);
+        (Self(sinc), Self(cosine))
+    }
+
+    #[inline(always)]
+    fn arc_square(self) -> Self {
+        Self(near_arc_square(self.0))
+    }
+
+    #[inline(always)]
+    fn reciprocal_root(self) -> Self {
+        Self(reciprocal_root(self.0))
+    }
+}
+
+/// A number with its first and second derivative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Jet {
+    pub(crate) value: f64,
+    pub(crate) first: f64,
+    pub(crate) second: f64,
+}
+
+impl Jet {
+    /// The parameter itself.
+    pub(crate) fn parameter(value: f64) -> Self {
+        Self {
+            value,
+            first: 1.0,
+            second: 0.0,
+        }
+    }
+
+    /// A function of it, given the function's value and derivatives there.
+    fn chain(self, [value, first, second]: [f64; 3]) -> Self {
+        Self {
+            value,
+            first: first * self.first,
+            second: second * self.first * self.first + first * self.second,
+        }
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            first: self.first + other.first,
+            second: self.second + other.second,
+        }
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self {
+            value: self.value - other.value,
+            first: self.first - other.first,
+            second: self.second - other.second,
+        }
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let both = self.first * other.first;
+        Self {
+            value: self.value * other.value,
+            first: self.first * other.value + self.value * other.first,
+            second: self.second * other.value + 2.0 * both + self.value * other.second,
+        }
+    }
+}
+
+/// A power series and its first two derivatives at `x`.
+fn series(coefficients: &[f64], x: f64) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    for &c in coefficients.iter().rev() {
+        sums[2] = sums[2] * x + 2.0 * sums[1];
+        sums[1] = sums[1] * x + sums[0];
+        sums[0] = sums[0] * x + c;
+    }
+    sums
+}
+
+impl Scalar for Jet {
+    type Constant = f64;
+
+    fn constant(value: f64) -> Self {
+        Self {
+            value,
+            first: 0.0,
+            second: 0.0,
+        }
+    }
+
+    fn waves(self) -> (Self, Self) {
+        let z = self.value;
+        let (sinc, cosine) = z.waves();
+        // S' = (C - S)/2z and 4z S'' + 6 S' + S = 0; C' = -S/2.
+        let [first, second] = if z < 0.5 {
+            let mut coefficients = [1.0; 12];
+            for k in 1..12 {
+                let k_th = (2 * k * (2 * k + 1)) as f64;
+                coefficients[k] = -coefficients[k - 1] / k_th;
+            }
+            let [_, first, second] = series(&coefficients, z);
+            [first, second]
+        } else {
+            let first = (cosine - sinc) / (2.0 * z);
+            [first, -(6.0 * first + sinc) / (4.0 * z)]
+        };
+        (
+            self.chain([sinc, first, second]),
+            self.chain([cosine, -0.5 * sinc, -0.5 * first]),
+        )
+    }
+
+    fn arc_square(self) -> Self {
+        let u = self.value;
+        let square = u.arc_square();
+        // A = 4 asin²(√u), u(1-u) A'' + (1/2 - u) A' = 2.
+        if u < 0.02 {
+            // asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
+            let mut coefficients = [0.0; 12];
+            let mut term = 2.0;
+            for (n, coefficient) in (0..12).map(f64::from).zip(&mut coefficients).skip(1) {
+                term *= 4.0 * n / (2.0 * (2.0 * n - 1.0));
+                *coefficient = term / (n * n);
+            }
+            let [_, first, second] = series(&coefficients, u);
+            return self.chain([square, first, second]);
+        }
+        // Towards 1 it bends without limit; what comes of it there is refused as a fit.
+        let rest = u * (1.0 - u).max(1e-30);
+        let first = 2.0 * (square / rest).sqrt();
+        self.chain([square, first, (2.0 - (0.5 - u) * first) / rest])
+    }
+
+    fn reciprocal_root(self) -> Self {
+        let root = self.value.reciprocal_root();
+        let cube = root * root * root;
+        self.chain([root, -0.5 * cube, 0.75 * cube * root * root])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches a wrong derivative, and a series that is left too late.
+    #[test]
+    fn derivatives_are_those_of_the_values() {
+        type Function = (fn(Jet) -> Jet, fn(f64) -> f64);
+        let functions: [Function; 4] = [
+            (|x| x.waves().0, |x| x.waves().0),
+            (|x| x.waves().1, |x| x.waves().1),
+            (Jet::arc_square, f64::arc_square),
+            (Jet::reciprocal_root, f64::reciprocal_root),
+        ];
+        for (place, (of_jet, of_number)) in functions.into_iter().enumerate() {
+            for i in 1..99 {
+                let x = f64::from(i) * 0.01 * if place < 2 { 9.0 } else { 1.0 };
+                let h = 1e-3 * x.min(if place == 2 { 1.0 - x } else { 1.0 });
+                let at = |k: f64| of_number(x + k * h);
+                let first = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
+                let second = (16.0 * (at(1.0) + at(-1.0)) - (at(2.0) + at(-2.0)) - 30.0 * at(0.0))
+                    / (12.0 * h * h);
+                let jet = of_jet(Jet::parameter(x));
+                assert_eq!(jet.value, of_number(x));
+                let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within * (1.0 + a.abs());
+                assert!(near(jet.first, first, 1e-9), "{place} {x} {jet:?} {first}");
+                let within = 1e-15 / (h * h) + 1e-8;
+                assert!(
+                    near(jet.second, second, within),
+                    "{place} {x} {jet:?} {second}"
+                );
+            }
+        }
+        let still = Jet::constant(0.0);
+        assert_eq!(still.waves().0.value, 1.0);
+        assert_eq!(Jet::parameter(0.0).arc_square().first, 4.0);
+    }
+}

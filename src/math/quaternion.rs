@@ -1,0 +1,329 @@
+//! Quaternion algebra in f64 without branches, calls or tables: in a loop over
+//! arrays all of it becomes vector instructions. Only addition, subtraction,
+//! multiplication, division and square root, each rounded once as IEEE 754 says, so
+//! that every machine and every vector width gives the same bits.
+//!
+//! Plain arrays, `x y z w`: glam's types would keep such a loop scalar. What is generic over
+//! [`Real`] is written for vectors of f64 too.
+
+use std::f64::consts::{FRAC_2_PI, PI, TAU};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::math::canonical::nearest_whole;
+
+/// What sums and products are made of, be it a number or a vector of them.
+pub(crate) trait Arithmetic:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+}
+
+impl<N> Arithmetic for N where
+    N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N> + Neg<Output = N>
+{
+}
+
+/// f64, or a vector of them: what holds for one is said of each.
+pub(crate) trait Real: Arithmetic + Div<Output = Self> {
+    /// The same in every lane.
+    fn all(value: f64) -> Self;
+
+    /// The square root.
+    fn root(self) -> Self;
+
+    /// The smaller and the larger of two numbers; `other` where one of them is none.
+    fn smaller(self, other: Self) -> Self;
+    fn larger(self, other: Self) -> Self;
+
+    /// `then` up to a limit, else `otherwise`; also where one of them is no number.
+    fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self;
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        if self <= limit { then } else { otherwise }
+    }
+}
+
+/// `x y z w`.
+pub(crate) type Quaternion = [f64; 4];
+/// Half of a rotation vector, unless said otherwise.
+pub(crate) type Vector = [f64; 3];
+
+/// `|v|²`.
+#[inline(always)]
+pub(crate) fn square<N: Arithmetic>([x, y, z]: [N; 3]) -> N {
+    x * x + y * y + z * z
+}
+
+/// The inner product in R⁴.
+#[inline(always)]
+pub(crate) fn dot<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> N {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+}
+
+/// `|v|`.
+#[inline(always)]
+pub(crate) fn length(v: Vector) -> f64 {
+    square(v).sqrt()
+}
+
+/// `k v`.
+#[inline(always)]
+pub(crate) fn scaled<N: Arithmetic>(v: [N; 3], k: N) -> [N; 3] {
+    [v[0] * k, v[1] * k, v[2] * k]
+}
+
+/// `a + b`.
+#[inline(always)]
+pub(crate) fn sum<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// `a / b` for positive numbers, at most 1e150: between keys that are next to nothing
+/// apart tangents are meaningless, but they stay numbers.
+#[inline(always)]
+pub(crate) fn ratio<R: Real>(a: R, b: R) -> R {
+    (a / b).smaller(R::all(1e150))
+}
+
+/// The Hamilton product `a b`.
+#[inline(always)]
+pub(crate) fn product<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
+    [
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    ]
+}
+
+/// `a⁻¹ b` for unit quaternions.
+#[inline(always)]
+pub(crate) fn step<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
+    product([-a[0], -a[1], -a[2], a[3]], b)
+}
+
+/// A key in f64, normalised: two steps of Newton's, from keys that are unit to f32.
+#[inline(always)]
+pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
+    let q = [
+        f64::from(key[0]),
+        f64::from(key[1]),
+        f64::from(key[2]),
+        f64::from(key[3]),
+    ];
+    normalised(q)
+}
+
+/// As [`unit()`], of its components in f64.
+#[inline(always)]
+pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
+    let square = dot(q, q);
+    let (half, three_halves) = (R::all(0.5), R::all(1.5));
+    let first = three_halves - half * square;
+    let scale = first * (three_halves - half * square * first * first);
+    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
+}
+
+/// pi/2 in parts of 24 bits: a whole number below 2^29 times each is exact.
+const HALF_PI: [f64; 4] = [
+    1.570_796_251_296_997,
+    7.549789415861596e-8,
+    5.390302529957765e-15,
+    3.2820035428735005e-22,
+];
+
+/// Sine and cosine, within 2e-16 up to 8e8 radians; beyond, some pair of them.
+/// Coefficients: fdlibm (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
+#[inline(always)]
+pub(crate) fn sine_cosine(x: f64) -> (f64, f64) {
+    // The whole part of x / (pi/2), and in the last bits its quadrant.
+    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+    let shifted = x * FRAC_2_PI + SHIFT;
+    let whole = shifted - SHIFT;
+    let quadrant = shifted.to_bits();
+    let r =
+        (((x - whole * HALF_PI[0]) - whole * HALF_PI[1]) - whole * HALF_PI[2]) - whole * HALF_PI[3];
+    let r = if r.abs() < 1.0 { r } else { 0.0 };
+    let z = r * r;
+    let sine_tail = ((((1.589_690_995_211_55e-10 * z - 2.505_076_025_340_686_3e-8) * z
+        + 2.755_731_370_707_006_8e-6)
+        * z
+        - 1.984_126_982_985_795e-4)
+        * z
+        + 8.333_333_333_322_49e-3)
+        * z
+        - 1.666_666_666_666_663_2e-1;
+    let sine = r + r * (z * sine_tail);
+    let cosine_tail = ((((-1.135_964_755_778_819_5e-11 * z + 2.087_572_321_298_175e-9) * z
+        - 2.755_731_435_139_066_3e-7)
+        * z
+        + 2.480_158_728_947_673e-5)
+        * z
+        - 1.388_888_888_887_411e-3)
+        * z
+        + 4.166_666_666_666_66e-2;
+    let cosine = 1.0 - (0.5 * z - z * z * cosine_tail);
+    let odd = quadrant & 1 == 1;
+    let (s, c) = if odd { (cosine, sine) } else { (sine, cosine) };
+    let sine_sign = (quadrant & 2) << 62;
+    let cosine_sign = (quadrant.wrapping_add(1) & 2) << 62;
+    (
+        f64::from_bits(s.to_bits() ^ sine_sign),
+        f64::from_bits(c.to_bits() ^ cosine_sign),
+    )
+}
+
+/// Coefficients of `(atan(t)/t - 1) / t²` in powers of t², for 0 <= t <= tan(pi/8);
+/// from Chebyshev nodes, within 1e-17 of it.
+const ARC_TANGENT: [f64; 11] = [
+    -0.3333333333333333,
+    0.19999999999995519,
+    -0.14285714284666184,
+    0.11111111015227572,
+    -0.09090904576954117,
+    0.07692183163650894,
+    -0.06664511064599371,
+    0.05858145587628202,
+    -0.050854323376990765,
+    0.0392311556198723,
+    -0.01917627151752634,
+];
+
+/// The arc tangent of `t`, 0 <= t <= 1, within 5e-16 of it, relative.
+#[inline(always)]
+pub(crate) fn arc_tangent(t: f64) -> f64 {
+    // That of half the angle, twice: a wild tangent multiplies an angle's error.
+    let half = t / (1.0 + (1.0 + t * t).sqrt());
+    let z = half * half;
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = ARC_TANGENT;
+    let high = ((((c10 * z + c9) * z + c8) * z + c7) * z + c6) * z + c5;
+    let tail = ((((high * z + c4) * z + c3) * z + c2) * z + c1) * z + c0;
+    2.0 * (half + half * (z * tail))
+}
+
+/// The exponential of a half-rotation vector: `[cos |a|; sin |a| a/|a|]`.
+#[inline(always)]
+pub(crate) fn exp(a: Vector) -> Quaternion {
+    let angle = length(a);
+    let (sine, cosine) = sine_cosine(angle);
+    // sin(x)/x is 1 to f64 rounding below 1e-9.
+    let sinc = if angle > 1e-9 { sine / angle } else { 1.0 };
+    [sinc * a[0], sinc * a[1], sinc * a[2], cosine]
+}
+
+/// The logarithm of a unit quaternion, HALF of the rotation vector, of length at
+/// most pi. By the arc tangent, not by the arc cosine: the latter loses half of the
+/// digits of a small angle.
+#[inline(always)]
+pub(crate) fn log(q: Quaternion) -> Vector {
+    log_toward(q, [1.0, 0.0, 0.0])
+}
+
+/// As [`log`]; `axis` gives the direction where the quaternion has none (at -1,
+/// where every direction is a logarithm of length pi).
+#[inline(always)]
+pub(crate) fn log_toward(q: Quaternion, axis: Vector) -> Vector {
+    let v = [q[0], q[1], q[2]];
+    let sine = length(v);
+    let half = arc_tangent(sine / (1.0 + q[3].abs()));
+    let angle = if q[3] < 0.0 {
+        PI - 2.0 * half
+    } else {
+        2.0 * half
+    };
+    let scale = if sine > 0.0 { angle / sine } else { 0.0 };
+    let axis_length = length(axis);
+    let at_minus_one = sine == 0.0 && q[3] < 0.0 && axis_length > 0.0;
+    let toward = if at_minus_one { PI / axis_length } else { 0.0 };
+    sum(scaled(v, scale), scaled(axis, toward))
+}
+
+/// The branch of the logarithm of `q` that lies nearest to `near`: with `p` the
+/// principal one, `p + 2 pi k p/|p|` for the best whole `k`.
+#[inline(always)]
+pub(crate) fn log_near(q: Quaternion, near: Vector) -> Vector {
+    let principal = log_toward(q, near);
+    let own = length(principal);
+    let far = length(near);
+    // A principal logarithm of (almost) nothing still has branches along `near`.
+    let has_axis = own > 1e-9;
+    let to_own = if has_axis { 1.0 / own } else { 0.0 };
+    let to_near = if !has_axis && far > PI {
+        1.0 / far
+    } else {
+        0.0
+    };
+    let axis = sum(scaled(principal, to_own), scaled(near, to_near));
+    let along = axis[0] * near[0] + axis[1] * near[1] + axis[2] * near[2];
+    let turns = nearest_whole((along - own) / TAU);
+    sum(principal, scaled(axis, turns * TAU))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches a wrong digit in a coefficient or in a part of pi/2.
+    #[test]
+    fn sine_and_cosine_are_those_of_libm() {
+        for i in 0..200_000 {
+            let x = f64::from(i) * f64::from(i) * 0.019_1;
+            let (sine, cosine) = sine_cosine(x);
+            let (expected_sine, expected_cosine) = libm::sincos(x);
+            assert!((sine - expected_sine).abs() < 2.5e-16, "{x}");
+            assert!((cosine - expected_cosine).abs() < 2.5e-16, "{x}");
+        }
+        for x in [1e12, 1e300, f64::INFINITY, f64::NAN] {
+            let (sine, cosine) = sine_cosine(x);
+            assert!((sine * sine + cosine * cosine - 1.0).abs() < 1e-15, "{x}");
+        }
+    }
+
+    #[test]
+    fn the_arc_tangent_is_that_of_libm() {
+        for i in 0..=100_000 {
+            let t = f64::from(i) / 100_000.0;
+            assert!((arc_tangent(t) - libm::atan(t)).abs() <= 5e-16 * t, "{t}");
+        }
+    }
+
+    #[test]
+    fn exp_undoes_log_on_every_branch() {
+        let direction = scaled([2.0, -1.0, 0.5], 1.0 / length([2.0, -1.0, 0.5]));
+        let distance = |a: Vector, b: Vector| length(sum(a, scaled(b, -1.0)));
+        for angle in [0.0, 1e-12, 1e-5, 0.4, 1.5, 3.0, 3.1] {
+            let v = scaled(direction, angle);
+            let q = exp(v);
+            assert!(distance(log(q), v) < 1e-9, "{angle}");
+            for turns in [-2.0, 1.0, 3.0] {
+                let far = scaled(direction, angle + turns * TAU);
+                let branch = log_near(q, far);
+                assert!(distance(branch, far) < 1e-6, "{angle} {turns} {branch:?}");
+            }
+        }
+        assert_eq!(log([0.0, 0.0, 0.0, -1.0]), [PI, 0.0, 0.0]);
+        assert_eq!(log([0.0, 0.0, 0.0, 1.0]), [0.0; 3]);
+    }
+}

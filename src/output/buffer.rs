@@ -1,0 +1,107 @@
+//! Memory for results.
+
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+
+use glam::Quat;
+
+use crate::output::rotations::Storage;
+
+/// Bytes from which on allocators take fresh pages for every result, and give them back.
+#[cfg(target_os = "linux")]
+const LONG: usize = 32 << 20;
+
+/// Memory for a result, zeros at first, for what evaluates into the caller's memory:
+/// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into) and its like. Long ones lie on
+/// huge pages where the system has them (Linux): fresh ones are filled in half the time.
+///
+/// ```
+/// # use glam::Quat;
+/// # use tumble::{Device, Engine, Error, Frames, Layout, OutputBuffer, TrackSet, method};
+/// # let mut set = TrackSet::new();
+/// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
+/// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+/// let frames = Frames::fps(60);
+/// let mut rotations = OutputBuffer::new(clip.track_count() * clip.timeline(&frames)?.len());
+/// clip.evaluate_into(&frames, Layout::TrackMajor, &mut rotations)?;
+/// # assert_eq!(rotations[0], Quat::IDENTITY);
+/// # Ok::<(), Error>(())
+/// ```
+pub struct OutputBuffer(Memory);
+
+enum Memory {
+    Heap(Vec<Quat>),
+    #[cfg(target_os = "linux")]
+    HugePages(memmap2::MmapMut),
+}
+
+impl OutputBuffer {
+    /// For so many rotations.
+    #[must_use]
+    pub fn new(rotations: usize) -> Self {
+        #[cfg(target_os = "linux")]
+        if let Some(bytes) = rotations.checked_mul(size_of::<Quat>())
+            && bytes >= LONG
+            && let Ok(memory) = memmap2::MmapMut::map_anon(bytes)
+        {
+            // Advice: where it is not taken, pages are of the ordinary size.
+            let _ = memory.advise(memmap2::Advice::HugePage);
+            return Self(Memory::HugePages(memory));
+        }
+        Self(Memory::Heap(bytemuck::zeroed_vec(rotations)))
+    }
+}
+
+impl Deref for OutputBuffer {
+    type Target = [Quat];
+
+    fn deref(&self) -> &[Quat] {
+        match &self.0 {
+            Memory::Heap(rotations) => rotations,
+            #[cfg(target_os = "linux")]
+            Memory::HugePages(bytes) => bytemuck::cast_slice(bytes),
+        }
+    }
+}
+
+impl DerefMut for OutputBuffer {
+    fn deref_mut(&mut self) -> &mut [Quat] {
+        match &mut self.0 {
+            Memory::Heap(rotations) => rotations,
+            #[cfg(target_os = "linux")]
+            Memory::HugePages(bytes) => bytemuck::cast_slice_mut(bytes),
+        }
+    }
+}
+
+impl Storage for OutputBuffer {
+    fn quats(&self) -> &[Quat] {
+        self
+    }
+}
+
+impl fmt::Debug for OutputBuffer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "OutputBuffer({} rotations)", self.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches memory that is too short, too long or not zero, short and long.
+    #[test]
+    fn all_that_was_asked_for_is_there() {
+        for rotations in [0, 1, 1000, (32 << 20) / 16 - 1, (32 << 20) / 16 + 1] {
+            let mut buffer = OutputBuffer::new(rotations);
+            assert_eq!(buffer.len(), rotations);
+            assert!(buffer.iter().all(|q| q.to_array() == [0.0; 4]));
+            buffer.fill(Quat::IDENTITY);
+            assert_eq!(
+                buffer.last().copied(),
+                (rotations > 0).then_some(Quat::IDENTITY)
+            );
+        }
+    }
+}

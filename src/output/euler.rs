@@ -1,0 +1,204 @@
+//! Sequences of Euler angles.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::shader::{INTRINSIC, NEGATIVE, SYMMETRIC};
+
+/// The three axes about which a rotation is taken apart: one of twelve sequences, about
+/// axes that turn along or that stand still.
+///
+/// ```
+/// use tumble::EulerSequence;
+/// let yaw_pitch_roll: EulerSequence = "ZYX".parse()?; // intrinsic: about the turned axes
+/// let the_same: EulerSequence = "xyz".parse()?;       // extrinsic: about the fixed ones
+/// assert!("XXY".parse::<EulerSequence>().is_err());
+/// # Ok::<(), tumble::UnknownSequence>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct EulerSequence {
+    axes: [u8; 3],
+    intrinsic: bool,
+}
+
+impl EulerSequence {
+    /// About the turned x, y and z axes in turn.
+    pub const XYZ: Self = Self {
+        axes: [0, 1, 2],
+        intrinsic: true,
+    };
+
+    /// All 24: twelve intrinsic ones, then twelve extrinsic ones.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let mut all = Vec::new();
+        for intrinsic in [true, false] {
+            for code in 0..27u8 {
+                let axes = [code / 9, code / 3 % 3, code % 3];
+                if axes[0] != axes[1] && axes[1] != axes[2] {
+                    all.push(Self { axes, intrinsic });
+                }
+            }
+        }
+        all
+    }
+
+    /// The axes in the order of the angles: 0, 1, 2 for x, y, z.
+    pub fn axes(self) -> [usize; 3] {
+        self.axes.map(usize::from)
+    }
+
+    /// Whether each angle is about an axis that those before it have turned.
+    #[must_use]
+    pub fn is_intrinsic(self) -> bool {
+        self.intrinsic
+    }
+
+    /// What the kernels are told.
+    pub(crate) fn detail(self) -> u32 {
+        let [mut i, j, mut k] = self.axes.map(i32::from);
+        if self.intrinsic {
+            (i, k) = (k, i);
+        }
+        let symmetric = i == k;
+        if symmetric {
+            k = 3 - i - j;
+        }
+        let negative = (i - j) * (j - k) * (k - i) < 0;
+        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        (i | j << 2 | k << 4) as u32
+            | flag(symmetric, SYMMETRIC)
+            | flag(negative, NEGATIVE)
+            | flag(self.intrinsic, INTRINSIC)
+    }
+}
+
+impl fmt::Display for EulerSequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let letters = if self.intrinsic { "XYZ" } else { "xyz" };
+        let axes = self.axes.map(usize::from);
+        axes.iter()
+            .try_for_each(|&axis| f.write_str(&letters[axis..=axis]))
+    }
+}
+
+/// Three letters that are no sequence.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{name}` is no sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
+)]
+pub struct UnknownSequence {
+    /// What was given.
+    pub name: String,
+}
+
+impl FromStr for EulerSequence {
+    type Err = UnknownSequence;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSequence> {
+        let named = |sequence: &Self| sequence.to_string() == name;
+        Self::all()
+            .into_iter()
+            .find(named)
+            .ok_or_else(|| UnknownSequence {
+                name: name.to_owned(),
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::twin::axis_angle::axis_angle;
+    use crate::twin::euler::euler;
+    use crate::twin::matrix::rows;
+
+    const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
+
+    fn composed(sequence: EulerSequence, degrees: [f32; 3]) -> DQuat {
+        let turns = [0, 1, 2].map(|i| {
+            let angle = f64::from(degrees[i]).to_radians();
+            DQuat::from_axis_angle(AXES[sequence.axes()[i]], angle)
+        });
+        match sequence.is_intrinsic() {
+            true => turns[0] * turns[1] * turns[2],
+            false => turns[2] * turns[1] * turns[0],
+        }
+    }
+
+    fn rotations() -> Vec<DQuat> {
+        let mut all = vec![DQuat::IDENTITY, -DQuat::IDENTITY];
+        for i in 0..4000 {
+            let x = f64::from(i);
+            let axis = DVec3::new((x * 0.7).sin(), (x * 1.3).cos(), (x * 0.4).sin());
+            all.push(DQuat::from_axis_angle(axis.normalize(), x * 0.0031 - 6.2));
+        }
+        // Locked, and next to it.
+        for axis in AXES {
+            for angle in [90.0, -90.0, 180.0, 90.001, 1e-4, 179.999] {
+                let turn = DQuat::from_axis_angle(axis, f64::to_radians(angle));
+                all.push(turn);
+                all.push(DQuat::from_rotation_x(0.3) * turn * DQuat::from_rotation_x(-0.8));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn angles_put_together_are_the_rotation() {
+        let mut locked = 0;
+        for rotation in rotations() {
+            let stored = rotation.as_quat().to_array();
+            let exact = rotation.as_quat().as_dquat().normalize();
+            for sequence in EulerSequence::all() {
+                let angles = euler(stored, sequence.detail());
+                let off =
+                    crate::reference::quaternion::angle_between(composed(sequence, angles), exact);
+                assert!(off < 1.5e-6, "{sequence}, {rotation}: {angles:?}, {off:e}");
+                let [first, second, third] = angles;
+                assert!(first.abs() <= 180.0 && third.abs() <= 180.0);
+                let symmetric = sequence.axes()[0] == sequence.axes()[2];
+                let range = if symmetric { 0.0..=180.0 } else { -90.0..=90.0 };
+                assert!(range.contains(&second), "{sequence}: {angles:?}");
+                locked += usize::from(third == 0.0);
+            }
+        }
+        assert!(locked > 50, "{locked}");
+    }
+
+    #[test]
+    fn axes_and_matrices_are_the_rotation() {
+        for rotation in rotations() {
+            let stored = rotation.as_quat();
+            let exact = stored.as_dquat().normalize();
+            let [x, y, z, degrees] = axis_angle(stored.to_array()).map(f64::from);
+            let axis = DVec3::new(x, y, z);
+            assert!((axis.length() - 1.0).abs() < 3e-7);
+            assert!((0.0..=360.0).contains(&degrees));
+            let back = DQuat::from_axis_angle(axis.normalize(), degrees.to_radians());
+            let off = crate::reference::quaternion::angle_between(back, exact);
+            assert!(off < 1.2e-6, "{rotation}: {degrees}° about {axis}, {off:e}");
+            for (r, row) in rows(stored.to_array(), 0).into_iter().enumerate() {
+                for (c, found) in row.into_iter().enumerate() {
+                    let expected = (exact * AXES[c])[r];
+                    assert!((f64::from(found) - expected).abs() < 4e-7);
+                    let transposed = rows(stored.to_array(), 1)[c][r];
+                    assert_eq!(found.to_bits(), transposed.to_bits());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_sequences() {
+        assert_eq!(EulerSequence::all().len(), 24);
+        for sequence in EulerSequence::all() {
+            assert_eq!(sequence.to_string().parse(), Ok(sequence));
+        }
+        for wrong in ["", "XY", "XYY", "Xyz", "xyzx", "abc"] {
+            assert!(wrong.parse::<EulerSequence>().is_err(), "{wrong}");
+        }
+    }
+}

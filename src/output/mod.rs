@@ -1,0 +1,6 @@
+//! TODO-DOC
+
+pub(crate) mod buffer;
+pub(crate) mod encoding;
+pub(crate) mod euler;
+pub(crate) mod rotations;

@@ -1,0 +1,309 @@
+//! Poses from poses: layers blended or added, and chains of parents walked down to the
+//! world. On the engine's device, with the CPU's bits.
+
+use crate::pose::on_cpu;
+use glam::{Quat, Vec3};
+
+use crate::engine::{Backend, Engine, Error};
+use crate::gpu::engine::VulkanEngine;
+use crate::output::buffer::OutputBuffer;
+use crate::output::rotations::{Layout, Rotations};
+use crate::pose::skeleton::Skeleton;
+use crate::shader::Kernel;
+use crate::shader::PoseDispatch;
+
+impl Engine {
+    /// Layers into one: the weighted sum of each rotation, normalised, every layer with
+    /// the sign that is nearer to the first layer's. Weights need not add up to 1.
+    ///
+    /// # Errors
+    /// When there is no layer, their shapes differ, a weight is not finite, or the device
+    /// fails.
+    pub fn blend(&self, layers: &[(&Rotations, f32)]) -> Result<Rotations, Error> {
+        let Some((&(first, _), others)) = layers.split_first() else {
+            return Err(Error::Poses("there is no layer to blend"));
+        };
+        for &(layer, _) in others {
+            same_shape(first, layer)?;
+        }
+        let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
+        finite(&weights)?;
+        self.on_device(|device| {
+            let mut blended = empty(first);
+            let mut gathered: Vec<Quat> = Vec::new();
+            for (start, output) in chunks(&mut blended, limit(device) / layers.len()) {
+                gathered.clear();
+                for &(layer, _) in layers {
+                    gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
+                }
+                let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
+                match device {
+                    None => on_cpu::blend(values, &weights, output),
+                    Some(device) => device.pass(
+                        Kernel::PosesBlend,
+                        &[bytes(values), bytes(&weights)],
+                        pass(output.len(), layers.len()),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
+            }
+            Ok(like(first, blended))
+        })
+    }
+
+    /// Every rotation of one result towards that of another, by slerp, the shorter way:
+    /// `weight` from 0 to 1.
+    ///
+    /// # Errors
+    /// When their shapes differ, the weight lies outside, or the device fails.
+    pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
+        same_shape(from, to)?;
+        part(weight)?;
+        self.on_device(|device| {
+            let mut mixed = empty(from);
+            for (start, output) in chunks(&mut mixed, limit(device)) {
+                let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
+                match device {
+                    None => on_cpu::mix(a, b, weight, output),
+                    Some(device) => device.pass(
+                        Kernel::PosesMix,
+                        &[bytes(a), bytes(b), bytes(&[weight])],
+                        pass(output.len(), 0),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
+            }
+            Ok(like(from, mixed))
+        })
+    }
+
+    /// An additive layer: what each of its rotations turns from its track's reference, or
+    /// `weight` of that (0 to 1), behind the base: `base · (reference⁻¹ layer)^weight`.
+    ///
+    /// # Errors
+    /// When the shapes differ, there is not one reference for each track, the weight lies
+    /// outside, or the device fails.
+    pub fn add(
+        &self,
+        base: &Rotations,
+        layer: &Rotations,
+        reference: &[Quat],
+        weight: f32,
+    ) -> Result<Rotations, Error> {
+        same_shape(base, layer)?;
+        part(weight)?;
+        if reference.len() != base.tracks() {
+            return Err(Error::Poses(
+                "give one reference rotation for each track of the layer",
+            ));
+        }
+        self.on_device(|device| {
+            let mut added = empty(base);
+            let mut own: Vec<[f32; 4]> = Vec::new();
+            for (start, output) in chunks(&mut added, limit(device)) {
+                let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
+                own.clear();
+                own.extend((start..start + output.len()).map(|place| {
+                    let track = match base.layout() {
+                        Layout::TrackMajor => place / base.samples(),
+                        Layout::FrameMajor => place % base.tracks(),
+                    };
+                    reference[track].to_array()
+                }));
+                match device {
+                    None => on_cpu::add(a, b, &own, weight, output),
+                    Some(device) => {
+                        own.push([weight, 0.0, 0.0, 0.0]);
+                        device.pass(
+                            Kernel::PosesAdd,
+                            &[bytes(a), bytes(b), bytes(&own)],
+                            pass(output.len(), 0),
+                            bytemuck::cast_slice_mut(output),
+                        )?;
+                    }
+                }
+            }
+            Ok(like(base, added))
+        })
+    }
+
+    /// Rotations in their parents' frames to rotations and positions in the world's.
+    ///
+    /// ```
+    /// # use glam::{Quat, Vec3};
+    /// # use tumble::{Device, Engine, Frames, Skeleton, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # let keys = [Quat::IDENTITY, Quat::from_rotation_z(std::f32::consts::FRAC_PI_2)];
+    /// set.push("upper", &[0.0, 1.0], &keys)?;
+    /// set.push("lower", &[0.0, 1.0], &[keys[0]; 2])?;
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let local = engine.evaluate(&set, method::SLERP, &Frames::fps(1))?;
+    /// let world = engine.world(&local, &Skeleton::chain(2, 3.0))?;
+    /// // The lower box hangs at the end of the upper one, which has turned aside.
+    /// assert!(world.position(1, 1).unwrap().distance(Vec3::new(3.0, 0.0, 0.0)) < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the skeleton has not one link for each track, or the device fails.
+    pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
+        let (tracks, samples) = (local.tracks(), local.samples());
+        if skeleton.len() != tracks {
+            return Err(Error::Poses(
+                "the skeleton has not one link for each track of the rotations",
+            ));
+        }
+        let links = skeleton.links();
+        self.on_device(|device| {
+            let mut values = vec![[0.0; 4]; 2 * tracks * samples];
+            let frames = (limit(device) / (2 * tracks).max(1)).max(1);
+            let mut frame_major: Vec<[f32; 4]> = Vec::new();
+            let windows = values.chunks_mut((2 * tracks * frames).max(1));
+            for (first, output) in (0..).step_by(frames).zip(windows) {
+                let count = output.len() / (2 * tracks);
+                frame_major.clear();
+                for frame in first..first + count {
+                    let own = (0..tracks)
+                        .map(|track| local.layout().index(track, frame, tracks, samples));
+                    frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
+                }
+                match device {
+                    None => on_cpu::world(&frame_major, &links, output),
+                    Some(device) => device.pass(
+                        Kernel::PosesWorld,
+                        &[bytes(&frame_major), bytes(&links)],
+                        pass(count, tracks),
+                        bytemuck::cast_slice_mut(output),
+                    )?,
+                }
+            }
+            Ok(WorldPoses {
+                values,
+                tracks,
+                samples,
+            })
+        })
+    }
+
+    /// Does some work on the engine's device; nothing is the CPU.
+    fn on_device<T>(
+        &self,
+        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        match &*self.backend {
+            Backend::Cpu(_) => work(None),
+            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| work(Some(engine))),
+        }
+    }
+}
+
+/// How many values of 16 bytes one pass takes.
+fn limit(device: Option<&VulkanEngine>) -> usize {
+    device.map_or(usize::MAX, VulkanEngine::pass_limit)
+}
+
+/// Rotations and positions in the world, `[frame][track]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorldPoses {
+    /// The rotation, then the position.
+    values: Vec<[f32; 4]>,
+    tracks: usize,
+    samples: usize,
+}
+
+impl WorldPoses {
+    /// Number of tracks.
+    #[must_use]
+    pub fn tracks(&self) -> usize {
+        self.tracks
+    }
+
+    /// Samples of each track.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// The rotation of a track at a sample; `None` out of range.
+    #[must_use]
+    pub fn rotation(&self, track: usize, sample: usize) -> Option<Quat> {
+        let place = self.place(track, sample)?;
+        Some(Quat::from_array(self.values[place]))
+    }
+
+    /// Where a track's box hangs at a sample; `None` out of range.
+    #[must_use]
+    pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
+        let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
+        Some(Vec3::new(x, y, z))
+    }
+
+    /// `[frame][track]`: the rotation `x y z w`, then the position `x y z 0`.
+    #[must_use]
+    pub fn as_slice(&self) -> &[[f32; 4]] {
+        &self.values
+    }
+
+    fn place(&self, track: usize, sample: usize) -> Option<usize> {
+        let inside = track < self.tracks && sample < self.samples;
+        inside.then(|| 2 * (sample * self.tracks + track))
+    }
+}
+
+fn same_shape(a: &Rotations, b: &Rotations) -> Result<(), Error> {
+    let shape = |layer: &Rotations| (layer.tracks(), layer.samples(), layer.layout());
+    if shape(a) == shape(b) {
+        Ok(())
+    } else {
+        Err(Error::Poses(
+            "layers differ in tracks, samples or layout; evaluate them at the same frames",
+        ))
+    }
+}
+
+fn finite(weights: &[f32]) -> Result<(), Error> {
+    if weights.iter().all(|weight| weight.is_finite()) {
+        Ok(())
+    } else {
+        Err(Error::Poses("a weight is not finite"))
+    }
+}
+
+fn part(weight: f32) -> Result<(), Error> {
+    if (0.0..=1.0).contains(&weight) {
+        Ok(())
+    } else {
+        Err(Error::Poses("a weight of slerp lies between 0 and 1"))
+    }
+}
+
+fn empty(layer: &Rotations) -> OutputBuffer {
+    OutputBuffer::new(layer.as_quats().len())
+}
+
+fn like(layer: &Rotations, quats: OutputBuffer) -> Rotations {
+    let (tracks, samples) = (layer.tracks(), layer.samples());
+    Rotations::new(Box::new(quats), tracks, samples, layer.layout())
+}
+
+/// Stretches of at most `limit` values, and where they start.
+fn chunks(quats: &mut [Quat], limit: usize) -> impl Iterator<Item = (usize, &mut [[f32; 4]])> {
+    let limit = limit.clamp(1, 1 << 40);
+    let chunks = quats.chunks_mut(limit).map(bytemuck::cast_slice_mut);
+    (0..).step_by(limit).zip(chunks)
+}
+
+fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
+    bytemuck::cast_slice(&layer.as_quats()[start..start + count])
+}
+
+fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
+    bytemuck::cast_slice(values)
+}
+
+fn pass(count: usize, detail: usize) -> PoseDispatch {
+    PoseDispatch {
+        count: count as u32,
+        detail: detail as u32,
+    }
+}

@@ -1,0 +1,178 @@
+//! Which track hangs from which.
+
+use glam::Vec3;
+
+use crate::math::canonical::canonical;
+use crate::shader::Link;
+use crate::shader::ROOT;
+
+/// Parents of tracks, and where each hangs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Skeleton {
+    parents: Vec<Option<usize>>,
+    offsets: Vec<Vec3>,
+    /// Parents before their children.
+    order: Vec<usize>,
+}
+
+/// Why parents make no skeleton. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SkeletonError {
+    /// One offset for each track.
+    #[error("there are {parents} parents but {offsets} offsets; give one of each for a track")]
+    Lengths {
+        /// Parents given.
+        parents: usize,
+        /// Offsets given.
+        offsets: usize,
+    },
+    /// No such track.
+    #[error("track {track} hangs from track {parent}, of {tracks}")]
+    NoSuchParent {
+        /// The track.
+        track: usize,
+        /// Its parent.
+        parent: usize,
+        /// How many there are.
+        tracks: usize,
+    },
+    /// A track that hangs from itself, by way of others.
+    #[error("track {track} hangs from itself")]
+    Cycle {
+        /// One of those concerned.
+        track: usize,
+    },
+    /// An offset is NaN or infinite.
+    #[error("track {track} hangs at {offset}, which is not finite")]
+    OffsetNotFinite {
+        /// The track.
+        track: usize,
+        /// Its offset.
+        offset: Vec3,
+    },
+}
+
+impl Skeleton {
+    /// Tracks that hang from their parents at offsets (any length unit), seen from the
+    /// parent's frame; a root's is where it hangs in the world.
+    ///
+    /// # Errors
+    /// A [`SkeletonError`] that names the track.
+    pub fn new(parents: Vec<Option<usize>>, offsets: Vec<Vec3>) -> Result<Self, SkeletonError> {
+        let tracks = parents.len();
+        if offsets.len() != tracks {
+            return Err(SkeletonError::Lengths {
+                parents: tracks,
+                offsets: offsets.len(),
+            });
+        }
+        if let Some(track) = offsets.iter().position(|offset| !offset.is_finite()) {
+            let offset = offsets[track];
+            return Err(SkeletonError::OffsetNotFinite { track, offset });
+        }
+        let mut children = vec![Vec::new(); tracks];
+        let mut order = Vec::with_capacity(tracks);
+        for (track, &parent) in parents.iter().enumerate() {
+            match parent {
+                None => order.push(track),
+                Some(parent) if parent < tracks => children[parent].push(track),
+                Some(parent) => {
+                    return Err(SkeletonError::NoSuchParent {
+                        track,
+                        parent,
+                        tracks,
+                    });
+                }
+            }
+        }
+        // Level by level.
+        let mut next = 0;
+        while let Some(&track) = order.get(next) {
+            order.append(&mut children[track]);
+            next += 1;
+        }
+        // What no root leads to hangs from itself.
+        if let Some(track) = children.iter().position(|left| !left.is_empty()) {
+            return Err(SkeletonError::Cycle { track });
+        }
+        Ok(Self {
+            parents,
+            offsets,
+            order,
+        })
+    }
+
+    /// A chain of boxes: the first hangs at the origin, each other at the lower end of
+    /// the one before it, `(0, -length, 0)`.
+    #[must_use]
+    pub fn chain(boxes: usize, length: f64) -> Self {
+        let offset = |track: usize| match track {
+            0 => Vec3::ZERO,
+            _ => Vec3::new(0.0, -length as f32, 0.0),
+        };
+        Self {
+            parents: (0..boxes).map(|track| track.checked_sub(1)).collect(),
+            offsets: (0..boxes).map(offset).collect(),
+            order: (0..boxes).collect(),
+        }
+    }
+
+    /// Number of tracks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parents.len()
+    }
+
+    /// Whether it has no tracks.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.parents.is_empty()
+    }
+
+    /// What the kernels walk.
+    pub(crate) fn links(&self) -> Vec<Link> {
+        let link = |&track: &usize| Link {
+            offset: self.offsets[track].to_array().map(canonical),
+            track: track as u32,
+            parent: self.parents[track].map_or(ROOT, |parent| parent as u32),
+            padding_3: [0; 3],
+        };
+        self.order.iter().map(link).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parents_come_first_and_circles_are_refused() {
+        let parents = vec![Some(2), None, Some(1), Some(2)];
+        let skeleton = Skeleton::new(parents, vec![Vec3::ZERO; 4]).unwrap();
+        assert_eq!(skeleton.order, [1, 2, 0, 3]);
+        let refused = |parents: &[Option<usize>]| {
+            Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
+        };
+        assert_eq!(refused(&[None, Some(1)]), SkeletonError::Cycle { track: 1 });
+        assert_eq!(
+            refused(&[Some(1), Some(0), None]),
+            SkeletonError::Cycle { track: 0 }
+        );
+        assert!(matches!(
+            refused(&[Some(7)]),
+            SkeletonError::NoSuchParent { parent: 7, .. }
+        ));
+        assert!(matches!(
+            Skeleton::new(vec![None], vec![]),
+            Err(SkeletonError::Lengths { .. })
+        ));
+        let nowhere = Skeleton::new(vec![None], vec![Vec3::NAN]);
+        assert!(matches!(
+            nowhere,
+            Err(SkeletonError::OffsetNotFinite { track: 0, .. })
+        ));
+        let chain = Skeleton::chain(3, 2.0);
+        assert_eq!(chain.parents, [None, Some(0), Some(1)]);
+    }
+}

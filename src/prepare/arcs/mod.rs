@@ -1,0 +1,4 @@
+//! TODO-DOC
+
+pub(crate) mod arc_lanes;
+pub(crate) mod arcs;

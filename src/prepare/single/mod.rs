@@ -1,0 +1,12 @@
+//! TODO-DOC
+
+pub(crate) mod curves;
+pub(crate) mod exp_log;
+pub(crate) mod fit_part;
+pub(crate) mod handles;
+pub(crate) mod hermite_fit;
+pub(crate) mod key_steps;
+pub(crate) mod key_weights;
+pub(crate) mod long_tangents;
+pub(crate) mod small_angle;
+pub(crate) mod waiting;

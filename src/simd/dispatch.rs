@@ -1,0 +1,232 @@
+//! The widest vector instructions that this processor has, chosen at run time: one
+//! binary runs everywhere. Every choice gives the same bits; only addition,
+//! subtraction and multiplication are used, never a fused one.
+//!
+//! Work is compiled once for each width. Where nothing is optimised that would take two thirds of
+//! a build for no speed, so that such a build has the baseline alone (`wide_vectors`, set by the
+//! build script).
+
+use std::str::FromStr;
+use std::sync::OnceLock;
+
+use glam::Vec4;
+
+#[cfg(wide_vectors)]
+use crate::simd::eight::Eight;
+#[cfg(wide_vectors)]
+use crate::simd::sixteen::Sixteen;
+
+use crate::simd::lanes::Lanes;
+
+/// Vector instructions that the twins can be compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum VectorWidth {
+    /// What the target always has: SSE2 on x86-64, NEON on `AArch64`.
+    Baseline,
+    /// AVX2, eight lanes.
+    Avx2,
+    /// AVX-512, sixteen lanes.
+    Avx512,
+}
+
+impl VectorWidth {
+    /// Every width that this processor can run, narrowest first.
+    #[must_use]
+    pub fn available() -> Vec<Self> {
+        [Self::Baseline, Self::Avx2, Self::Avx512]
+            .into_iter()
+            .filter(|width| width.is_available())
+            .collect()
+    }
+
+    /// The widest that this process uses where nobody chooses: what the processor has,
+    /// or less where the environment's `TUMBLE_VECTOR_WIDTH` says so.
+    pub fn widest() -> Self {
+        static WIDEST: OnceLock<VectorWidth> = OnceLock::new();
+        #[cfg(test)]
+        if let Some(width) = tests::WIDTH.get() {
+            return width;
+        }
+        *WIDEST.get_or_init(|| {
+            let limit = Self::limit().ok().flatten().unwrap_or(Self::Avx512);
+            limit.narrowed()
+        })
+    }
+
+    /// The limit that the environment sets.
+    pub(crate) fn limit() -> Result<Option<Self>, UnknownWidth> {
+        match std::env::var("TUMBLE_VECTOR_WIDTH") {
+            Ok(name) if !name.is_empty() => name.parse().map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// This width, or the next narrower one that the processor has.
+    pub(crate) fn narrowed(self) -> Self {
+        let wider = [Self::Avx512, Self::Avx2].into_iter();
+        let mut narrower = wider.filter(|&width| width <= self && width.is_available());
+        narrower.next().unwrap_or(Self::Baseline)
+    }
+
+    fn is_available(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(wide_vectors)]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
+            #[cfg(wide_vectors)]
+            Self::Avx512 => {
+                std::arch::is_x86_feature_detected!("avx512f")
+                    && std::arch::is_x86_feature_detected!("avx512dq")
+                    && std::arch::is_x86_feature_detected!("avx512vl")
+                    && std::arch::is_x86_feature_detected!("avx512bw")
+            }
+            #[cfg(not(wide_vectors))]
+            _ => false,
+        }
+    }
+}
+
+/// A name that is no vector width's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no vector width `{name}`; there are baseline, avx2 and avx512")]
+pub struct UnknownWidth {
+    /// The name given.
+    pub name: String,
+}
+
+impl FromStr for VectorWidth {
+    type Err = UnknownWidth;
+
+    fn from_str(name: &str) -> Result<Self, UnknownWidth> {
+        match name.to_lowercase().as_str() {
+            "baseline" | "sse2" | "neon" => Ok(Self::Baseline),
+            "avx2" => Ok(Self::Avx2),
+            "avx512" => Ok(Self::Avx512),
+            _ => Err(UnknownWidth {
+                name: name.to_owned(),
+            }),
+        }
+    }
+}
+
+/// Work over lanes: `run` is compiled for each vector width. Implementations are
+/// `#[inline(always)]`. Loops that are not written in vectors have no branches, calls or
+/// intrinsics, so that the compiler makes vectors of them.
+pub(crate) trait InLanes {
+    /// `L`: the vectors, for work that is written in them.
+    fn run<L: Lanes>(&mut self);
+}
+
+/// Does work over lanes with the widest vectors there are.
+pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
+    in_lanes_of(VectorWidth::widest(), work);
+}
+
+/// Does work over lanes with vectors of a width, or of the next narrower one that the processor
+/// has.
+pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
+    match width.narrowed() {
+        #[cfg(wide_vectors)]
+        // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
+        VectorWidth::Avx512 => unsafe { avx512(work) },
+        #[cfg(wide_vectors)]
+        // SAFETY: the processor has AVX2, likewise.
+        VectorWidth::Avx2 => unsafe { avx2(work) },
+        _ => work.run::<Vec4>(),
+    }
+}
+
+#[cfg(wide_vectors)]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
+fn avx512<W: InLanes>(work: &mut W) {
+    work.run::<Sixteen>();
+}
+
+#[cfg(wide_vectors)]
+#[target_feature(enable = "avx2")]
+fn avx2<W: InLanes>(work: &mut W) {
+    work.run::<Eight>();
+}
+
+/// The narrowest vectors with which long results are better written past the caches on this
+/// processor, if any. A core of Intel's waits for each line that it overwrites, one of AMD's Zen 5
+/// often; Zen 3 writes as fast either way.
+pub(crate) fn streaming_stores_from() -> Option<VectorWidth> {
+    static FROM: OnceLock<Option<VectorWidth>> = OnceLock::new();
+    *FROM.get_or_init(detect_streaming_stores)
+}
+
+#[cfg(target_arch = "x86_64")]
+fn detect_streaming_stores() -> Option<VectorWidth> {
+    use std::arch::x86_64::__cpuid;
+    const ZEN_5: u32 = 26;
+    let vendor = __cpuid(0);
+    let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
+    // Above 15, it is told in two parts.
+    let signature = __cpuid(1).eax;
+    let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
+    match name.as_flattened() {
+        b"GenuineIntel" => Some(VectorWidth::Avx2),
+        b"AuthenticAMD" if family >= ZEN_5 => Some(VectorWidth::Avx512),
+        _ => None,
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn detect_streaming_stores() -> Option<VectorWidth> {
+    None
+}
+
+/// Bytes that a cache brings at once, on most processors.
+pub(crate) const CACHE_LINE: usize = 64;
+
+/// Has memory brought into the cache, while what comes next is done.
+pub(crate) fn bring_near(memory: &[u8]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in memory.chunks(CACHE_LINE) {
+        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+        // SAFETY: SSE is always there; nothing is read that counts.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = memory;
+}
+
+/// What this thread stored past the caches is seen before what it stores from here on.
+pub(crate) fn fence() {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: SSE is always there.
+    unsafe {
+        std::arch::x86_64::_mm_sfence();
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::cell::Cell;
+
+    use super::VectorWidth;
+
+    thread_local! {
+        pub(crate) static WIDTH: Cell<Option<VectorWidth>> = const { Cell::new(None) };
+    }
+
+    /// What `work` gives on this thread at every width that the processor has.
+    pub(crate) fn at_every_width<R>(work: impl Fn() -> R) -> Vec<(VectorWidth, R)> {
+        let at = |width| {
+            WIDTH.set(Some(width));
+            (width, work())
+        };
+        let results = VectorWidth::available().into_iter().map(at).collect();
+        WIDTH.set(None);
+        results
+    }
+
+    #[test]
+    fn widths_have_names() {
+        assert_eq!("AVX2".parse(), Ok(VectorWidth::Avx2));
+        assert_eq!("sse2".parse(), Ok(VectorWidth::Baseline));
+        let error = "avx".parse::<VectorWidth>().unwrap_err();
+        assert!(error.to_string().contains("baseline, avx2 and avx512"));
+    }
+}

@@ -1,0 +1,341 @@
+//! [`Doubles`](crate::simd::lanes::Doubles) as two vectors, each with half of the samples.
+
+use glam::Vec4;
+
+use pair::Pair;
+
+/// Makes two vectors of so many numbers by these functions of one, which `$run` calls.
+macro_rules! doubles {
+    ($name:ident: $vector:ident, $count:literal, $run:ident, $all:path, $add:path, $sub:path,
+     $mul:path, $div:path, $negated:path, $root:path, $min:path, $max:path, $up_to:path,
+     $are_at_most:path) => {
+        /// As many numbers as a vector of f32 has lanes.
+        #[derive(Clone, Copy)]
+        pub(crate) struct $name(pub(crate) [$vector; 2]);
+
+        impl std::ops::Add for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn add(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$add(a, c), $add(b, d)]))
+            }
+        }
+
+        impl std::ops::Sub for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn sub(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$sub(a, c), $sub(b, d)]))
+            }
+        }
+
+        impl std::ops::Mul for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn mul(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$mul(a, c), $mul(b, d)]))
+            }
+        }
+
+        impl std::ops::Div for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn div(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$div(a, c), $div(b, d)]))
+            }
+        }
+
+        impl std::ops::Neg for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let Self([a, b]) = self;
+                Self([$negated(a), $negated(b)])
+            }
+        }
+
+        impl $crate::math::quaternion::Real for $name {
+            #[inline(always)]
+            fn all(value: f64) -> Self {
+                Self([$run!($all(value)); 2])
+            }
+
+            #[inline(always)]
+            fn root(self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$root(a), $root(b)]))
+            }
+
+            #[inline(always)]
+            fn smaller(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$min(a, c), $min(b, d)]))
+            }
+
+            #[inline(always)]
+            fn larger(self, Self([c, d]): Self) -> Self {
+                let Self([a, b]) = self;
+                Self($run!([$max(a, c), $max(b, d)]))
+            }
+
+            #[inline(always)]
+            fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self {
+                let ([a, b], [c, d]) = (self.0, limit.0);
+                let ([e, f], [g, h]) = (then.0, otherwise.0);
+                Self([$up_to(a, c, e, g), $up_to(b, d, f, h)])
+            }
+        }
+
+        impl $crate::simd::lanes::Doubles for $name {
+            #[inline(always)]
+            fn load(numbers: &[f64]) -> Self {
+                let own: [f64; 2 * $count] = *numbers.first_chunk().expect("enough numbers");
+                Self(bytemuck::cast(own))
+            }
+
+            #[inline(always)]
+            fn store(self, numbers: &mut [f64]) {
+                let own: [f64; 2 * $count] = bytemuck::cast(self.0);
+                numbers[..2 * $count].copy_from_slice(&own);
+            }
+
+            #[inline(always)]
+            fn are_at_most(self, limit: f64) -> bool {
+                let Self([a, b]) = self;
+                let limit = $run!($all(limit));
+                $are_at_most(a, limit) && $are_at_most(b, limit)
+            }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+pub(crate) use doubles;
+
+/// What every processor of the target does.
+#[cfg(target_arch = "x86_64")]
+macro_rules! baseline {
+    ($($work:tt)*) => {
+        // SAFETY: every x86-64 processor has SSE2.
+        unsafe { $($work)* }
+    };
+}
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! baseline {
+    ($work:expr) => {
+        $work
+    };
+}
+
+doubles!(
+    Four: Pair, 2, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div,
+    pair::negated, pair::root, pair::smaller, pair::larger, pair::up_to, pair::are_at_most
+);
+
+impl Four {
+    /// Rounded to f32.
+    #[inline(always)]
+    pub(crate) fn rounded(self) -> Vec4 {
+        let Self([a, b]) = self;
+        pair::rounded(a, b)
+    }
+
+    /// The same in f64.
+    #[inline(always)]
+    pub(crate) fn of(numbers: Vec4) -> Self {
+        Self(pair::widened(numbers))
+    }
+}
+
+/// Two numbers, by SSE2.
+#[cfg(target_arch = "x86_64")]
+mod pair {
+    use std::arch::x86_64::{
+        __m128, _mm_and_pd, _mm_andnot_pd, _mm_cmple_pd, _mm_cvtpd_ps, _mm_cvtps_pd, _mm_movehl_ps,
+        _mm_movelh_ps, _mm_movemask_pd, _mm_or_pd, _mm_set1_pd, _mm_xor_pd,
+    };
+    pub(crate) use std::arch::x86_64::{
+        __m128d as Pair, _mm_add_pd as add, _mm_div_pd as div, _mm_max_pd as larger,
+        _mm_min_pd as smaller, _mm_mul_pd as mul, _mm_set1_pd as all, _mm_sqrt_pd as root,
+        _mm_sub_pd as sub,
+    };
+
+    use super::Vec4;
+
+    #[inline(always)]
+    pub(crate) fn negated(numbers: Pair) -> Pair {
+        baseline!(_mm_xor_pd(numbers, _mm_set1_pd(-0.0)))
+    }
+
+    #[inline(always)]
+    pub(crate) fn up_to(numbers: Pair, limit: Pair, then: Pair, otherwise: Pair) -> Pair {
+        baseline! {
+            let within = _mm_cmple_pd(numbers, limit);
+            _mm_or_pd(_mm_and_pd(within, then), _mm_andnot_pd(within, otherwise))
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn are_at_most(numbers: Pair, limit: Pair) -> bool {
+        baseline!(_mm_movemask_pd(_mm_cmple_pd(numbers, limit)) == 0b11)
+    }
+
+    #[inline(always)]
+    pub(crate) fn rounded(a: Pair, b: Pair) -> Vec4 {
+        Vec4::from(baseline!(_mm_movelh_ps(_mm_cvtpd_ps(a), _mm_cvtpd_ps(b))))
+    }
+
+    #[inline(always)]
+    pub(crate) fn widened(numbers: Vec4) -> [Pair; 2] {
+        let numbers = __m128::from(numbers);
+        baseline!([
+            _mm_cvtps_pd(numbers),
+            _mm_cvtps_pd(_mm_movehl_ps(numbers, numbers))
+        ])
+    }
+}
+
+/// Two numbers, by what the compiler makes of them.
+#[cfg(not(target_arch = "x86_64"))]
+mod pair {
+    pub(crate) use glam::DVec2 as Pair;
+
+    use super::Vec4;
+
+    #[inline(always)]
+    pub(crate) fn all(value: f64) -> Pair {
+        Pair::splat(value)
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(a: Pair, b: Pair) -> Pair {
+        a + b
+    }
+
+    #[inline(always)]
+    pub(crate) fn sub(a: Pair, b: Pair) -> Pair {
+        a - b
+    }
+
+    #[inline(always)]
+    pub(crate) fn mul(a: Pair, b: Pair) -> Pair {
+        a * b
+    }
+
+    #[inline(always)]
+    pub(crate) fn div(a: Pair, b: Pair) -> Pair {
+        a / b
+    }
+
+    #[inline(always)]
+    pub(crate) fn negated(numbers: Pair) -> Pair {
+        -numbers
+    }
+
+    #[inline(always)]
+    pub(crate) fn root(numbers: Pair) -> Pair {
+        Pair::new(numbers.x.sqrt(), numbers.y.sqrt())
+    }
+
+    #[inline(always)]
+    pub(crate) fn smaller(a: Pair, b: Pair) -> Pair {
+        Pair::select(a.cmplt(b), a, b)
+    }
+
+    #[inline(always)]
+    pub(crate) fn larger(a: Pair, b: Pair) -> Pair {
+        Pair::select(a.cmpgt(b), a, b)
+    }
+
+    #[inline(always)]
+    pub(crate) fn up_to(numbers: Pair, limit: Pair, then: Pair, otherwise: Pair) -> Pair {
+        Pair::select(numbers.cmple(limit), then, otherwise)
+    }
+
+    #[inline(always)]
+    pub(crate) fn are_at_most(numbers: Pair, limit: Pair) -> bool {
+        numbers.cmple(limit).all()
+    }
+
+    #[inline(always)]
+    pub(crate) fn rounded(a: Pair, b: Pair) -> Vec4 {
+        Vec4::new(a.x as f32, a.y as f32, b.x as f32, b.y as f32)
+    }
+
+    #[inline(always)]
+    pub(crate) fn widened(numbers: Vec4) -> [Pair; 2] {
+        let [x, y, z, w] = numbers.to_array().map(f64::from);
+        [Pair::new(x, y), Pair::new(z, w)]
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::math::quaternion::Real;
+    use crate::simd::lanes::{Doubles, Lanes};
+
+    /// Catches halves that are mixed up, and a comparison that sees only one of them.
+    pub(crate) fn doubles_are_samples<L: Lanes>() {
+        let numbers: Vec<f64> = (0..L::COUNT).map(|k| 0.1 * (k * k) as f64 - 0.7).collect();
+        let found = L::Doubles::load(&numbers);
+        let two = L::Doubles::all(2.0);
+        let mut stored = vec![0.0; L::COUNT];
+        let mut rounded = vec![0.0; L::COUNT];
+        L::rounded(found).store(&mut rounded);
+        let widened = L::load(&rounded).widened();
+        type Same = fn(f64) -> f64;
+        let cases: [(L::Doubles, Same); 11] = [
+            (found, |x| x),
+            (widened, |x| f64::from(x as f32)),
+            (found + two, |x| x + 2.0),
+            (found - two, |x| x - 2.0),
+            (found * two, |x| x * 2.0),
+            (two / found, |x| 2.0 / x),
+            (-found, |x| -x),
+            ((found * found).root(), f64::abs),
+            (found.smaller(two), |x| if x < 2.0 { x } else { 2.0 }),
+            (found.larger(two), |x| if x > 2.0 { x } else { 2.0 }),
+            (found.up_to(two, found, -two), |x| {
+                if x <= 2.0 { x } else { -2.0 }
+            }),
+        ];
+        for (doubles, same) in cases {
+            doubles.store(&mut stored);
+            assert!(stored.iter().copied().eq(numbers.iter().copied().map(same)));
+        }
+        for (number, rounded) in numbers.iter().zip(rounded) {
+            assert_eq!(*number as f32, rounded);
+        }
+        for k in 0..L::COUNT {
+            for other in [4.5, f64::NAN] {
+                let mut all = vec![4.0; L::COUNT];
+                assert!(L::Doubles::load(&all).are_at_most(4.0));
+                all[k] = other;
+                assert!(!L::Doubles::load(&all).are_at_most(4.0));
+                let own = L::Doubles::load(&all);
+                for (doubles, of_none) in [
+                    (own.larger(two), 2.0),
+                    (own.smaller(two), 2.0),
+                    (own.up_to(two, own, two + two), 4.0),
+                ] {
+                    doubles.store(&mut stored);
+                    assert!(!other.is_nan() || stored[k] == of_none);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn four_doubles_are_samples() {
+        doubles_are_samples::<Vec4>();
+    }
+}

@@ -1,0 +1,322 @@
+//! Eight lanes of AVX2.
+
+use std::arch::x86_64::{
+    __m256, __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_pd, _mm256_add_ps,
+    _mm256_and_ps, _mm256_blendv_pd, _mm256_blendv_ps, _mm256_castps_pd, _mm256_castps256_ps128,
+    _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd,
+    _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
+    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
+    _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
+    _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
+    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
+};
+use std::cell::Cell;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::curve::segment::POWERS;
+use crate::shader::PolynomialSegment;
+use crate::shader::TINY_BITS;
+use crate::simd::doubles::doubles;
+use crate::simd::lanes::{Lanes, Number};
+use crate::simd::operators::operators;
+
+/// What only processors with AVX2 do.
+macro_rules! avx2 {
+    ($($work:tt)*) => {
+        // SAFETY: functions that are compiled for AVX2 alone use `Eight`, and those run where
+        // the processor has it (`Kernels::new`, `lanes_of`).
+        unsafe { $($work)* }
+    };
+}
+
+/// Samples 0 2 4 6 in one half and 1 3 5 7 in the other: so two neighbours lie side by side
+/// when each half has been transposed, and the halves need not be exchanged.
+#[derive(Clone, Copy)]
+pub(crate) struct Eight(__m256);
+
+/// Two rotations, half of a cache line.
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(C, align(32))]
+pub(crate) struct HalfLine([[f32; 4]; 2]);
+
+operators!(Eight: avx2, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_xor_ps);
+
+impl Number for Eight {
+    #[inline(always)]
+    fn all(value: f32) -> Self {
+        Self(avx2!(_mm256_set1_ps(value)))
+    }
+
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        let tiny = Self::all(f32::from_bits(TINY_BITS));
+        let magnitude = self.magnitude();
+        Self(avx2! {
+            let whole = _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude.0, tiny.0);
+            _mm256_and_ps(self.0, whole)
+        })
+    }
+}
+
+impl Eight {
+    /// A rotation in each half.
+    #[inline(always)]
+    fn of_two(first: [f32; 4], second: [f32; 4]) -> Self {
+        Self(avx2!(_mm256_set_m128(
+            bytemuck::cast(second),
+            bytemuck::cast(first)
+        )))
+    }
+}
+
+doubles!(
+    EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
+    _mm256_mul_pd, _mm256_div_pd, negated, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to,
+    are_at_most
+);
+
+#[inline(always)]
+fn negated(numbers: __m256d) -> __m256d {
+    avx2!(_mm256_xor_pd(numbers, _mm256_set1_pd(-0.0)))
+}
+
+#[inline(always)]
+fn up_to(numbers: __m256d, limit: __m256d, then: __m256d, otherwise: __m256d) -> __m256d {
+    avx2! {
+        let within = _mm256_cmp_pd::<_CMP_LE_OQ>(numbers, limit);
+        _mm256_blendv_pd(otherwise, then, within)
+    }
+}
+
+#[inline(always)]
+fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
+    avx2! {
+        let within = _mm256_cmp_pd::<_CMP_LE_OQ>(numbers, limit);
+        _mm256_movemask_pd(within) == 0b1111
+    }
+}
+
+impl Lanes for Eight {
+    const COUNT: usize = 8;
+
+    type Narrow = Self;
+    type Rotations = [[f32; 4]; 8];
+    type Doubles = EightDoubles;
+    type Block = HalfLine;
+
+    #[inline(always)]
+    fn rounded(EightDoubles([a, b]): EightDoubles) -> Self {
+        Self(avx2! {
+            let samples = _mm256_set_m128(_mm256_cvtpd_ps(b), _mm256_cvtpd_ps(a));
+            _mm256_permutevar8x32_ps(samples, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7))
+        })
+    }
+
+    #[inline(always)]
+    fn widened(self) -> EightDoubles {
+        EightDoubles(avx2! {
+            let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+            let samples = _mm256_permutevar8x32_ps(self.0, order);
+            let (low, high) = (
+                _mm256_castps256_ps128(samples),
+                _mm256_extractf128_ps::<1>(samples),
+            );
+            [_mm256_cvtps_pd(low), _mm256_cvtps_pd(high)]
+        })
+    }
+
+    #[inline(always)]
+    fn load(samples: &[f32]) -> Self {
+        let samples: [f32; 8] = *samples.first_chunk().expect("eight samples");
+        Self(avx2! {
+            let order = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
+            _mm256_permutevar8x32_ps(bytemuck::cast(samples), order)
+        })
+    }
+
+    #[inline(always)]
+    fn store(self, samples: &mut [f32]) {
+        let stored = avx2! {
+            let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+            _mm256_permutevar8x32_ps(self.0, order)
+        };
+        samples.copy_from_slice(&bytemuck::cast::<_, [f32; 8]>(stored));
+    }
+
+    #[inline(always)]
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
+        let rotations: [[f32; 4]; 8] = *rotations.first_chunk().expect("eight rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(rotations);
+        Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    }
+
+    #[inline(always)]
+    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
+        let [a, b, c, d, e, f, g, h]: [u32; 8] = *places.first_chunk().expect("eight places");
+        // Written out: closures are not always inlined.
+        Self::transposed([
+            Self::of_two(rotations[a as usize], rotations[b as usize]),
+            Self::of_two(rotations[c as usize], rotations[d as usize]),
+            Self::of_two(rotations[e as usize], rotations[f as usize]),
+            Self::of_two(rotations[g as usize], rotations[h as usize]),
+        ])
+    }
+
+    #[inline(always)]
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
+        let from: [[f32; 4]; 8] = *from.first_chunk().expect("eight rotations");
+        let to: [[f32; 4]; 8] = *to.first_chunk().expect("eight rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(from);
+        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(to);
+        // Multiplied before they are put side by side: half as much to put.
+        let [x, y, z, w] = Self::transposed([
+            Self(a) * Self(e),
+            Self(b) * Self(f),
+            Self(c) * Self(g),
+            Self(d) * Self(h),
+        ]);
+        x + y + z + w
+    }
+
+    #[inline(always)]
+    fn repeated(rotation: [f32; 4]) -> Self {
+        Self::of_two(rotation, rotation)
+    }
+
+    #[inline(always)]
+    fn fourfold(self) -> [Self; 4] {
+        // Lanes are in the order for it.
+        avx2! {
+            [
+                Self(_mm256_permute_ps::<0b00_00_00_00>(self.0)),
+                Self(_mm256_permute_ps::<0b01_01_01_01>(self.0)),
+                Self(_mm256_permute_ps::<0b10_10_10_10>(self.0)),
+                Self(_mm256_permute_ps::<0b11_11_11_11>(self.0)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn fourfold_of(samples: &[f32]) -> Self {
+        let [a, b]: [f32; 2] = *samples.first_chunk().expect("two samples");
+        Self::of_two([a; 4], [b; 4])
+    }
+
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 2]>(self.0));
+    }
+
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        // Written out: closures are not always inlined.
+        let rows = avx2! {
+            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
+            [
+                _mm256_unpacklo_pd(ab_low, cd_low),
+                _mm256_unpackhi_pd(ab_low, cd_low),
+                _mm256_unpacklo_pd(ab_high, cd_high),
+                _mm256_unpackhi_pd(ab_high, cd_high),
+            ]
+        };
+        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
+        [Self(e), Self(f), Self(g), Self(h)]
+    }
+
+    #[inline(always)]
+    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
+        bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+        let places: [usize; 8] = *places.first_chunk().expect("eight places");
+        let segments: &mut [[[f32; 4]; POWERS]] = bytemuck::cast_slice_mut(segments);
+        let segments = Cell::from_mut(segments).as_slice_of_cells();
+        // Each is looked up once, not for every power.
+        let own = places.map(|place| segments[place].as_array_of_cells());
+        for (power, &components) in powers.iter().enumerate() {
+            let rotations = Self::rotations(components);
+            for (segment, rotation) in own.iter().zip(rotations) {
+                segment[power].set(rotation);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn of_block(half: &HalfLine) -> Self {
+        Self(bytemuck::cast(*half))
+    }
+
+    #[inline(always)]
+    fn behind(self, half: &HalfLine, count: usize) -> Self {
+        let places = Self(bytemuck::cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
+        let (half, end) = (Self::of_block(half), Self::all((4 * count) as f32));
+        Self(avx2! {
+            let is_first = _mm256_cmp_ps::<_CMP_LT_OQ>(places.0, end.0);
+            _mm256_blendv_ps(self.0, half.0, is_first)
+        })
+    }
+
+    #[inline(always)]
+    fn store_past_caches(self, half: &mut HalfLine) {
+        // The place is aligned as half of a line is.
+        avx2!(_mm256_stream_ps(std::ptr::from_mut(half).cast(), self.0));
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+        Self(avx2! {
+            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
+            _mm256_blendv_ps(one.0, minus_one.0, below)
+        })
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
+        Self(avx2!(_mm256_and_ps(self.0, magnitude.0)))
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(avx2!(_mm256_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn any_at_most(self, limit: f32) -> bool {
+        let limit = Self::all(limit);
+        avx2! {
+            let within = _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0);
+            _mm256_movemask_ps(within) != 0
+        }
+    }
+
+    #[inline(always)]
+    fn any_within(self, limit: f32) -> bool {
+        self.magnitude().any_at_most(limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::evaluate::tests::runs_are_samples;
+    use crate::simd::dispatch::VectorWidth;
+    use crate::simd::doubles::tests::doubles_are_samples;
+    use crate::simd::lanes::tests::lanes_are_samples;
+
+    #[test]
+    fn eight_lanes_are_samples() {
+        if VectorWidth::available().contains(&VectorWidth::Avx2) {
+            lanes_are_samples::<Eight>();
+            doubles_are_samples::<Eight>();
+            runs_are_samples::<Eight>();
+        }
+    }
+}

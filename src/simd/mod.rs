@@ -1,0 +1,14 @@
+//! Vectors of f32 and f64 numbers: four lanes on any target, eight of AVX2 and sixteen of
+//! AVX-512, chosen at run time. With `gpu`, the only place that is not safe Rust: what is unsafe
+//! are the processor's own vector instructions.
+#![allow(unsafe_code)]
+
+pub(crate) mod dispatch;
+pub(crate) mod doubles;
+#[cfg(wide_vectors)]
+pub(crate) mod eight;
+pub(crate) mod lanes;
+#[cfg(wide_vectors)]
+pub(crate) mod operators;
+#[cfg(wide_vectors)]
+pub(crate) mod sixteen;

@@ -1,0 +1,341 @@
+//! Sixteen lanes of AVX-512.
+
+use std::arch::x86_64::{
+    __m256, __m512, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_set_m128, _mm512_abs_ps,
+    _mm512_add_pd, _mm512_add_ps, _mm512_broadcast_f32x4, _mm512_castpd_ps, _mm512_castps_pd,
+    _mm512_castps256_ps512, _mm512_castps512_ps256, _mm512_cmp_pd_mask, _mm512_cmp_ps_mask,
+    _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
+    _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
+    _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
+    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
+    _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
+    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
+};
+
+use crate::cpu::streaming::Line;
+use crate::shader::PolynomialSegment;
+use crate::shader::TINY_BITS;
+use crate::simd::doubles::doubles;
+use crate::simd::eight::Eight;
+use crate::simd::lanes::{Lanes, Number};
+use crate::simd::operators::operators;
+
+/// What only processors with AVX-512 do.
+macro_rules! avx512 {
+    ($($work:tt)*) => {
+        // SAFETY: functions that are compiled for AVX-512 alone use `Sixteen`, and those run
+        // where the processor has it (`Kernels::new`, `lanes_of`).
+        unsafe { $($work)* }
+    };
+}
+
+/// Samples 0 4 8 12 in the first quarter, 1 5 9 13 in the next, and so on: so four neighbours
+/// lie side by side when each quarter has been transposed.
+#[derive(Clone, Copy)]
+pub(crate) struct Sixteen(__m512);
+
+operators!(Sixteen: avx512, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_xor_ps);
+
+impl Number for Sixteen {
+    #[inline(always)]
+    fn all(value: f32) -> Self {
+        Self(avx512!(_mm512_set1_ps(value)))
+    }
+
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        let tiny = Self::all(f32::from_bits(TINY_BITS));
+        Self(avx512! {
+            let whole = _mm512_cmp_ps_mask::<_CMP_NLT_UQ>(_mm512_abs_ps(self.0), tiny.0);
+            _mm512_maskz_mov_ps(whole, self.0)
+        })
+    }
+}
+
+/// Two halves.
+#[inline(always)]
+fn joined(low: __m256, high: __m256) -> __m512 {
+    avx512!(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+}
+
+impl Sixteen {
+    /// From the order of lanes to that of samples, and back.
+    #[inline(always)]
+    fn reordered(self) -> Self {
+        Self(avx512! {
+            let order = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
+            _mm512_permutexvar_ps(order, self.0)
+        })
+    }
+
+    /// The first quarters of four vectors side by side, and so on.
+    #[inline(always)]
+    fn quarters_exchanged([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        avx512! {
+            let ab_even = _mm512_shuffle_f32x4::<0b10_00_10_00>(a.0, b.0);
+            let ab_odd = _mm512_shuffle_f32x4::<0b11_01_11_01>(a.0, b.0);
+            let cd_even = _mm512_shuffle_f32x4::<0b10_00_10_00>(c.0, d.0);
+            let cd_odd = _mm512_shuffle_f32x4::<0b11_01_11_01>(c.0, d.0);
+            [
+                Self(_mm512_shuffle_f32x4::<0b10_00_10_00>(ab_even, cd_even)),
+                Self(_mm512_shuffle_f32x4::<0b10_00_10_00>(ab_odd, cd_odd)),
+                Self(_mm512_shuffle_f32x4::<0b11_01_11_01>(ab_even, cd_even)),
+                Self(_mm512_shuffle_f32x4::<0b11_01_11_01>(ab_odd, cd_odd)),
+            ]
+        }
+    }
+
+    /// A rotation in each quarter.
+    #[inline(always)]
+    fn of_four([a, b, c, d]: [[f32; 4]; 4]) -> Self {
+        Self(avx512! {
+            let low = _mm256_set_m128(bytemuck::cast(b), bytemuck::cast(a));
+            let high = _mm256_set_m128(bytemuck::cast(d), bytemuck::cast(c));
+            joined(low, high)
+        })
+    }
+}
+
+doubles!(
+    SixteenDoubles: __m512d, 8, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
+    _mm512_mul_pd, _mm512_div_pd, negated, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to,
+    are_at_most
+);
+
+#[inline(always)]
+fn negated(numbers: __m512d) -> __m512d {
+    avx512!(_mm512_xor_pd(numbers, _mm512_set1_pd(-0.0)))
+}
+
+#[inline(always)]
+fn up_to(numbers: __m512d, limit: __m512d, then: __m512d, otherwise: __m512d) -> __m512d {
+    avx512! {
+        let within = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(numbers, limit);
+        _mm512_mask_blend_pd(within, otherwise, then)
+    }
+}
+
+#[inline(always)]
+fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
+    avx512!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(numbers, limit) == u8::MAX)
+}
+
+impl Lanes for Sixteen {
+    const COUNT: usize = 16;
+
+    type Narrow = Eight;
+    type Rotations = [[f32; 4]; 16];
+    type Doubles = SixteenDoubles;
+    type Block = Line;
+
+    #[inline(always)]
+    fn rounded(SixteenDoubles([a, b]): SixteenDoubles) -> Self {
+        Self(avx512!(joined(_mm512_cvtpd_ps(a), _mm512_cvtpd_ps(b)))).reordered()
+    }
+
+    #[inline(always)]
+    fn widened(self) -> SixteenDoubles {
+        let samples = self.reordered();
+        SixteenDoubles(avx512! {
+            let low = _mm512_castps512_ps256(samples.0);
+            let high = _mm512_extractf32x8_ps::<1>(samples.0);
+            [_mm512_cvtps_pd(low), _mm512_cvtps_pd(high)]
+        })
+    }
+
+    #[inline(always)]
+    fn load(samples: &[f32]) -> Self {
+        let samples: [f32; 16] = *samples.first_chunk().expect("sixteen samples");
+        Self(bytemuck::cast(samples)).reordered()
+    }
+
+    #[inline(always)]
+    fn store(self, samples: &mut [f32]) {
+        let stored: [f32; 16] = bytemuck::cast(self.reordered().0);
+        samples.copy_from_slice(&stored);
+    }
+
+    #[inline(always)]
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
+        let rotations: [[f32; 4]; 16] = *rotations.first_chunk().expect("sixteen rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m512; 4]>(rotations);
+        Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    }
+
+    #[inline(always)]
+    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
+        let places: &[u32; 16] = places.first_chunk().expect("sixteen places");
+        // Written out: closures are not always inlined.
+        macro_rules! four {
+            ($a:literal $b:literal $c:literal $d:literal) => {
+                Self::of_four([
+                    rotations[places[$a] as usize],
+                    rotations[places[$b] as usize],
+                    rotations[places[$c] as usize],
+                    rotations[places[$d] as usize],
+                ])
+            };
+        }
+        Self::transposed([
+            four!(0 1 2 3),
+            four!(4 5 6 7),
+            four!(8 9 10 11),
+            four!(12 13 14 15),
+        ])
+    }
+
+    #[inline(always)]
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
+        let from: [[f32; 4]; 16] = *from.first_chunk().expect("sixteen rotations");
+        let to: [[f32; 4]; 16] = *to.first_chunk().expect("sixteen rotations");
+        let [a, b, c, d] = bytemuck::cast::<_, [__m512; 4]>(from);
+        let [e, f, g, h] = bytemuck::cast::<_, [__m512; 4]>(to);
+        // Multiplied before they are put side by side: half as much to put.
+        let [x, y, z, w] = Self::transposed([
+            Self(a) * Self(e),
+            Self(b) * Self(f),
+            Self(c) * Self(g),
+            Self(d) * Self(h),
+        ]);
+        x + y + z + w
+    }
+
+    #[inline(always)]
+    fn repeated(rotation: [f32; 4]) -> Self {
+        Self(avx512!(_mm512_broadcast_f32x4(bytemuck::cast(rotation))))
+    }
+
+    #[inline(always)]
+    fn fourfold(self) -> [Self; 4] {
+        // Lanes are in the order for it.
+        avx512! {
+            [
+                Self(_mm512_permute_ps::<0b00_00_00_00>(self.0)),
+                Self(_mm512_permute_ps::<0b01_01_01_01>(self.0)),
+                Self(_mm512_permute_ps::<0b10_10_10_10>(self.0)),
+                Self(_mm512_permute_ps::<0b11_11_11_11>(self.0)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn fourfold_of(samples: &[f32]) -> Self {
+        let [a, b, c, d]: [f32; 4] = *samples.first_chunk().expect("four samples");
+        Self(bytemuck::cast([[a; 4], [b; 4], [c; 4], [d; 4]]))
+    }
+
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 4]>(self.0));
+    }
+
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        // Written out: closures are not always inlined.
+        avx512! {
+            let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
+            [
+                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low))),
+                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low))),
+                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high))),
+                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
+        bytemuck::cast([a.0, b.0, c.0, d.0])
+    }
+
+    #[inline(always)]
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+        // A vector for each lane and four powers: a quarter as many stores. The last four
+        // begin with what is stored already.
+        for i in 0..powers.len().div_ceil(4) {
+            let first = (4 * i).min(powers.len() - 4);
+            let a = Self::transposed(powers[first]);
+            let b = Self::transposed(powers[first + 1]);
+            let c = Self::transposed(powers[first + 2]);
+            let d = Self::transposed(powers[first + 3]);
+            for quarter in 0..4 {
+                let own = [a[quarter], b[quarter], c[quarter], d[quarter]];
+                let own = Self::quarters_exchanged(own);
+                for j in 0..4 {
+                    let rotations: [[f32; 4]; 4] = bytemuck::cast(own[j].0);
+                    let segment = &mut segments[places[4 * quarter + j]];
+                    segment.coefficients[first..first + 4].copy_from_slice(&rotations);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn of_block(line: &Line) -> Self {
+        Self(bytemuck::cast(*line))
+    }
+
+    #[inline(always)]
+    fn behind(self, line: &Line, count: usize) -> Self {
+        let first = (1u32 << (4 * count)) - 1;
+        let line = Self::of_block(line);
+        Self(avx512!(_mm512_mask_blend_ps(first as u16, self.0, line.0)))
+    }
+
+    #[inline(always)]
+    fn store_past_caches(self, line: &mut Line) {
+        // The place is aligned as a line is.
+        avx512!(_mm512_stream_ps(std::ptr::from_mut(line).cast(), self.0));
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+        Self(avx512! {
+            let below = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, _mm512_setzero_ps());
+            _mm512_mask_blend_ps(below, one.0, minus_one.0)
+        })
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Self(avx512!(_mm512_abs_ps(self.0)))
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(avx512!(_mm512_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn any_at_most(self, limit: f32) -> bool {
+        let limit = Self::all(limit);
+        avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, limit.0) != 0)
+    }
+
+    #[inline(always)]
+    fn any_within(self, limit: f32) -> bool {
+        self.magnitude().any_at_most(limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::evaluate::tests::runs_are_samples;
+    use crate::simd::dispatch::VectorWidth;
+    use crate::simd::doubles::tests::doubles_are_samples;
+    use crate::simd::lanes::tests::lanes_are_samples;
+
+    #[test]
+    fn sixteen_lanes_are_samples() {
+        if VectorWidth::available().contains(&VectorWidth::Avx512) {
+            lanes_are_samples::<Sixteen>();
+            doubles_are_samples::<Sixteen>();
+            runs_are_samples::<Sixteen>();
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Seconds to frames, in f64: where spans start and end, and how the parameter of their
+//! samples follows.
+
+use crate::math::canonical::{nearest_whole, round_f32};
+use crate::time::frame_rate::FrameRate;
+use crate::time::wrap::Cycle;
+
+/// How the parameter of a span's frames follows from their numbers.
+pub(crate) struct InFrames {
+    /// The whole frame nearest to the span's middle.
+    pub(crate) whole: f64,
+    /// parameter = (frame - whole) × scale + offset
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+
+/// A span between two frame coordinates over which the parameter runs through
+/// `extent`.
+#[inline(always)]
+pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
+    let middle = (from + to) * 0.5;
+    let scale = extent / (to - from);
+    let whole = nearest_whole(middle);
+    InFrames {
+        whole,
+        scale: finite_scale(scale),
+        offset: round_f32((whole - middle) * scale),
+    }
+}
+
+/// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
+#[inline(always)]
+pub(crate) fn finite_scale(scale: f64) -> f32 {
+    let largest = f64::from(f32::MAX);
+    round_f32(if scale < largest { scale } else { largest })
+}
+
+/// Key times as frames: exact ratios in f64.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct FrameClock {
+    rate: FrameRate,
+    start: f64,
+    /// Frames by which the rounding of a key's time may move it.
+    rounding: f64,
+}
+
+/// Where one span ends and the next starts.
+#[derive(Clone, Copy)]
+pub(crate) struct Boundary {
+    /// Its frame coordinate.
+    pub(crate) frame: f64,
+    /// The first whole frame not before it.
+    pub(crate) first: f64,
+}
+
+impl FrameClock {
+    /// `latest`: the largest time that will be asked for.
+    pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
+        let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
+        Self {
+            rate,
+            start,
+            rounding,
+        }
+    }
+
+    /// A time within its own rounding of a whole frame is that frame, so a sample on
+    /// a key returns the key at hour 24 too.
+    #[inline(always)]
+    pub(crate) fn boundary(self, time: f64) -> Boundary {
+        settled(self.rate.frames_in(time - self.start), self.rounding)
+    }
+
+    /// The first frame not before a time.
+    #[inline(always)]
+    pub(crate) fn first_frame(self, time: f64) -> f64 {
+        let first = self.boundary(time).first;
+        if first > 0.0 { first } else { 0.0 }
+    }
+
+    fn time(self, frame: usize) -> f64 {
+        self.start + self.rate.time_of(frame as u64)
+    }
+}
+
+/// Frame coordinates, a whole frame where they are one but for rounding.
+#[inline(always)]
+fn settled(exact: f64, rounding: f64) -> Boundary {
+    let whole = nearest_whole(exact);
+    let frame = if (exact - whole).abs() <= rounding {
+        whole
+    } else {
+        exact
+    };
+    let first = if whole < frame { whole + 1.0 } else { whole };
+    Boundary { frame, first }
+}
+
+/// What tells where a track's spans lie among the frames.
+pub(crate) trait Clock: Copy {
+    /// Where a time lies.
+    fn boundary(self, time: f64) -> Boundary;
+    /// The track's own time at a frame, where the frames are the track's own.
+    fn own_time(self, frame: usize) -> Option<f64>;
+    /// Frames in a second.
+    fn rate(self) -> f64;
+}
+
+impl Clock for FrameClock {
+    #[inline(always)]
+    fn boundary(self, time: f64) -> Boundary {
+        Self::boundary(self, time)
+    }
+
+    #[inline(always)]
+    fn own_time(self, frame: usize) -> Option<f64> {
+        Some(self.time(frame))
+    }
+
+    #[inline(always)]
+    fn rate(self) -> f64 {
+        self.rate.frames_in(1.0)
+    }
+}
+
+/// The frames of a copy of a track.
+#[derive(Clone, Copy)]
+pub(crate) struct CopyClock {
+    own: FrameClock,
+    sign: f64,
+    offset: f64,
+}
+
+impl CopyClock {
+    pub(crate) fn new(own: FrameClock, cycle: &Cycle) -> Self {
+        Self {
+            own,
+            sign: cycle.sign,
+            offset: cycle.offset,
+        }
+    }
+}
+
+impl Clock for CopyClock {
+    fn boundary(self, time: f64) -> Boundary {
+        let own = self.own.rate.frames_in(time - self.own.start);
+        let rounding = self.own.rounding + 4.0 * f64::EPSILON * self.offset.abs();
+        settled(own * self.sign + self.offset, rounding)
+    }
+
+    fn own_time(self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn rate(self) -> f64 {
+        Clock::rate(self.own)
+    }
+}

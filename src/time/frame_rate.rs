@@ -1,0 +1,158 @@
+//! Frame rates as exact ratios.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::time::frames::FramesError;
+
+/// Frames per second as a ratio: 30000/1001 is exact, 29.97 is not.
+///
+/// ```
+/// use tumble::FrameRate;
+/// let ntsc: FrameRate = "30000/1001".parse()?;
+/// assert_eq!(ntsc, FrameRate::new(30_000, 1_001)?);
+/// assert_eq!("12.5".parse::<FrameRate>()?, FrameRate::new(25, 2)?);
+/// # Ok::<(), tumble::FramesError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FrameRate {
+    frames: u64,
+    seconds: u64,
+}
+
+impl FrameRate {
+    /// `frames` in `seconds` seconds, reduced.
+    ///
+    /// # Errors
+    /// When either is zero or exceeds 2^53 (no longer exact in f64).
+    pub fn new(frames: u64, seconds: u64) -> Result<Self, FramesError> {
+        let exact = 1..=1u64 << f64::MANTISSA_DIGITS;
+        let divisor = gcd(frames, seconds).max(1);
+        let rate = Self {
+            frames: frames / divisor,
+            seconds: seconds / divisor,
+        };
+        if !exact.contains(&rate.frames) || !exact.contains(&rate.seconds) {
+            return Err(FramesError::Rate {
+                given: format!("{frames}/{seconds}"),
+            });
+        }
+        Ok(rate)
+    }
+
+    /// Whole frames per second; 0 is refused where it is used.
+    pub(crate) fn whole(frames: u32) -> Self {
+        Self {
+            frames: u64::from(frames),
+            seconds: 1,
+        }
+    }
+
+    pub(crate) fn is_zero(self) -> bool {
+        self.frames == 0
+    }
+
+    /// Frames per second, rounded to f64.
+    #[must_use]
+    pub fn per_second(self) -> f64 {
+        self.frames as f64 / self.seconds as f64
+    }
+
+    /// How many frames fit into `seconds`, not rounded to a whole number.
+    #[inline(always)]
+    pub(crate) fn frames_in(self, seconds: f64) -> f64 {
+        let frames = seconds * self.frames as f64;
+        // Most rates are whole, and a division takes longer than all else here.
+        if self.seconds == 1 {
+            frames
+        } else {
+            frames / self.seconds as f64
+        }
+    }
+
+    /// The time of frame `frame`, seconds after frame 0.
+    #[must_use]
+    pub fn time_of(self, frame: u64) -> f64 {
+        // The product is exact for every count of frames that can be asked for at
+        // the usual rates.
+        frame as f64 * self.seconds as f64 / self.frames as f64
+    }
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+impl fmt::Display for FrameRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.seconds {
+            1 => write!(f, "{}", self.frames),
+            seconds => write!(f, "{}/{seconds}", self.frames),
+        }
+    }
+}
+
+impl FromStr for FrameRate {
+    type Err = FramesError;
+
+    /// `25`, `12.5`, `1e-3` or `30000/1001`; decimals are taken exactly.
+    fn from_str(text: &str) -> Result<Self, FramesError> {
+        let refuse = || FramesError::Rate {
+            given: text.to_owned(),
+        };
+        let (frames, seconds) = match text.split_once('/') {
+            Some((frames, seconds)) => (
+                frames.parse().map_err(|_| refuse())?,
+                seconds.parse().map_err(|_| refuse())?,
+            ),
+            None => decimal_ratio(text).ok_or_else(refuse)?,
+        };
+        Self::new(frames, seconds).map_err(|_| refuse())
+    }
+}
+
+/// `12.5e1` as digits over a power of ten.
+fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
+    let (mantissa, exponent) = match text.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
+        None => (text, 0),
+    };
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits = format!("{whole}{}", fraction.trim_end_matches('0'));
+    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let places = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
+    let power = 10u64.checked_pow(places.unsigned_abs())?;
+    let digits: u64 = digits.parse().ok()?;
+    if places < 0 {
+        Some((digits, power))
+    } else {
+        Some((digits.checked_mul(power)?, 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_exact_ratios() {
+        for (text, frames, seconds) in [
+            ("25", 25, 1),
+            ("29.97", 2997, 100),
+            ("30000/1001", 30_000, 1_001),
+            ("1e9", 1_000_000_000, 1),
+            ("1e-9", 1, 1_000_000_000),
+            ("50/2", 25, 1),
+            ("12.50", 25, 2),
+        ] {
+            assert_eq!(text.parse(), FrameRate::new(frames, seconds), "{text}");
+        }
+        for text in [
+            "0", "-1", "nan", "inf", "30fps", "", "1/0", "0/5", "1e99", ".", "1 0", "+-5",
+        ] {
+            assert!(text.parse::<FrameRate>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Time: which samples an evaluation asks for.
+//!
+//! Everything in seconds is f64 and stays on the host. What reaches a kernel is a
+//! whole number of frames from the middle of a segment (or, for explicit times,
+//! one f32 distance from that middle), so a frame 24 hours into a set is as exact
+//! as the first.
+
+use std::sync::Arc;
+
+use crate::time::frame_rate::FrameRate;
+
+/// More samples of one track than this are refused.
+pub const MAX_FRAMES: u64 = 1 << 40;
+
+/// A key this close (in frames) after the last frame still has a frame: key times
+/// are rarely whole multiples of the frame time to the last bit.
+const LAST_FRAME_TOLERANCE: f64 = 1e-6;
+
+/// Which samples of every track to evaluate: frames at a rate, or explicit times.
+///
+/// Before its first key and after its last a track holds its end values.
+///
+/// ```
+/// use tumble::Frames;
+/// let frames = Frames::fps(25);                       // from the first key to the last
+/// let second = Frames::fps(60).between(1.0, 2.0);     // 61 frames
+/// let sparse = Frames::at(vec![0.0, 0.125, 7.5]);     // any times, in any order
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    request: Request,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Request {
+    Rate {
+        rate: FrameRate,
+        start: Option<f64>,
+        end: Option<f64>,
+    },
+    Shared(Arc<[f64]>),
+    PerTrack(Arc<[f64]>),
+}
+
+/// Why samples were refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FramesError {
+    /// No frame rate.
+    #[error(
+        "`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
+    )]
+    Rate {
+        /// What was given.
+        given: String,
+    },
+    /// The range ends before it starts.
+    #[error("the range ends at {end} s, before it starts at {start} s")]
+    ReversedRange {
+        /// Start, seconds.
+        start: f64,
+        /// End, seconds.
+        end: f64,
+    },
+    /// A time is NaN or infinite.
+    #[error("time {index} is {time}; times are finite numbers of seconds")]
+    TimeNotFinite {
+        /// Its place in the list, from 0.
+        index: usize,
+        /// The offending time.
+        time: f64,
+    },
+    /// Times given for each track must divide evenly among the tracks.
+    #[error("{times} times do not divide among {tracks} tracks; give every track the same number")]
+    Uneven {
+        /// Number of times given.
+        times: usize,
+        /// Number of tracks in the set.
+        tracks: usize,
+    },
+    /// More samples than [`MAX_FRAMES`] or than memory can address.
+    #[error(
+        "tracks × frames = {tracks} × {frames:.0}, which is {bytes:.0} bytes; at most {MAX_FRAMES} frames can be asked for"
+    )]
+    TooMany {
+        /// Number of tracks.
+        tracks: usize,
+        /// Samples of each.
+        frames: f64,
+        /// Bytes of the result.
+        bytes: f64,
+    },
+    /// Two neighbouring keys lie so far apart that frames between them cannot be
+    /// counted in 32 bits.
+    #[error("track {track}: {frames:.3e} frames between key {key} and the next; the limit is 2^32")]
+    GapTooLong {
+        /// The track's place in the set.
+        track: usize,
+        /// The key before the gap.
+        key: usize,
+        /// Frames in the gap.
+        frames: f64,
+    },
+}
+
+impl Frames {
+    /// Whole frames per second, from the set's first key to its last. A rate of 0 is
+    /// refused when the frames are resolved against a set.
+    #[must_use]
+    pub fn fps(frames_per_second: u32) -> Self {
+        Self::rate(FrameRate::whole(frames_per_second))
+    }
+
+    /// Frames at an exact rate, from the set's first key to its last: frame `k` at
+    /// `start + k / rate`, for every `k` with a time not past the end.
+    #[must_use]
+    pub fn rate(rate: FrameRate) -> Self {
+        Self {
+            request: Request::Rate {
+                rate,
+                start: None,
+                end: None,
+            },
+        }
+    }
+
+    /// The same rate from `start` to `end`, seconds; no effect on explicit times.
+    #[must_use]
+    pub fn between(mut self, from: f64, to: f64) -> Self {
+        if let Request::Rate { start, end, .. } = &mut self.request {
+            (*start, *end) = (Some(from), Some(to));
+        }
+        self
+    }
+
+    /// Explicit times, seconds, the same for every track, in any order.
+    #[must_use]
+    pub fn at(times: Vec<f64>) -> Self {
+        Self {
+            request: Request::Shared(times.into()),
+        }
+    }
+
+    /// Explicit times of each track's own, one track after another.
+    #[must_use]
+    pub fn at_each(times: Vec<f64>) -> Self {
+        Self {
+            request: Request::PerTrack(times.into()),
+        }
+    }
+
+    /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
+    ///
+    /// # Errors
+    /// A [`FramesError`] when the request does not fit the set.
+    pub fn resolve(
+        &self,
+        tracks: usize,
+        span: Option<(f64, f64)>,
+    ) -> Result<Timeline, FramesError> {
+        let finite = |times: &[f64]| match times.iter().position(|time| !time.is_finite()) {
+            Some(index) => Err(FramesError::TimeNotFinite {
+                index,
+                time: times[index],
+            }),
+            None => Ok(()),
+        };
+        let (first, last) = span.unwrap_or((0.0, 0.0));
+        let (ticks, count) = match &self.request {
+            Request::Rate { rate, start, end } => {
+                if rate.is_zero() {
+                    let given = rate.to_string();
+                    return Err(FramesError::Rate { given });
+                }
+                let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
+                finite(&[start, end])?;
+                if end < start {
+                    return Err(FramesError::ReversedRange { start, end });
+                }
+                let count = (rate.frames_in(end - start) + LAST_FRAME_TOLERANCE).floor() + 1.0;
+                check_size(tracks, count)?;
+                (Ticks::Frames { rate: *rate, start }, count as usize)
+            }
+            Request::Shared(times) => {
+                finite(times)?;
+                check_size(tracks, times.len() as f64)?;
+                (
+                    Ticks::Times {
+                        times: Arc::clone(times),
+                        stride: 0,
+                    },
+                    times.len(),
+                )
+            }
+            Request::PerTrack(times) => {
+                finite(times)?;
+                if tracks == 0 || !times.len().is_multiple_of(tracks) {
+                    return Err(FramesError::Uneven {
+                        times: times.len(),
+                        tracks,
+                    });
+                }
+                let stride = times.len() / tracks;
+                (
+                    Ticks::Times {
+                        times: Arc::clone(times),
+                        stride,
+                    },
+                    stride,
+                )
+            }
+        };
+        Ok(Timeline { ticks, count })
+    }
+}
+
+fn check_size(tracks: usize, frames: f64) -> Result<(), FramesError> {
+    let bytes = tracks as f64 * frames * size_of::<glam::Quat>() as f64;
+    if frames > MAX_FRAMES as f64 || bytes > isize::MAX as f64 {
+        return Err(FramesError::TooMany {
+            tracks,
+            frames,
+            bytes,
+        });
+    }
+    Ok(())
+}
+
+/// The samples of one evaluation: [`Frames`] resolved against a set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timeline {
+    pub(crate) ticks: Ticks,
+    count: usize,
+}
+
+/// What a sample index means.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Ticks {
+    /// Frame `k` lies at `start + k / rate`.
+    Frames { rate: FrameRate, start: f64 },
+    /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
+    /// one list for all tracks.
+    Times { times: Arc<[f64]>, stride: usize },
+}
+
+impl Timeline {
+    /// Samples of each track.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is nothing to evaluate.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The same samples for a set that has only some of the tracks.
+    pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
+        let mut own = self.clone();
+        if let Ticks::Times { times, stride: 1.. } = &mut own.ticks {
+            *times = times[tracks.start * self.count..tracks.end * self.count].into();
+        }
+        own
+    }
+
+    /// Explicit times, each made another, for every track its own.
+    pub(crate) fn map_times(&self, tracks: usize, map: impl Fn(usize, f64) -> f64) -> Self {
+        let times =
+            (0..tracks).flat_map(|track| (0..self.count).map(move |sample| (track, sample)));
+        let mapped = times.map(|(track, sample)| map(track, self.time(track, sample)));
+        Self {
+            ticks: Ticks::Times {
+                times: mapped.collect(),
+                stride: self.count,
+            },
+            count: self.count,
+        }
+    }
+
+    /// The time of a sample in seconds.
+    ///
+    /// # Panics
+    /// When `sample` is not below [`Timeline::len`].
+    #[must_use]
+    pub fn time(&self, track: usize, sample: usize) -> f64 {
+        assert!(sample < self.count, "sample {sample} of {}", self.count);
+        match &self.ticks {
+            Ticks::Frames { rate, start } => start + rate.time_of(sample as u64),
+            Ticks::Times { times, stride } => times[track * stride + sample],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_key_keeps_its_frame() {
+        let set = |last| Some((0.1, last));
+        // 0.1 + 20 s is not 20.1 in binary.
+        let frames = Frames::fps(25).resolve(1, set(0.1 + 20.0)).unwrap();
+        assert_eq!(frames.len(), 501);
+        assert_eq!(Frames::fps(25).resolve(1, set(20.09)).unwrap().len(), 500);
+        assert_eq!(Frames::fps(1).resolve(1, set(0.1)).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn impossible_requests_are_refused_before_any_work() {
+        let span = Some((0.0, 1e9));
+        let error = Frames::fps(1_000_000).resolve(4, span).unwrap_err();
+        assert!(
+            matches!(error, FramesError::TooMany { tracks: 4, .. }),
+            "{error}"
+        );
+        let reversed = Frames::fps(1)
+            .between(2.0, 1.0)
+            .resolve(1, span)
+            .unwrap_err();
+        assert_eq!(
+            reversed,
+            FramesError::ReversedRange {
+                start: 2.0,
+                end: 1.0
+            }
+        );
+        let nan = Frames::at(vec![0.0, f64::NAN])
+            .resolve(1, span)
+            .unwrap_err();
+        assert!(matches!(nan, FramesError::TimeNotFinite { index: 1, .. }));
+        let uneven = Frames::at_each(vec![0.0; 3]).resolve(2, span).unwrap_err();
+        assert_eq!(
+            uneven,
+            FramesError::Uneven {
+                times: 3,
+                tracks: 2
+            }
+        );
+    }
+}

@@ -1,0 +1,129 @@
+//! A result in windows: what is evaluated at once, on a device or into a stream.
+
+use std::ops::Range;
+
+use crate::output::rotations::Layout;
+
+/// A contiguous stretch of a result: some samples of some tracks.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Window {
+    /// Where it starts in what it was cut from, in rotations.
+    pub(crate) start: usize,
+    pub(crate) tracks: Range<usize>,
+    pub(crate) samples: Range<usize>,
+    pub(crate) layout: Layout,
+}
+
+impl Window {
+    /// All of a result.
+    pub(crate) fn whole(tracks: usize, samples: usize, layout: Layout) -> Self {
+        Self {
+            start: 0,
+            tracks: 0..tracks,
+            samples: 0..samples,
+            layout,
+        }
+    }
+
+    /// Number of rotations.
+    pub(crate) fn len(&self) -> usize {
+        self.tracks.len() * self.samples.len()
+    }
+
+    /// Distance between neighbouring samples of a track.
+    pub(crate) fn stride(&self) -> usize {
+        match self.layout {
+            Layout::TrackMajor => 1,
+            Layout::FrameMajor => self.tracks.len(),
+        }
+    }
+
+    /// Where a rotation lies in the window.
+    pub(crate) fn place(&self, track: usize, sample: usize) -> usize {
+        let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
+        self.layout
+            .index(track, sample, self.tracks.len(), self.samples.len())
+    }
+
+    /// Cuts it into windows of at most `limit` rotations, in the order in which they
+    /// lie in memory.
+    pub(crate) fn cut(&self, limit: usize) -> Vec<Self> {
+        let (rows, columns) = match self.layout {
+            Layout::TrackMajor => (&self.tracks, &self.samples),
+            Layout::FrameMajor => (&self.samples, &self.tracks),
+        };
+        if rows.is_empty() || columns.is_empty() {
+            return Vec::new();
+        }
+        // Whole rows while they fit, pieces of one row where it does not.
+        let rows_each = (limit / columns.len()).max(1);
+        let columns_each = columns.len().min(limit.max(1));
+        let pieces = |of: &Range<usize>, each: usize| -> Vec<Range<usize>> {
+            let piece = |from: usize| from..(from + each).min(of.end);
+            of.clone().step_by(each).map(piece).collect()
+        };
+        let mut windows = Vec::new();
+        let mut start = 0;
+        for row in pieces(rows, rows_each) {
+            for column in pieces(columns, columns_each) {
+                let (tracks, samples) = match self.layout {
+                    Layout::TrackMajor => (row.clone(), column),
+                    Layout::FrameMajor => (column, row.clone()),
+                };
+                let window = Self {
+                    start,
+                    tracks,
+                    samples,
+                    layout: self.layout,
+                };
+                start += window.len();
+                windows.push(window);
+            }
+        }
+        windows
+    }
+}
+
+impl Window {
+    /// Its own windows, as those of what it was cut from.
+    pub(crate) fn within(&self, cut: impl Fn(&Self) -> Vec<Self>) -> Vec<Self> {
+        let mut windows = cut(self);
+        for window in &mut windows {
+            window.start += self.start;
+        }
+        windows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_cover_every_rotation_once_in_order() {
+        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+            for (tracks, samples) in [(0, 5), (1, 1), (3, 7), (7, 3), (1, 100), (100, 1)] {
+                let whole = Window::whole(tracks, samples, layout);
+                for (outer, inner) in [(1000, 1), (1000, 64), (64, 5), (7, 2), (2, 2)] {
+                    let mut next = 0;
+                    for window in whole.cut(outer) {
+                        assert_eq!(window.start, next);
+                        for part in window.within(|window| window.cut(inner)) {
+                            assert!(part.len() <= inner);
+                            assert_eq!(part.start, next);
+                            for track in part.tracks.clone() {
+                                for sample in part.samples.clone() {
+                                    let place = next + part.place(track, sample);
+                                    let expected = layout.index(track, sample, tracks, samples);
+                                    assert_eq!(place, expected);
+                                }
+                            }
+                            next += part.len();
+                        }
+                    }
+                    assert_eq!(next, tracks * samples);
+                }
+            }
+        }
+    }
+}

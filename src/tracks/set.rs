@@ -1,0 +1,424 @@
+//! What was loaded: tracks of unit quaternions with their key times.
+//!
+//! The first stop on the path of the data. A [`TrackSet`] knows no method, no
+//! frame rate and no device; it is checked once, when keys are pushed, and
+//! everything behind it trusts it: every track has at least one key, times are
+//! finite and strictly increasing, keys are unit quaternions.
+
+use crate::Tcb;
+use crate::TrackError;
+use std::ops::Range;
+
+use crate::tracks::check::{check_times, unit_key};
+use crate::tracks::signs::any_turns;
+
+use crate::tracks::key_data::KeyData;
+use glam::{DVec3, Quat};
+
+use crate::tracks::vectors::VectorTracks;
+
+/// A set of keyframe tracks: the input of every evaluation.
+///
+/// Keys are f32 unit quaternions, `x y z w` in memory; times are f64 seconds.
+/// Tracks may differ in their number of keys and in their times.
+///
+/// ```
+/// use glam::Quat;
+/// let mut set = tumble::TrackSet::new();
+/// let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+/// set.push("hinge", &[0.0, 2.0], &keys)?;
+/// assert_eq!((set.track_count(), set.key_count()), (1, 2));
+/// # Ok::<(), tumble::TrackError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrackSet {
+    keys: Vec<Quat>,
+    times: Vec<f64>,
+    tracks: Vec<TrackRange>,
+    names: Vec<String>,
+    pub(crate) velocities: KeyData<DVec3>,
+    pub(crate) tangents: KeyData<[Quat; 2]>,
+    pub(crate) tcb: KeyData<Tcb>,
+    pub(crate) translations: VectorTracks,
+    pub(crate) scales: VectorTracks,
+    /// First and last key time over all tracks.
+    pub(crate) span: Option<(f64, f64)>,
+    /// Keys of the longest track.
+    longest: usize,
+    /// Whether the sign of a key may be turned by the one before it.
+    turns: bool,
+}
+
+/// Where a track's keys and times lie in the pools of its set; tracks whose
+/// times are equal share them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct TrackRange {
+    first_key: usize,
+    first_time: usize,
+    len: usize,
+}
+
+/// One track, borrowed from its [`TrackSet`].
+#[derive(Debug, Clone, Copy)]
+pub struct Track<'a> {
+    /// The track's name, when it was given one.
+    pub name: Option<&'a str>,
+    /// Key times in seconds, strictly increasing.
+    pub times: &'a [f64],
+    /// Unit keys, one for each time.
+    pub keys: &'a [Quat],
+    /// Angular velocities of the keys, rad/s in the body frame; empty where none were
+    /// given.
+    pub velocities: &'a [DVec3],
+    /// Tangents with which a curve arrives at each key and leaves it, `x y z w` a second;
+    /// empty where none were given.
+    pub tangents: &'a [[Quat; 2]],
+    /// Tension, continuity and bias of the keys; empty where none were given.
+    pub tcb: &'a [Tcb],
+}
+
+impl TrackSet {
+    /// An empty set.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Appends a track. `times` are seconds, strictly increasing; `keys` are
+    /// rotations, one for each time. Keys that are unit to within f32 rounding are
+    /// kept bit for bit, others (norm within 0.1 of 1) are normalised.
+    ///
+    /// # Errors
+    /// A [`TrackError`] that names the key; the set is then unchanged.
+    pub fn push(
+        &mut self,
+        name: impl Into<String>,
+        times: &[f64],
+        keys: &[Quat],
+    ) -> Result<(), TrackError> {
+        let track = self.tracks.len();
+        check_times(track, times, keys.len())?;
+        let first_key = self.keys.len();
+        for (key, &quat) in keys.iter().enumerate() {
+            match unit_key(track, key, quat) {
+                Ok(unit) => self.keys.push(unit),
+                Err(error) => {
+                    self.keys.truncate(first_key);
+                    return Err(error);
+                }
+            }
+        }
+        self.turns = self.turns || any_turns(bytemuck::cast_slice(&self.keys[first_key..]));
+        let first_time = self.share_or_append(times);
+        self.tracks.push(TrackRange {
+            first_key,
+            first_time,
+            len: keys.len(),
+        });
+        self.longest = self.longest.max(keys.len());
+        let name = name.into();
+        if !name.is_empty() {
+            self.names.resize(track, String::new());
+            self.names.push(name);
+        }
+        Ok(())
+    }
+
+    /// A set whose tracks all have the same key times, as in a `.dat` file.
+    /// `keys` holds one track after another, `times.len()` keys each.
+    ///
+    /// # Errors
+    /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
+    pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
+        Self::from_shared_times(times.to_vec(), keys.to_vec())
+    }
+
+    /// As [`TrackSet::with_shared_times`], without a copy.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn from_shared_times(times: Vec<f64>, mut keys: Vec<Quat>) -> Result<Self, TrackError> {
+        let len = times.len();
+        if len == 0 || !keys.len().is_multiple_of(len) {
+            return Err(TrackError::LengthMismatch {
+                track: 0,
+                keys: keys.len(),
+                times: len,
+            });
+        }
+        check_times(0, &times, len)?;
+        for (place, key) in keys.iter_mut().enumerate() {
+            *key = unit_key(place / len, place % len, *key)?;
+        }
+        let turns = keys
+            .chunks(len)
+            .any(|track| any_turns(bytemuck::cast_slice(track)));
+        let range = |track| TrackRange {
+            first_key: track * len,
+            first_time: 0,
+            len,
+        };
+        Ok(Self {
+            tracks: (0..keys.len() / len).map(range).collect(),
+            longest: if keys.is_empty() { 0 } else { len },
+            span: (!keys.is_empty()).then(|| (times[0], times[len - 1])),
+            keys,
+            times,
+            turns,
+            ..Self::default()
+        })
+    }
+
+    /// Number of tracks.
+    #[must_use]
+    pub fn track_count(&self) -> usize {
+        self.tracks.len()
+    }
+
+    /// Number of keys of all tracks together.
+    #[must_use]
+    pub fn key_count(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Keys of the track that has most.
+    pub(crate) fn longest(&self) -> usize {
+        self.longest
+    }
+
+    /// Whether the sign of any key may be turned by the one before it in its track: where
+    /// none is, which is usual, nobody need look at them all again.
+    #[inline]
+    pub(crate) fn turns(&self) -> bool {
+        self.turns
+    }
+
+    /// Whether the set has no tracks.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.tracks.is_empty()
+    }
+
+    /// The track at `index`.
+    ///
+    /// # Panics
+    /// Never for `index < track_count()`; use [`TrackSet::tracks`] to walk them.
+    pub fn track(&self, index: usize) -> Track<'_> {
+        let TrackRange {
+            first_key,
+            first_time,
+            len,
+        } = self.tracks[index];
+        Track {
+            name: self
+                .names
+                .get(index)
+                .map(String::as_str)
+                .filter(|name| !name.is_empty()),
+            times: &self.times[first_time..first_time + len],
+            keys: &self.keys[first_key..first_key + len],
+            velocities: self.velocities.of(index, len),
+            tangents: self.tangents.of(index, len),
+            tcb: self.tcb.of(index, len),
+        }
+    }
+
+    /// The times and keys of a track, and no more: where tracks are short, the rest costs
+    /// more than the work.
+    #[inline]
+    pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
+        let TrackRange {
+            first_key,
+            first_time,
+            len,
+        } = self.tracks[index];
+        let times = &self.times[first_time..first_time + len];
+        (times, &self.keys[first_key..first_key + len])
+    }
+
+    /// The keys of all tracks, one behind the other.
+    pub(crate) fn keys(&self) -> &[Quat] {
+        &self.keys
+    }
+
+    /// How many keys tracks that follow one another have: those of all lie one behind the
+    /// other.
+    pub(crate) fn keys_of(&self, tracks: Range<usize>) -> usize {
+        let first = |track: usize| {
+            self.tracks
+                .get(track)
+                .map_or(self.keys.len(), |t| t.first_key)
+        };
+        first(tracks.end) - first(tracks.start)
+    }
+
+    /// Every track in order.
+    #[must_use]
+    pub fn tracks(&self) -> impl ExactSizeIterator<Item = Track<'_>> {
+        (0..self.tracks.len()).map(|index| self.track(index))
+    }
+
+    /// The track's name, or `box1`, `box2` … by its place when it has none.
+    pub fn track_name(&self, index: usize) -> String {
+        self.track(index)
+            .name
+            .map_or_else(|| format!("box{}", index + 1), str::to_owned)
+    }
+
+    /// First and last key time over all tracks, seconds; `None` when empty.
+    #[must_use]
+    pub fn time_span(&self) -> Option<(f64, f64)> {
+        self.span
+    }
+
+    /// The tracks in `range` as a set of their own.
+    ///
+    /// # Panics
+    /// When the range passes [`TrackSet::track_count`].
+    #[must_use]
+    pub fn select(&self, range: Range<usize>) -> Self {
+        let mut set = Self::default();
+        for index in range {
+            let track = self.track(index);
+            let first_time = set.share_or_append(track.times);
+            let first_key = set.keys.len();
+            set.keys.extend_from_slice(track.keys);
+            let own = set.tracks.len();
+            set.velocities.set(own, track.velocities);
+            set.tangents.set(own, track.tangents);
+            set.tcb.set(own, track.tcb);
+            set.translations
+                .push(self.translations.get(index).cloned().flatten());
+            set.scales.push(self.scales.get(index).cloned().flatten());
+            if let Some(name) = track.name {
+                set.names.resize(set.tracks.len(), String::new());
+                set.names.push(name.to_owned());
+            }
+            set.tracks.push(TrackRange {
+                first_key,
+                first_time,
+                len: track.keys.len(),
+            });
+            set.longest = set.longest.max(track.keys.len());
+        }
+        set
+    }
+
+    /// Files hold many tracks with one list of times: keep it once.
+    fn share_or_append(&mut self, times: &[f64]) -> usize {
+        let own = (times[0], times[times.len() - 1]);
+        let (first, last) = self.span.unwrap_or(own);
+        self.span = Some((first.min(own.0), last.max(own.1)));
+        if let Some(last) = self.tracks.last()
+            && self.times[last.first_time..last.first_time + last.len] == *times
+        {
+            return last.first_time;
+        }
+        let first = self.times.len();
+        self.times.extend_from_slice(times);
+        first
+    }
+}
+
+/// Tracks for tests, which swing about axes of their own for 20 s.
+#[cfg(test)]
+pub(crate) fn swinging(tracks: usize, keys: usize, uneven: bool) -> TrackSet {
+    let last = (keys - 1).max(1) as f64;
+    let times: Vec<f64> = (0..keys)
+        .map(|k| 20.0 * (k as f64 + if uneven { 0.4 * (k as f64).sin() } else { 0.0 }) / last)
+        .collect();
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let key = |&time: &f64| {
+            let turn = (time * (0.9 + 0.2 * track as f64)).sin() as f32;
+            Quat::from_rotation_y(1.1 * turn) * Quat::from_rotation_x(0.4 * time as f32)
+        };
+        let keys: Vec<Quat> = times.iter().map(key).collect();
+        set.push("", &times, &keys).expect("unit keys in order");
+    }
+    set
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_track_leaves_the_set_unchanged() {
+        let mut set = TrackSet::new();
+        set.push("a", &[0.0], &[Quat::IDENTITY]).unwrap();
+        let before = set.clone();
+        let keys = [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)];
+        let error = set.push("b", &[0.0, 1.0], &keys).unwrap_err();
+        assert_eq!(
+            error,
+            TrackError::NotUnit {
+                track: 1,
+                key: 1,
+                norm: 2.0
+            }
+        );
+        assert_eq!(set, before);
+        let bad_times = [
+            (
+                vec![],
+                TrackError::LengthMismatch {
+                    track: 1,
+                    keys: 1,
+                    times: 0,
+                },
+            ),
+            (
+                vec![f64::INFINITY],
+                TrackError::TimeNotFinite {
+                    track: 1,
+                    key: 0,
+                    time: f64::INFINITY,
+                },
+            ),
+        ];
+        for (times, expected) in bad_times {
+            assert_eq!(
+                set.push("", &times, &[Quat::IDENTITY]).unwrap_err(),
+                expected
+            );
+        }
+        assert_eq!(
+            set.push("", &[], &[]).unwrap_err(),
+            TrackError::Empty { track: 1 }
+        );
+        let decreasing = set.push("", &[1.0, 1.0], &[Quat::IDENTITY; 2]).unwrap_err();
+        assert!(matches!(
+            decreasing,
+            TrackError::TimeNotIncreasing { key: 1, .. }
+        ));
+    }
+
+    #[test]
+    fn equal_times_are_kept_once_and_names_stay_with_their_tracks() {
+        let times = [0.0, 1.0];
+        let keys = [Quat::IDENTITY; 2];
+        let mut set = TrackSet::new();
+        set.push("", &times, &keys).unwrap();
+        set.push("hip", &times, &keys).unwrap();
+        set.push("", &[0.0, 2.0], &keys).unwrap();
+        assert_eq!(set.times.len(), 4);
+        assert_eq!(set.track_name(0), "box1");
+        assert_eq!(set.track_name(1), "hip");
+        assert_eq!(set.track_name(2), "box3");
+        assert_eq!(set.select(1..3).track_name(0), "hip");
+        assert_eq!(set.time_span(), Some((0.0, 2.0)));
+    }
+
+    #[test]
+    fn a_nearly_unit_key_is_normalised_and_a_unit_key_is_kept() {
+        let unit = Quat::from_rotation_y(0.3);
+        let long = Quat::from_array(unit.to_array().map(|c| c * 1.01));
+        let mut set = TrackSet::new();
+        set.push("", &[0.0, 1.0], &[unit, long]).unwrap();
+        let keys = set.track(0).keys;
+        assert_eq!(keys[0].to_array(), unit.to_array());
+        assert!(keys[1].angle_between(unit) < 1e-6);
+        assert!((f64::from(keys[1].length()) - 1.0).abs() < 1e-6);
+    }
+}

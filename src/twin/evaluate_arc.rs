@@ -1,0 +1,166 @@
+//! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
+
+use glam::Vec4;
+
+use crate::cpu::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
+use crate::shader::ArcSegment;
+use crate::simd::lanes::{Lanes, Number};
+use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter};
+
+impl Evaluate for ArcSegment {
+    #[inline(always)]
+    fn constant(&self) -> f32 {
+        square(self.tangent)
+    }
+
+    #[inline(always)]
+    fn samples<L: Lanes>() -> usize {
+        L::COUNT
+    }
+
+    #[inline(always)]
+    fn load<L: Lanes>(distances: &[f32]) -> L {
+        L::load(distances)
+    }
+
+    const FAR_FROM: Option<usize> = Some(5);
+
+    type Begun<L: Lanes> = Begun<L>;
+    type Vectors<L: Lanes> = [L; 4];
+
+    #[inline(always)]
+    fn begin<L: Lanes, const FAR: bool>(
+        square: L,
+        parameters: &mut impl Parameters<L>,
+    ) -> Begun<L> {
+        let (parameter, z) = parameter_and_square(square, parameters);
+        let halves = quarter_halves(parameter, z);
+        let mut begun = Begun {
+            turn: halves.sine_cosm1(),
+            halves,
+            parameter,
+            z,
+        };
+        if FAR {
+            // What lies before the first sample means nothing.
+            begun = begun.next(square, parameters).next(square, parameters);
+        }
+        begun
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
+        &self,
+        square: L,
+        begun: Begun<L>,
+        parameters: &mut impl Parameters<L>,
+    ) -> (Begun<L>, [L; 4]) {
+        let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
+        let (sine, fall) = if FAR {
+            begun.turn
+        } else {
+            quarter_halves(begun.parameter, begun.z).sine_cosm1()
+        };
+        let (s, f) = (sine.fourfold(), fall.fourfold());
+        // Written out: closures are not always inlined.
+        let mut quarters = [
+            turned(middle, tangent, s[0], f[0]),
+            turned(middle, tangent, s[1], f[1]),
+            turned(middle, tangent, s[2], f[2]),
+            turned(middle, tangent, s[3], f[3]),
+        ];
+        if FILTER {
+            // Written out: `lanes::canonical` here costs SSE2 half as much again.
+            quarters = [
+                quarters[0].canonical(),
+                quarters[1].canonical(),
+                quarters[2].canonical(),
+                quarters[3].canonical(),
+            ];
+        }
+        (begun.next(square, parameters), quarters)
+    }
+
+    #[inline(always)]
+    fn at(&self, parameter: f32) -> Vec4 {
+        let z = parameter * parameter * self.constant();
+        let (sine, fall) = sine_cosm1_quarter(parameter, z);
+        let (sine, fall) = (Vec4::splat(sine), Vec4::splat(fall));
+        turned(self.middle.into(), self.tangent.into(), sine, fall)
+    }
+
+    #[inline(always)]
+    fn is_canonical(&self) -> bool {
+        is_coarse(self.middle) || self.is_coarse_or_zero()
+    }
+}
+
+impl ArcSegment {
+    /// As [`Evaluate::is_canonical`], where some middle is small.
+    #[inline(never)]
+    fn is_coarse_or_zero(&self) -> bool {
+        let is_zero = |c: usize| self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
+        (0..4).all(|c| self.middle[c].abs() >= COARSE || is_zero(c))
+    }
+}
+
+/// The samples of the next three turns, each as far as they have come; or, where none are begun
+/// far before their own, the parameters of the next turn's.
+#[derive(Clone, Copy)]
+pub(crate) struct Begun<L> {
+    /// Sine and fall of those of the next turn.
+    turn: (L, L),
+    /// Of those behind them.
+    halves: QuarterHalves<L>,
+    /// Of those behind these, and the angle's square.
+    parameter: L,
+    z: L,
+}
+
+impl<L: Lanes> Begun<L> {
+    /// A turn later.
+    #[inline(always)]
+    fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
+        let (parameter, z) = parameter_and_square(square, parameters);
+        Self {
+            turn: self.halves.sine_cosm1(),
+            halves: quarter_halves(self.parameter, self.z),
+            parameter,
+            z,
+        }
+    }
+}
+
+#[inline(always)]
+fn parameter_and_square<L: Lanes>(square: L, parameters: &mut impl Parameters<L>) -> (L, L) {
+    let parameter = parameters.next();
+    (parameter, parameter * parameter * square)
+}
+
+/// The rotation at a parameter of an arc.
+#[inline(always)]
+pub(crate) fn on_arc<N: Number>(
+    middle: [N; 4],
+    tangent: [N; 4],
+    square: N,
+    parameter: N,
+) -> [N; 4] {
+    let z = parameter * parameter * square;
+    let (sine, fall) = sine_cosm1_quarter(parameter, z);
+    [
+        turned(middle[0], tangent[0], sine, fall),
+        turned(middle[1], tangent[1], sine, fall),
+        turned(middle[2], tangent[2], sine, fall),
+        turned(middle[3], tangent[3], sine, fall),
+    ]
+}
+
+#[inline(always)]
+fn turned<N: Number>(middle: N, tangent: N, sine: N, fall: N) -> N {
+    middle + (middle * fall + tangent * sine)
+}
+
+#[inline(always)]
+pub(crate) fn square<N: Number>(q: [N; 4]) -> N {
+    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+}

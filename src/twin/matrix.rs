@@ -1,0 +1,25 @@
+//! Twin of `shaders/matrix.wgsl`: the same names, the same order.
+
+use crate::math::canonical::canonical;
+
+#[inline(always)]
+pub(crate) fn rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
+    let [x, y, z, w] = rotation;
+    let along = if detail == 1 { [-x, -y, -z] } else { [x, y, z] };
+    let double = along.map(|c| c + c);
+    let xx = along[0] * double[0];
+    let yy = along[1] * double[1];
+    let zz = along[2] * double[2];
+    let xy = along[0] * double[1];
+    let yz = along[1] * double[2];
+    let zx = along[2] * double[0];
+    let wx = w * double[0];
+    let wy = w * double[1];
+    let wz = w * double[2];
+    [
+        [1.0 - (yy + zz), xy - wz, zx + wy],
+        [xy + wz, 1.0 - (xx + zz), yz - wx],
+        [zx - wy, yz + wx, 1.0 - (xx + yy)],
+    ]
+    .map(|row| row.map(canonical))
+}

@@ -1,0 +1,19 @@
+//! TODO-DOC
+
+pub(crate) mod arc_between;
+pub(crate) mod arc_tangent;
+pub(crate) mod axis_angle;
+pub(crate) mod euler;
+pub(crate) mod evaluate_arc;
+pub(crate) mod evaluate_polynomial;
+pub(crate) mod f16;
+pub(crate) mod matrix;
+pub(crate) mod pose_add;
+pub(crate) mod pose_blend;
+pub(crate) mod pose_mix;
+pub(crate) mod pose_world;
+pub(crate) mod quaternion;
+pub(crate) mod self_test;
+pub(crate) mod sine_cosine;
+pub(crate) mod small_angle;
+pub(crate) mod snorm16;

@@ -1,0 +1,20 @@
+//! Twin of `shaders/pose_blend.wgsl`: the same names, the same order.
+
+use crate::math::canonical::canonical;
+use crate::shader::LEAST_SQUARED_SUM;
+use crate::twin::quaternion::{dot4, normalised};
+
+/// Its layers, one behind the other, `count` values each.
+#[inline(always)]
+pub(crate) fn pose(layers: &[[f32; 4]], weights: &[f32], count: usize, place: usize) -> [f32; 4] {
+    let first = layers[place];
+    let mut sum = first.map(|c| c * weights[0]);
+    for (layer, &weight) in weights.iter().enumerate().skip(1) {
+        let next = layers[layer * count + place];
+        let flip = dot4(first, next) < 0.0;
+        let near = if flip { next.map(|c| -c) } else { next };
+        sum = std::array::from_fn(|c| sum[c] + near[c] * weight);
+    }
+    let short = dot4(sum, sum) < LEAST_SQUARED_SUM;
+    if short { first } else { normalised(sum) }.map(canonical)
+}

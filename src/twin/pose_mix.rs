@@ -1,0 +1,9 @@
+//! Twin of `shaders/pose_mix.wgsl`: the same names, the same order.
+
+use crate::math::canonical::canonical;
+use crate::twin::quaternion::slerp;
+
+#[inline(always)]
+pub(crate) fn pose(from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
+    slerp(from, to, weight).map(canonical)
+}

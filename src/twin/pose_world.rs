@@ -1,0 +1,27 @@
+//! Twin of `shaders/pose_world.wgsl`: the same names, the same order.
+
+use crate::math::canonical::canonical;
+use crate::shader::Link;
+use crate::shader::ROOT;
+use crate::twin::quaternion::{normalised, product, rotated};
+
+/// One frame: a rotation for each track, to a rotation and a position for each.
+#[inline(always)]
+pub(crate) fn pose(local: &[[f32; 4]], links: &[Link], world: &mut [[f32; 4]]) {
+    for link in links {
+        let own = local[link.track as usize];
+        let mut rotation = own;
+        let mut position = link.offset;
+        if link.parent != ROOT {
+            let parent = 2 * link.parent as usize;
+            let above = world[parent];
+            rotation = normalised(product(above, own));
+            let hung = rotated(above, link.offset);
+            position = std::array::from_fn(|c| world[parent + 1][c] + hung[c]);
+        }
+        let there = 2 * link.track as usize;
+        let [x, y, z] = position;
+        world[there] = rotation.map(canonical);
+        world[there + 1] = [x, y, z, 0.0].map(canonical);
+    }
+}

@@ -1,0 +1,60 @@
+//! Twin of `shaders/quaternion.wgsl`: the same names, the same order.
+
+use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
+use crate::twin::sine_cosine::sine_cosine;
+
+/// The Hamilton product `a b`.
+#[inline(always)]
+pub(crate) fn product(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    ]
+}
+
+#[inline(always)]
+pub(crate) fn dot4(a: [f32; 4], b: [f32; 4]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+}
+
+#[inline(always)]
+pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
+    let across = [
+        q[1] * v[2] - q[2] * v[1],
+        q[2] * v[0] - q[0] * v[2],
+        q[0] * v[1] - q[1] * v[0],
+    ];
+    let twice = across.map(|c| c + c);
+    let again = [
+        q[1] * twice[2] - q[2] * twice[1],
+        q[2] * twice[0] - q[0] * twice[2],
+        q[0] * twice[1] - q[1] * twice[0],
+    ];
+    std::array::from_fn(|c| v[c] + twice[c] * q[3] + again[c])
+}
+
+#[inline(always)]
+pub(crate) fn normalised(q: [f32; 4]) -> [f32; 4] {
+    let scale = reciprocal_root(dot4(q, q));
+    q.map(|c| c * scale)
+}
+
+#[inline(always)]
+pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+    let near = if dot4(a, b) < 0.0 { b.map(|c| -c) } else { b };
+    let sum: [f32; 4] = std::array::from_fn(|c| a[c] + near[c]);
+    let difference: [f32; 4] = std::array::from_fn(|c| flushed(near[c] - a[c]));
+    let square = dot4(difference, difference);
+    let whole = dot4(sum, sum);
+    let half = arc_tangent(root(square), root(whole));
+    let turn = sine_cosine((t + t - 1.0) * half);
+    let inverse = if square == 0.0 {
+        0.0
+    } else {
+        reciprocal_root(square)
+    };
+    let to_unit = reciprocal_root(whole);
+    std::array::from_fn(|c| sum[c] * to_unit * turn.1 + difference[c] * inverse * turn.0)
+}

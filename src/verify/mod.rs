@@ -1,0 +1,266 @@
+//! Verification: does a device give the CPU's bits, and how far are both from the
+//! f64 reference?
+//!
+//! The last word on every result: nothing here trusts what the engine says about
+//! itself. The reference shares no code with the kernels.
+
+pub(crate) mod outputs;
+
+pub use crate::verify::outputs::OutputVerification;
+use glam::{DQuat, Quat};
+use rayon::prelude::*;
+
+use crate::device::Device;
+use crate::engine::{Engine, Error};
+use crate::method::interpolation::Interpolation;
+use crate::output::rotations::Rotations;
+use crate::reference;
+use crate::reference::quaternion::angle_between;
+use crate::shader::Form;
+use crate::time::frames::{Frames, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// Largest allowed distance of a quaternion's norm from 1.
+pub const NORM_BOUND: f64 = 4e-7;
+
+/// Largest allowed error of a form against the reference, radians.
+#[must_use]
+pub fn error_bound(form: Form) -> f64 {
+    match form {
+        Form::Arc => 6e-7,
+        Form::Polynomial => 1e-6,
+    }
+}
+
+/// What [`verify`] found for one set and one method.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Verification {
+    /// The method's name.
+    pub method: &'static str,
+    /// The Vulkan device; `None` when the engine is the CPU's, and nothing was
+    /// compared between devices.
+    pub device: Option<String>,
+    /// Rotations compared.
+    pub rotations: u64,
+    /// Rotations whose bits differ between the device and the CPU.
+    pub differing: u64,
+    /// The first of them.
+    pub first_difference: Option<Place>,
+    /// Largest angle between a result and the reference, radians.
+    pub max_error: f64,
+    /// Root mean square of that angle, radians.
+    pub rms_error: f64,
+    /// Where the largest error is.
+    pub worst: Option<Place>,
+    /// Largest | |q| - 1 |.
+    pub max_norm_error: f64,
+    /// What `max_error` may be, radians.
+    pub error_bound: f64,
+    /// What `max_norm_error` may be.
+    pub norm_bound: f64,
+    /// What follows from the rotations.
+    pub outputs: Vec<OutputVerification>,
+}
+
+/// One rotation of a result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Place {
+    /// The track's place in the set, from 0.
+    pub track: usize,
+    /// The frame (the sample's place), from 0.
+    pub frame: usize,
+    /// Its time, seconds.
+    pub time: f64,
+}
+
+impl Verification {
+    /// Whether all bits agree and all errors are within their bounds.
+    pub fn passes(&self) -> bool {
+        self.differing == 0
+            && self.max_error <= self.error_bound
+            && self.max_norm_error <= self.norm_bound
+            && self.outputs.iter().all(OutputVerification::passes)
+    }
+}
+
+/// Evaluates on the engine, on the CPU and with the reference, and compares every
+/// rotation and all that follows from it: velocities, accelerations, encodings.
+///
+/// ```
+/// use tumble::{Engine, Frames, TrackSet, method, verify::verify};
+/// # use glam::Quat;
+/// # let mut set = TrackSet::new();
+/// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
+/// let engine = Engine::first()?;
+/// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
+/// assert!(found.passes());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`Engine::evaluate`].
+pub fn verify(
+    engine: &Engine,
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+) -> Result<Verification, Error> {
+    let timeline = frames.resolve(set.track_count(), set.time_span())?;
+    let found = engine.evaluate(set, interpolation, frames)?;
+    let device = engine.device_info().map(|info| info.name.clone());
+    let (differing, first) = match device {
+        Some(_) => {
+            let cpu = Engine::new(Device::Cpu)?.evaluate(set, interpolation, frames)?;
+            differences(&found, &cpu)
+        }
+        None => (0, None),
+    };
+    let tracks: Vec<TrackErrors> = (0..set.track_count())
+        .into_par_iter()
+        .map(|track| TrackErrors::measure(set, interpolation, &timeline, &found, track))
+        .collect();
+
+    let place = |index: usize| {
+        let (track, frame) = (index / timeline.len(), index % timeline.len());
+        Place {
+            track,
+            frame,
+            time: timeline.time(track, frame),
+        }
+    };
+    let worst = tracks
+        .iter()
+        .enumerate()
+        .max_by(|a, b| a.1.max.total_cmp(&b.1.max));
+    let rotations = found.as_quats().len();
+    let squares: f64 = tracks.iter().map(|track| track.squares).sum();
+    Ok(Verification {
+        method: interpolation.method.name,
+        device,
+        rotations: rotations as u64,
+        differing,
+        first_difference: first.map(place),
+        max_error: worst.map_or(0.0, |(_, track)| track.max),
+        rms_error: (squares / rotations.max(1) as f64).sqrt(),
+        worst: worst
+            .filter(|_| rotations > 0)
+            .map(|(track, errors)| place(track * timeline.len() + errors.worst)),
+        max_norm_error: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
+        error_bound: error_bound(interpolation.form()),
+        norm_bound: NORM_BOUND,
+        outputs: outputs::verify(engine, set, interpolation, frames, &timeline)?,
+    })
+}
+
+/// How many rotations differ in their bits, and the first that does.
+fn differences(a: &Rotations, b: &Rotations) -> (u64, Option<usize>) {
+    let bits = |q: &Quat| q.to_array().map(f32::to_bits);
+    let mut differing = (0..)
+        .zip(a.as_quats().iter().zip(b.as_quats()))
+        .filter(|(_, (a, b))| bits(a) != bits(b));
+    let first = differing.next().map(|(index, _)| index);
+    (u64::from(first.is_some()) + differing.count() as u64, first)
+}
+
+/// One track against the reference.
+struct TrackErrors {
+    /// Largest angle, radians, and its sample.
+    max: f64,
+    worst: usize,
+    /// Sum of the squared angles.
+    squares: f64,
+    /// Largest | |q| - 1 |.
+    norm: f64,
+}
+
+impl TrackErrors {
+    fn measure(
+        set: &TrackSet,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        found: &Rotations,
+        index: usize,
+    ) -> Self {
+        let track = set.track(index);
+        let curve = reference::Curve::of(&interpolation, track);
+        let samples = timeline.len();
+        let row = &found.as_quats()[index * samples..(index + 1) * samples];
+        let mut errors = Self {
+            max: 0.0,
+            worst: 0,
+            squares: 0.0,
+            norm: 0.0,
+        };
+        for (sample, &quat) in row.iter().enumerate() {
+            let quat: DQuat = quat.as_dquat();
+            let norm = (quat.length() - 1.0).abs();
+            let expected = curve.rotation(timeline.time(index, sample));
+            let angle = angle_between(quat, expected);
+            // NaN is as wrong as can be, and must not slip through comparisons.
+            let [angle, norm] =
+                [angle, norm].map(|error| if error.is_nan() { f64::INFINITY } else { error });
+            if angle > errors.max {
+                (errors.max, errors.worst) = (angle, sample);
+            }
+            errors.squares += angle * angle;
+            errors.norm = errors.norm.max(norm);
+        }
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::METHODS;
+    use crate::method::slerp::SLERP;
+    use crate::output::buffer::OutputBuffer;
+
+    fn set() -> TrackSet {
+        let mut set = TrackSet::new();
+        let times = [0.0, 0.5, 2.0, 2.5];
+        let keys = [0.0, 1.0, -0.4, 2.0].map(Quat::from_rotation_z);
+        set.push("", &times, &keys).unwrap();
+        set.push(
+            "",
+            &times,
+            &keys.map(|key| key * Quat::from_rotation_x(1.2)),
+        )
+        .unwrap();
+        set
+    }
+
+    #[test]
+    fn the_cpu_is_within_its_bounds_and_says_that_no_device_took_part() {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        for method in METHODS {
+            let found = verify(&engine, &set(), method.into(), &Frames::fps(60)).unwrap();
+            assert!(found.passes(), "{found:?}");
+            assert_eq!((found.device.as_deref(), found.rotations), (None, 2 * 151));
+        }
+    }
+
+    #[test]
+    fn a_wrong_result_is_noticed() {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        let (set, frames) = (set(), Frames::fps(10));
+        let timeline = frames.resolve(2, set.time_span()).unwrap();
+        let good = engine.evaluate(&set, SLERP, &frames).unwrap();
+        for wrong in [
+            Quat::from_xyzw(0.0, 0.0, 0.0, 1.001),
+            Quat::NAN,
+            Quat::from_rotation_x(0.5),
+        ] {
+            let mut quats = OutputBuffer::new(52);
+            quats.copy_from_slice(good.as_quats());
+            quats[26 + 7] = wrong;
+            let bad = Rotations::new(Box::new(quats), 2, 26, good.layout());
+            assert_eq!(differences(&good, &bad), (1, Some(33)));
+            let errors = TrackErrors::measure(&set, SLERP.into(), &timeline, &bad, 1);
+            assert!(errors.max > 1e-3 && errors.worst == 7, "{}", errors.max);
+        }
+    }
+}
