@@ -6,7 +6,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::evaluate::FEW;
-use crate::cpu::row::row;
+use crate::cpu::row;
 use crate::cpu::scratch::{Memories, Memory};
 use crate::cpu::sparse_times::FewTimes;
 use crate::cpu::streaming::{Output, Stage};
@@ -256,8 +256,20 @@ impl CpuEngine {
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         match &part.prepared.segments {
-            Segments::Arc(all) => row(self.width, part, all, timeline, cycle, output),
-            Segments::Polynomial(all) => row(self.width, part, all, timeline, cycle, output),
+            Segments::Arc(segments) => row::Row {
+                part,
+                segments,
+                timeline,
+                cycle,
+            }
+            .evaluate(self.width, output),
+            Segments::Polynomial(segments) => row::Row {
+                part,
+                segments,
+                timeline,
+                cycle,
+            }
+            .evaluate(self.width, output),
         }
     }
 

@@ -9,7 +9,7 @@ use crate::cpu::streaming::{Output, Samples};
 use crate::math::canonical::round_f32;
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::{NONE, Source};
-use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
@@ -20,69 +20,45 @@ use crate::time::wrap::Cycle;
 /// Samples whose distances are found out together.
 const CHUNK: usize = 64;
 
-/// Evaluates the samples of one part of a track in a cycle into `output`, which starts with the
-/// first of them, with vectors of that width.
-pub(crate) fn row<S: Evaluate>(
-    width: VectorWidth,
-    part: PartRef<'_>,
-    segments: &[S],
-    timeline: &Timeline,
-    cycle: &Cycle,
-    output: &mut Output<'_, '_>,
-) -> Result<(), FramesError> {
-    match output {
-        Output::Here(samples) => in_place(width, part, segments, timeline, cycle, *samples),
-        Output::Staged(staged) => in_place(width, part, segments, timeline, cycle, staged),
+/// The samples of one part of a track in a cycle.
+pub(crate) struct Row<'a, S> {
+    pub(crate) part: PartRef<'a>,
+    pub(crate) segments: &'a [S],
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) cycle: &'a Cycle,
+}
+
+impl<S: Evaluate> Row<'_, S> {
+    /// Evaluates them into `output`, which starts with the first of them.
+    pub(crate) fn evaluate(
+        &self,
+        width: VectorWidth,
+        output: &mut Output<'_, '_>,
+    ) -> Result<(), FramesError> {
+        match output {
+            Output::Here(samples) => in_lanes_into(width, self, *samples),
+            Output::Staged(staged) => in_lanes_into(width, self, staged),
+        }
     }
 }
 
-fn in_place<S: Evaluate, O: Samples + ?Sized>(
-    width: VectorWidth,
-    part: PartRef<'_>,
-    segments: &[S],
-    timeline: &Timeline,
-    cycle: &Cycle,
-    output: &mut O,
-) -> Result<(), FramesError> {
-    let mut work = RowWork {
-        part,
-        segments,
-        timeline,
-        cycle,
-        output,
-        done: Ok(()),
-    };
-    in_lanes_of(width, &mut work);
-    work.done
-}
+impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
+    type Outcome = Result<(), FramesError>;
 
-/// A row to evaluate, and how that went.
-struct RowWork<'a, S, O: ?Sized> {
-    part: PartRef<'a>,
-    segments: &'a [S],
-    timeline: &'a Timeline,
-    cycle: &'a Cycle,
-    output: &'a mut O,
-    done: Result<(), FramesError>,
-}
-
-impl<S: Evaluate, O: Samples + ?Sized> InLanes for RowWork<'_, S, O> {
     #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let Self {
+    fn run<L: Lanes>(&self, output: &mut O) -> Result<(), FramesError> {
+        let &Self {
             part,
             segments,
             timeline,
             cycle,
-            output,
-            done,
         } = self;
-        *done = in_lanes_row::<L, S, O>(*part, segments, timeline, cycle, output);
+        row::<L, S, O>(part, segments, timeline, cycle, output)
     }
 }
 
 #[inline(always)]
-fn in_lanes_row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
+fn row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
     part: PartRef<'_>,
     segments: &[S],
     timeline: &Timeline,
@@ -121,7 +97,7 @@ fn in_lanes_row<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         };
         return part.prepared.runs(part.part, timeline, cycle, &mut row);
     }
-    let mut row = Row::<L, S> {
+    let mut row = Runs::<L, S> {
         part,
         segments,
         timeline,
@@ -195,7 +171,7 @@ fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
     true
 }
 
-struct Row<'a, L, S> {
+struct Runs<'a, L, S> {
     part: PartRef<'a>,
     segments: &'a [S],
     timeline: &'a Timeline,
@@ -205,7 +181,7 @@ struct Row<'a, L, S> {
     lanes: PhantomData<L>,
 }
 
-impl<L: Lanes, S: Evaluate> Row<'_, L, S> {
+impl<L: Lanes, S: Evaluate> Runs<'_, L, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let prepared = self.part.prepared;
