@@ -1,5 +1,6 @@
 //! The walk over tracks and samples: every thread takes a stretch of the output.
 
+use crate::prepare::set::whole_tracks;
 use std::ops::Range;
 
 use glam::Quat;
@@ -10,7 +11,6 @@ use crate::cpu::row;
 use crate::cpu::scratch::{Memories, Memory};
 use crate::cpu::sparse_times::FewTimes;
 use crate::cpu::streaming::{Output, Stage};
-use crate::curve::segment::Segments;
 use crate::engine::Error;
 use crate::from_keys::evaluate::{Sampled, Straight, straight};
 use crate::from_keys::fallback::Row;
@@ -18,6 +18,7 @@ use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::prepare::clip_data::{ClipData, PartRef, Wanted};
+use crate::shader::Form;
 use crate::simd::dispatch::{VectorWidth, bring_near, in_lanes_of};
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::window::Window;
@@ -255,17 +256,18 @@ impl CpuEngine {
         cycle: &Cycle,
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
-        match &part.prepared.segments {
-            Segments::Arc(segments) => row::Row {
+        let segments = &part.prepared.segments;
+        match segments.form {
+            Form::Arc => row::Row {
                 part,
-                segments,
+                segments: &segments.arcs,
                 timeline,
                 cycle,
             }
             .evaluate(self.width, output),
-            Segments::Polynomial(segments) => row::Row {
+            Form::Polynomial => row::Row {
                 part,
-                segments,
+                segments: &segments.polynomials,
                 timeline,
                 cycle,
             }
@@ -316,7 +318,7 @@ impl CpuEngine {
                 prepared.clear();
                 let own = first..(first + tracks_each).min(tracks.end);
                 let next = own.end..(own.end + tracks_each).min(tracks.end);
-                preparation.push(prepared, set, own)?;
+                preparation.push(prepared, set, whole_tracks(set, own))?;
                 // By then the results have pushed everything out of the caches.
                 for (times, keys) in next.map(|track| set.times_and_keys(track)) {
                     let some = keys.len().min(TASK_KEYS);

@@ -20,7 +20,6 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::Stretch;
 use crate::time::wrap::{Cycle, Sides};
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::flip;
 
 /// Intervals that one task takes, where nothing is prepared.
 const STRETCH: usize = 16 * 1024;
@@ -49,13 +48,11 @@ struct Piece<'o> {
     intervals: Range<usize>,
     samples: Range<usize>,
     output: &'o mut [[f32; 4]],
-    /// What its keys' signs make of the next key's.
-    flip: f32,
 }
 
 impl CpuEngine {
     /// As [`CpuEngine::sampled`], for one track that all threads share: stretches
-    /// of its intervals, once for the signs of their keys and once for their samples.
+    /// of its intervals.
     pub(crate) fn sampled_track(
         &self,
         set: &TrackSet,
@@ -77,41 +74,28 @@ impl CpuEngine {
         let firsts: Vec<usize> = (0..last).step_by(STRETCH).collect();
         let last_of = |first: usize| (first + STRETCH).min(last);
         let new = || Sampled::new(interpolation, straight);
-        let align = |sampled: &mut Sampled<'_>, &first: &usize| {
-            sampled.align(whole.between(first, last_of(first)), 1.0)
-        };
-        let flips: Vec<f32> = self.on_threads(|| {
-            let flips = firsts.par_iter().map_init(new, align);
-            flips.collect::<Result<_, _>>()
-        })?;
-        let (mut sign, mut from) = (1.0, 0);
+        let mut from = 0;
         let mut work = Vec::new();
-        for (i, (&first, flip)) in firsts.iter().zip(flips).enumerate() {
+        for (i, &first) in firsts.iter().enumerate() {
             let to = match firsts.get(i + 1) {
                 Some(&next) => (clock.first_frame(track.times[next]) as usize).min(timeline.len()),
                 None => timeline.len(),
             };
             let (own, others) = output.split_at_mut(to.max(from) - from);
-            work.push((first, sign, from..to.max(from), own));
-            (output, sign, from) = (others, sign * flip, to.max(from));
+            work.push((first, from..to.max(from), own));
+            (output, from) = (others, to.max(from));
         }
-        let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
         self.on_threads(|| {
             let all = work.into_par_iter();
-            all.try_for_each_init(new, |sampled, (first, sign, window, own)| {
+            all.try_for_each_init(new, |sampled, (first, window, own)| {
                 // Cubics look at the keys beside their own too.
                 let beside = usize::from(matches!(straight, Straight::Cubics(_)));
                 let start = first.saturating_sub(beside);
-                let before = match start < first {
-                    true => sign * flip(keys[start], keys[first]),
-                    false => sign,
-                };
                 let stretch = whole.between(start, (last_of(first) + beside).min(last));
-                if sampled.stretch(stretch, before, clock, &window, own)? {
+                if sampled.stretch(stretch, clock, &window, own)? {
                     let row = Row {
                         first: window.start,
                         key: first,
-                        sign,
                         ..Row::whole(set, index, interpolation, timeline)
                     };
                     self.mend(row, own)?;
@@ -146,7 +130,6 @@ impl CpuEngine {
                 intervals: first..end,
                 samples: from..to,
                 output: own,
-                flip: 1.0,
             });
             (output, from) = (others, to);
         }
@@ -156,37 +139,20 @@ impl CpuEngine {
             (Prepared::new(interpolation), preparation)
         };
         let evaluate = |(prepared, preparation): &mut (Prepared, Preparation),
-                        piece: &mut Piece<'_>,
-                        sign: f32|
+                        piece: Piece<'_>|
          -> Result<(), Error> {
             prepared.clear();
-            piece.flip = preparation.push_piece(prepared, track, index, piece.intervals.clone())?;
-            if sign < 0.0 {
-                prepared.negate(interpolation);
-            }
+            preparation.push(prepared, set, [(index, piece.intervals)])?;
             let part = PartRef {
                 prepared,
                 part: &prepared.parts[0],
             };
-            let cycle = Cycle::own(piece.samples.clone());
+            let cycle = Cycle::own(piece.samples);
             Ok(self.part(part, timeline, &cycle, &mut Output::Here(piece.output))?)
         };
         self.on_threads(|| {
-            let all = pieces.par_iter_mut();
-            all.try_for_each_init(new, |memory, piece| evaluate(memory, piece, 1.0))?;
-            // Those whose keys before them turn their sign, once more.
-            let mut sign = 1.0;
-            let mut turned = Vec::new();
-            for piece in &mut pieces {
-                let flip = piece.flip;
-                if sign < 0.0 && !piece.samples.is_empty() {
-                    turned.push(piece);
-                }
-                sign *= flip;
-            }
-            turned
-                .into_par_iter()
-                .try_for_each_init(new, |memory, piece| evaluate(memory, piece, -1.0))
+            let all = pieces.into_par_iter();
+            all.try_for_each_init(new, evaluate)
         })
     }
 }

@@ -2,9 +2,9 @@
 //! and no run for each.
 
 use crate::cpu::evaluate::{Affine, one};
-use crate::curve::segment::Segments;
 use crate::math::canonical::round_f32;
 use crate::prepare::clip_data::{ClipData, PartRef};
+use crate::shader::Form;
 use crate::shader::{ArcSegment, PolynomialSegment};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
@@ -126,12 +126,16 @@ impl<'a> PartRef<'a> {
             _ => return None,
         };
         let distance = round_f32(time - middle);
-        match &prepared.segments {
-            Segments::Arc(arcs) => {
+        let segments = &prepared.segments;
+        match segments.form {
+            Form::Arc => {
                 let parameter = distance * affine.scale + affine.offset;
-                Some(One::Arc(&arcs[index], parameter))
+                Some(One::Arc(&segments.arcs[index], parameter))
             }
-            Segments::Polynomial(all) => Some(One::Polynomial(&all[index], affine, distance)),
+            Form::Polynomial => {
+                let segment = &segments.polynomials[index];
+                Some(One::Polynomial(segment, affine, distance))
+            }
         }
     }
 }

@@ -93,16 +93,12 @@ impl Engine {
         }) = pieces.pop_front()
         {
             let of_piece = timeline.of_tracks(piece.clone());
-            let sign = match (&used, &intervals) {
-                (Some(before), Some(own)) if own.start > 0 => before.data.sign,
-                _ => 1.0,
-            };
             let (spare, buffers) = used.take().map_or_else(Default::default, Clip::into_spare);
             let wanted = Wanted {
                 tracks: piece.clone(),
                 few_groups: piece != tracks || intervals.is_some(),
                 only_for: Some(&of_piece),
-                intervals: intervals.clone().map(|own| (own, sign)),
+                intervals: intervals.clone(),
                 spare,
                 ..Wanted::all(set, None)
             };

@@ -5,13 +5,14 @@
 
 use crate::math::canonical::canonical;
 use crate::prepare::arcs::arc_lanes;
-use crate::prepare::arcs::arc_lanes::{LANES as ARC_LANES, arc_anyhow, arc_in_lanes, whole};
+use crate::prepare::arcs::arc_lanes::{LANES as ARC_LANES, whole};
 use crate::prepare::constant_velocity::arc_component;
 use crate::shader::Form;
 use crate::shader::IS_KEY;
 use crate::shader::KeySample;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{self, Lanes, Number};
+use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{on_arc, square};
 use crate::twin::evaluate_polynomial::polynomial;
 
@@ -21,10 +22,10 @@ pub(crate) const LANES: usize = ARC_LANES;
 /// Samples that wait, one behind the other in the result.
 pub(crate) struct SampleBlock {
     pub(crate) form: Form,
-    /// The keys beside each; the same one twice where the sample is that key.
+    /// The keys beside each, in the signs that they count with; the same one twice, as it was
+    /// given, where the sample is that key.
     pub(crate) from: [[f32; 4]; LANES],
     pub(crate) to: [[f32; 4]; LANES],
-    pub(crate) signs: [f32; LANES],
     pub(crate) parameters: [f32; LANES],
     pub(crate) count: usize,
     pub(crate) rotations: [[f32; 4]; LANES],
@@ -37,7 +38,6 @@ impl SampleBlock {
             form,
             from: [identity; LANES],
             to: [identity; LANES],
-            signs: [1.0; LANES],
             parameters: [0.0; LANES],
             count: 0,
             rotations: [identity; LANES],
@@ -49,7 +49,6 @@ impl InLanes for SampleBlock {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
-        // Their signs are as stored.
         match self.form {
             Form::Arc => self.arcs::<L>(),
             Form::Polynomial => self.polynomials::<L>(),
@@ -68,16 +67,9 @@ impl SampleBlock {
                 arcs.put(vector, from, L::load_rotations(&self.to[j..]));
             }
             for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
-                let (sign, parameter) = (L::load(&self.signs[j..]), L::load(&self.parameters[j..]));
+                let parameter = L::load(&self.parameters[j..]);
                 let rotations = &mut self.rotations[j..j + L::COUNT];
-                L::store_rotations(arcs.at(vector, sign, parameter), rotations);
-            }
-        }
-        if arcs.any_in_doubt {
-            for lane in 0..self.count {
-                let (arc, _) = arc_anyhow(self.from[lane], self.to[lane]);
-                let (sign, parameter) = (self.signs[lane], self.parameters[lane]);
-                self.rotations[lane] = at(arc.middle, arc.tangent, sign, parameter);
+                L::store_rotations(arcs.at(vector, L::all(1.0), parameter), rotations);
             }
         }
     }
@@ -116,7 +108,6 @@ const VECTORS: usize = 8;
 struct Arcs<L> {
     middles: [[L; 4]; VECTORS],
     tangents: [[L; 4]; VECTORS],
-    any_in_doubt: bool,
 }
 
 impl<L: Lanes> Arcs<L> {
@@ -125,17 +116,15 @@ impl<L: Lanes> Arcs<L> {
         Self {
             middles: [[L::all(0.0); 4]; VECTORS],
             tangents: [[L::all(0.0); 4]; VECTORS],
-            any_in_doubt: false,
         }
     }
 
     /// The arcs of a vector.
     #[inline(always)]
     fn put(&mut self, vector: usize, from: [L; 4], to: [L; 4]) {
-        let arcs = arc_in_lanes(from, to);
-        self.middles[vector % VECTORS] = arcs.middle;
-        self.tangents[vector % VECTORS] = arcs.tangent;
-        self.any_in_doubt |= arcs.any_in_doubt;
+        let (middle, tangent) = arc_between(from, to);
+        self.middles[vector % VECTORS] = middle;
+        self.tangents[vector % VECTORS] = tangent;
     }
 
     /// Their rotations.
@@ -149,7 +138,7 @@ impl<L: Lanes> Arcs<L> {
     }
 }
 
-/// A rotation of an arc whose first key has that sign.
+/// A rotation of an arc, with that sign.
 #[inline(always)]
 fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
     let [x, y, z, w] = on_arc(middle, tangent, square(tangent), parameter);
@@ -157,7 +146,8 @@ fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 
     lanes::canonical([x * sign, y * sign, z * sign, w * sign])
 }
 
-/// Samples of one track on arcs, in one sign, straight into the result.
+/// Samples of one track on arcs between keys that count with one sign, straight into the
+/// result.
 pub(crate) struct ArcRun<'a> {
     pub(crate) samples: &'a [KeySample],
     pub(crate) keys: &'a [[f32; 4]],
@@ -184,7 +174,6 @@ impl InLanes for ArcRun<'_> {
                 to[j] = from[j] + u32::from(sample.key & IS_KEY == 0);
                 parameters[j] = sample.parameter;
             }
-            arcs.any_in_doubt = false;
             let sign = L::all(self.sign);
             for first in (0..count).step_by(VECTORS * L::COUNT) {
                 let end = count.min(first + VECTORS * L::COUNT);
@@ -197,14 +186,10 @@ impl InLanes for ArcRun<'_> {
                     L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
                 }
             }
-            if arcs.any_in_doubt || any & IS_KEY != 0 {
+            if any & IS_KEY != 0 {
                 for j in 0..count {
-                    let (start, end) = (self.keys[from[j] as usize], self.keys[to[j] as usize]);
                     if from[j] == to[j] {
-                        rotations[j] = start;
-                    } else if arcs.any_in_doubt {
-                        let (arc, _) = arc_anyhow(start, end);
-                        rotations[j] = at(arc.middle, arc.tangent, self.sign, parameters[j]);
+                        rotations[j] = self.keys[from[j] as usize];
                     }
                 }
             }

@@ -9,14 +9,13 @@ use crate::prepare::tangent_weights::UNKNOWN;
 use crate::shader::TangentWeights;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
-use crate::twin::small_angle::{signed, small_angle_cubic};
+use crate::twin::small_angle::small_angle_cubic;
 
 /// Samples that wait, one behind the other in the result.
 pub(crate) struct CubicBlock {
-    /// The four keys about each, in the signs that those before them give, but for one
-    /// that they share.
+    /// The four keys about each, in the signs that they count with; where the sample is a key,
+    /// the second is that key as it was given.
     pub(crate) keys: [[[f32; 4]; LANES]; 4],
-    pub(crate) signs: [f32; LANES],
     /// Of the two keys beside it.
     pub(crate) weights: [[TangentWeights; LANES]; 2],
     pub(crate) parameters: [f32; LANES],
@@ -34,7 +33,6 @@ impl CubicBlock {
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
             keys: [[identity; LANES]; 4],
-            signs: [1.0; LANES],
             weights: [[UNKNOWN; LANES]; 2],
             parameters: [0.0; LANES],
             held: [0.0; LANES],
@@ -53,13 +51,7 @@ impl InLanes for CubicBlock {
         let [before, start, end, after] = &self.keys;
         let [first, last] = &self.weights;
         for j in 0..whole(self.count) {
-            let sign = self.signs[j];
-            let keys = [
-                signed(before[j], sign),
-                signed(start[j], sign),
-                signed(end[j], sign),
-                signed(after[j], sign),
-            ];
+            let keys = [before[j], start[j], end[j], after[j]];
             let curve = small_angle_cubic(keys, first[j], last[j]);
             let c = &curve.powers;
             let s = self.parameters[j];

@@ -5,14 +5,10 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use crate::engine::Error;
 use crate::from_keys::arcs::{ArcRun, LANES, SampleBlock};
 use crate::from_keys::cubics::CubicBlock;
-use crate::from_keys::fallback::LEFT_OUT;
-use crate::math::quaternion::{dot, unit};
-use crate::method::interpolation::{Interpolation, InterpolationError, Path};
+use crate::method::interpolation::{Interpolation, Path};
 use crate::prepare::tangent_weights::{TrackWeights, WeightRule};
 use crate::shader::Form;
 use crate::shader::{IS_KEY, KEY_INNER, LONGEST_STEP};
@@ -23,7 +19,7 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::{FramePlan, Stretch, TimePlan};
 use crate::time::wrap::Sides;
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::flip;
+use crate::tracks::signs::Signs;
 
 /// What samples are made of, straight from keys.
 #[derive(Clone, Copy)]
@@ -45,7 +41,9 @@ pub(crate) fn straight(
     timeline: &Timeline,
 ) -> Option<Straight> {
     let few = timeline.len() * set.track_count() < set.key_count();
-    if !few || interpolation.sides() != Sides::default() {
+    // As authored an arc may be of more than half a turn, and is then two segments.
+    let arcs_are_short = interpolation.path == Path::Shortest || set.arcs_are_short();
+    if !few || !arcs_are_short || interpolation.sides() != Sides::default() {
         return None;
     }
     match interpolation.form() {
@@ -82,13 +80,6 @@ pub(crate) struct Sampled<'a> {
     block: Block<'a>,
     plan: FramePlan<'a>,
     time_plan: TimePlan,
-    /// The sign of the track's first key.
-    sign: f32,
-    /// The sign of every key, where any of them differ.
-    signs: Vec<f32>,
-    /// Whether arcs of the track may be of more than half a turn.
-    is_left_out: bool,
-    any_left_out: bool,
 }
 
 enum Block<'a> {
@@ -111,10 +102,6 @@ impl<'a> Sampled<'a> {
             block,
             plan: FramePlan::new(),
             time_plan: TimePlan::new(),
-            sign: 1.0,
-            signs: Vec::new(),
-            is_left_out: false,
-            any_left_out: false,
         }
     }
 
@@ -131,11 +118,6 @@ impl<'a> Sampled<'a> {
         for index in tracks {
             let stretch = Stretch::whole(set, index);
             self.interpolation.ends.check(stretch.keys, index)?;
-            self.align(stretch, 1.0)?;
-            if self.is_left_out {
-                self.leave_out(samples, &mut output);
-                continue;
-            }
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
                     let latest = stretch.times[stretch.times.len() - 1];
@@ -151,77 +133,20 @@ impl<'a> Sampled<'a> {
                 }
             }
         }
-        let left_out = std::mem::take(&mut self.any_left_out);
-        Ok(self.block.flush(&mut output) | left_out)
+        Ok(self.block.flush(&mut output))
     }
 
-    /// The samples of some intervals of a track, `window`, whose first key counts with
-    /// `sign`; whether any was left out.
+    /// The samples of some intervals of a track, `window`; whether any was left out.
     pub(crate) fn stretch(
         &mut self,
         stretch: Stretch<'a>,
-        sign: f32,
         clock: FrameClock,
         window: &Range<usize>,
         output: &mut [[f32; 4]],
     ) -> Result<bool, Error> {
         let mut output = output.iter_mut();
-        self.align(stretch, sign)?;
-        if self.is_left_out {
-            self.leave_out(window.len(), &mut output);
-            return Ok(true);
-        }
         self.frames(stretch, clock, window, &mut output)?;
         Ok(self.block.flush(&mut output))
-    }
-
-    /// The sign of every key, where the first one's is given; what it is of the last.
-    pub(crate) fn align(
-        &mut self,
-        stretch: Stretch<'_>,
-        mut sign: f32,
-    ) -> Result<f32, InterpolationError> {
-        let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-        self.signs.clear();
-        self.sign = sign;
-        self.is_left_out = false;
-        if keys.len() == 2 && stretch.first_key == 0 {
-            // The second key's sign is nobody's first; but an arc as authored may be long.
-            if self.interpolation.path == Path::Shortest {
-                return Ok(sign);
-            }
-        }
-        let turns = stretch.turns();
-        if turns && self.interpolation.path == Path::AsAuthored {
-            for (i, pair) in keys.windows(2).enumerate() {
-                if self
-                    .interpolation
-                    .path
-                    .refuses(dot(unit(pair[0]), unit(pair[1])))
-                {
-                    return Err(InterpolationError::Antipodal {
-                        track: stretch.index,
-                        key: stretch.first_key + i,
-                    });
-                }
-            }
-            self.is_left_out = true;
-        } else if turns {
-            self.signs.reserve(keys.len());
-            for pair in keys.windows(2) {
-                self.signs.push(sign);
-                sign *= flip(pair[0], pair[1]);
-            }
-            self.signs.push(sign);
-        }
-        Ok(sign)
-    }
-
-    /// Leaves so many samples to be mended.
-    fn leave_out(&mut self, samples: usize, output: &mut Output<'_>) {
-        self.any_left_out |= self.block.flush(output);
-        output.take(samples).for_each(|place| *place = LEFT_OUT);
-        self.any_left_out = true;
     }
 
     /// The samples in `window` of a stretch's intervals, and of what lies beside the
@@ -234,20 +159,18 @@ impl<'a> Sampled<'a> {
         output: &mut Output<'_>,
     ) -> Result<(), Error> {
         let samples = self.plan.samples(stretch, clock, window)?;
-        let signs = Signs {
-            all: self.sign,
-            each: &self.signs,
-        };
         match &mut self.block {
             Block::ByTwo(block) => {
                 let mut samples = samples;
-                if block.form == Form::Arc && signs.each.is_empty() {
+                if block.form == Form::Arc
+                    && let Some(sign) = stretch.signs.shared()
+                {
                     block.flush(output);
                     let left = std::mem::take(output).into_slice();
                     let mut run = ArcRun {
                         samples,
                         keys: bytemuck::cast_slice(stretch.keys),
-                        sign: signs.all,
+                        sign,
                         output: &mut *left,
                         done: 0,
                     };
@@ -256,14 +179,15 @@ impl<'a> Sampled<'a> {
                     samples = &samples[done..];
                     *output = left[done..].iter_mut();
                 }
+                let keys = SignedKeys::new(stretch);
                 for &sample in samples {
-                    block.push(stretch.keys, sample, &signs, output);
+                    block.push(keys, sample, output);
                 }
             }
             Block::ByFour(block, weights) => {
-                let keys = CubicKeys::new(stretch, weights, &signs);
+                let keys = CubicKeys::new(stretch, weights);
                 for &sample in samples {
-                    block.push(&keys, sample, output);
+                    block.push(keys, sample, output);
                 }
             }
         }
@@ -271,10 +195,6 @@ impl<'a> Sampled<'a> {
     }
 
     fn times(&mut self, stretch: Stretch<'a>, times: &[f64], output: &mut Output<'_>) {
-        let signs = Signs {
-            all: self.sign,
-            each: &self.signs,
-        };
         let (mut near, plan) = (0, &mut self.time_plan);
         let mut next = |time: f64| {
             let sample = plan.sample(stretch.times, time, near);
@@ -283,14 +203,15 @@ impl<'a> Sampled<'a> {
         };
         match &mut self.block {
             Block::ByTwo(block) => {
+                let keys = SignedKeys::new(stretch);
                 for &time in times {
-                    block.push(stretch.keys, next(time), &signs, output);
+                    block.push(keys, next(time), output);
                 }
             }
             Block::ByFour(block, weights) => {
-                let keys = CubicKeys::new(stretch, weights, &signs);
+                let keys = CubicKeys::new(stretch, weights);
                 for &time in times {
-                    block.push(&keys, next(time), output);
+                    block.push(keys, next(time), output);
                 }
             }
         }
@@ -313,33 +234,46 @@ impl Block<'_> {
     }
 }
 
-/// The signs of keys.
-struct Signs<'a> {
-    all: f32,
-    /// Where any of them differ.
-    each: &'a [f32],
+/// Keys of a track with the signs that they count with, where any is turned.
+#[derive(Clone, Copy)]
+struct SignedKeys<'a> {
+    as_given: &'a [[f32; 4]],
+    signs: Option<Signs<'a>>,
+}
+
+impl<'a> SignedKeys<'a> {
+    fn new(stretch: Stretch<'a>) -> Self {
+        Self {
+            as_given: bytemuck::cast_slice(stretch.keys),
+            signs: Some(stretch.signs).filter(|signs| signs.any()),
+        }
+    }
+
+    #[inline(always)]
+    fn get(self, key: usize) -> [f32; 4] {
+        let as_given = self.as_given[key];
+        match self.signs {
+            None => as_given,
+            Some(signs) => {
+                let sign = signs.sign(key);
+                as_given.map(|component| component * sign)
+            }
+        }
+    }
 }
 
 /// The keys of a track, and their weights.
+#[derive(Clone, Copy)]
 struct CubicKeys<'a> {
-    keys: &'a [[f32; 4]],
+    keys: SignedKeys<'a>,
     weights: &'a [TangentWeights],
-    signs: &'a Signs<'a>,
 }
 
 impl<'a> CubicKeys<'a> {
-    fn new<'t>(
-        stretch: Stretch<'t>,
-        weights: &'a mut TrackWeights<'t>,
-        signs: &'a Signs<'a>,
-    ) -> Self
-    where
-        't: 'a,
-    {
+    fn new<'t: 'a>(stretch: Stretch<'t>, weights: &'a mut TrackWeights<'t>) -> Self {
         Self {
-            keys: bytemuck::cast_slice(stretch.keys),
+            keys: SignedKeys::new(stretch),
             weights: weights.of(stretch.times, stretch.first_key, stretch.all),
-            signs,
         }
     }
 }
@@ -350,24 +284,16 @@ type Output<'a> = std::slice::IterMut<'a, [f32; 4]>;
 impl SampleBlock {
     /// Adds a sample, and works the block out when it is full.
     #[inline(always)]
-    fn push(
-        &mut self,
-        keys: &[Quat],
-        sample: KeySample,
-        signs: &Signs<'_>,
-        output: &mut Output<'_>,
-    ) {
+    fn push(&mut self, keys: SignedKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
         let lane = self.count;
         let key = (sample.key & !IS_KEY) as usize;
         if sample.key & IS_KEY == 0 {
-            self.from[lane] = keys[key].to_array();
-            self.to[lane] = keys[key + 1].to_array();
-            self.signs[lane] = signs.each.get(key).copied().unwrap_or(signs.all);
+            self.from[lane] = keys.get(key);
+            self.to[lane] = keys.get(key + 1);
         } else {
-            // Between a key and itself lies that key, as it is stored.
-            self.from[lane] = keys[key].to_array();
+            // Between a key and itself lies that key.
+            self.from[lane] = keys.as_given[key];
             self.to[lane] = self.from[lane];
-            self.signs[lane] = 1.0;
         }
         self.parameters[lane] = sample.parameter;
         self.count += 1;
@@ -389,13 +315,9 @@ impl SampleBlock {
 impl CubicBlock {
     /// As [`SampleBlock::push`].
     #[inline(always)]
-    fn push(&mut self, from: &CubicKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
+    fn push(&mut self, from: CubicKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
         let lane = self.count;
-        let CubicKeys {
-            keys,
-            weights,
-            signs,
-        } = *from;
+        let CubicKeys { keys, weights } = from;
         let key = (sample.key & !IS_KEY) as usize;
         if sample.key & IS_KEY == 0 {
             let (first, last) = (weights[key], weights[key + 1]);
@@ -404,19 +326,11 @@ impl CubicBlock {
             self.weights[0][lane] = first;
             self.weights[1][lane] = last;
             for (place, key) in [before, key, key + 1, after].into_iter().enumerate() {
-                self.keys[place][lane] = keys[key];
-                if let Some(&sign) = signs.each.get(key) {
-                    self.keys[place][lane] = keys[key].map(|c| c * sign);
-                }
+                self.keys[place][lane] = keys.get(key);
             }
-            self.signs[lane] = if signs.each.is_empty() {
-                signs.all
-            } else {
-                1.0
-            };
             self.held[lane] = 0.0;
         } else {
-            self.keys[1][lane] = keys[key];
+            self.keys[1][lane] = keys.as_given[key];
             self.held[lane] = 1.0;
         }
         self.parameters[lane] = sample.parameter;

@@ -9,14 +9,13 @@ use crate::cpu::engine::CpuEngine;
 use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Output;
 use crate::engine::Error;
-use crate::method::interpolation::{Interpolation, Path};
+use crate::method::interpolation::Interpolation;
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::set::BATCH;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::wrap::Cycle;
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::flip;
 
 /// What stands for a sample that was left out: no rotation is 0.
 pub(crate) const LEFT_OUT: [f32; 4] = [0.0; 4];
@@ -33,36 +32,40 @@ pub(crate) struct Row<'a> {
     pub(crate) timeline: &'a Timeline,
     /// The first of them.
     pub(crate) first: usize,
-    /// A key that none of them lies before, and its sign.
+    /// A key that none of them lies before.
     pub(crate) key: usize,
-    pub(crate) sign: f32,
 }
 
 /// Samples that were left out, and those between them.
 struct Piece {
     intervals: Range<usize>,
     samples: Range<usize>,
-    sign: f32,
 }
 
-/// Pieces that are prepared together, with their places in the result, and the sign of
-/// their first keys.
-type Batch<'o> = (Vec<(Piece, &'o mut [[f32; 4]])>, f32);
+/// Pieces that are prepared together, with their places in the result.
+type Batch<'o> = Vec<(Piece, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
     /// Works out what was left out of a row.
     pub(crate) fn mend(&self, row: Row<'_>, mut output: &mut [[f32; 4]]) -> Result<(), Error> {
         let pieces = row.pieces(output);
         let mut from = row.first;
-        let mut work = Vec::with_capacity(pieces.len());
+        let mut batches: Vec<Batch<'_>> = Vec::new();
+        let mut intervals = BATCH;
         for piece in pieces {
             let others = &mut output[piece.samples.start - from..];
             let (own, others) = others.split_at_mut(piece.samples.len());
             (from, output) = (piece.samples.end, others);
-            work.push((piece, own));
+            if intervals >= BATCH {
+                batches.push(Vec::new());
+                intervals = 0;
+            }
+            intervals += piece.intervals.len();
+            if let Some(batch) = batches.last_mut() {
+                batch.push((piece, own));
+            }
         }
-        let track = row.set.track(row.index);
-        let mend = |(batch, sign): Batch<'_>| -> Result<(), Error> {
+        let mend = |batch: Batch<'_>| -> Result<(), Error> {
             let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
             let Memory {
                 prepared,
@@ -70,11 +73,8 @@ impl CpuEngine {
                 ..
             } = &mut memory;
             prepared.clear();
-            let intervals = batch.iter().map(|(piece, _)| piece.intervals.clone());
-            preparation.push_pieces(prepared, track, row.index, intervals)?;
-            if sign < 0.0 {
-                prepared.negate(row.interpolation);
-            }
+            let pieces = (batch.iter()).map(|(piece, _)| (row.index, piece.intervals.clone()));
+            preparation.push(prepared, row.set, pieces)?;
             for (part, (piece, own)) in prepared.parts.iter().zip(batch) {
                 let part = PartRef { prepared, part };
                 let own = &mut Output::Here(own);
@@ -83,22 +83,6 @@ impl CpuEngine {
             self.memories.give_back(memory);
             Ok(())
         };
-        let (turned, others): (Vec<_>, Vec<_>) =
-            work.into_iter().partition(|(piece, _)| piece.sign < 0.0);
-        let mut batches: Vec<Batch<'_>> = Vec::new();
-        for (work, sign) in [(turned, -1.0), (others, 1.0)] {
-            let mut intervals = BATCH;
-            for (piece, own) in work {
-                if intervals >= BATCH {
-                    batches.push((Vec::new(), sign));
-                    intervals = 0;
-                }
-                intervals += piece.intervals.len();
-                if let Some((batch, _)) = batches.last_mut() {
-                    batch.push((piece, own));
-                }
-            }
-        }
         batches.into_par_iter().try_for_each(mend)
     }
 }
@@ -118,7 +102,6 @@ impl<'a> Row<'a> {
             timeline,
             first: 0,
             key: 0,
-            sign: 1.0,
         }
     }
 
@@ -132,7 +115,6 @@ impl<'a> Row<'a> {
                 pieces.push(Piece {
                     intervals: 0..last,
                     samples: self.first..self.first + output.len(),
-                    sign: 1.0,
                 });
             }
             return pieces;
@@ -161,26 +143,9 @@ impl<'a> Row<'a> {
                 _ => pieces.push(Piece {
                     intervals: interval..interval + 1,
                     samples: sample..sample + 1,
-                    sign: 1.0,
                 }),
             }
         }
-        if self.interpolation.path == Path::Shortest {
-            self.align(&mut pieces);
-        }
         pieces
-    }
-
-    /// The signs of the first keys of pieces.
-    fn align(&self, pieces: &mut [Piece]) {
-        let keys: &[[f32; 4]] = bytemuck::cast_slice(self.set.times_and_keys(self.index).1);
-        let (mut key, mut sign) = (self.key, self.sign);
-        for piece in pieces {
-            while key < piece.intervals.start {
-                sign *= flip(keys[key], keys[key + 1]);
-                key += 1;
-            }
-            piece.sign = sign;
-        }
     }
 }

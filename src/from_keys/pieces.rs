@@ -10,15 +10,13 @@ use crate::cpu::engine::CpuEngine;
 use crate::engine::Error;
 use crate::from_keys::evaluate::{Straight, straight};
 use crate::from_keys::fallback::{LEFT_OUT, Row};
-use crate::method::interpolation::{Ends, Interpolation, Path};
+use crate::method::interpolation::{Ends, Interpolation};
 use crate::output::rotations::Layout;
 use crate::prepare::tangent_weights::WeightRule;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::Stretch;
 use crate::tracks::set::TrackSet;
-
-use crate::from_keys::upload::turned;
 
 /// Rows of one piece: workgroups along y.
 const ROWS: usize = 65_535;
@@ -49,12 +47,10 @@ impl<'a> KeyJob<'a> {
     ) -> Option<Self> {
         let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
         let straight = straight(set, interpolation, timeline)?;
-        // Arcs of more than half a turn need segments.
-        let is_shortest = interpolation.path == Path::Shortest;
         // Where samples are explicit times, a track is not cut.
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
-        let suits = is_row && by_pieces && is_shortest;
+        let suits = is_row && by_pieces;
         suits.then_some(Self {
             set,
             tracks,
@@ -106,8 +102,6 @@ impl<'a> KeyJob<'a> {
 pub(crate) struct Part<'a> {
     pub(crate) stretch: Stretch<'a>,
     pub(crate) window: Range<usize>,
-    /// The sign of its first key.
-    pub(crate) sign: f32,
 }
 
 /// What a device gets at once.
@@ -139,8 +133,8 @@ pub(crate) struct KeyPieces<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     /// The next track.
     next: usize,
-    /// The rest of a track that is more than a piece: what is left of it, from the key,
-    /// whose sign is known, and the sample on.
+    /// The rest of a track that is more than a piece: what is left of it, from the key and
+    /// the sample on.
     long: Option<Long>,
 }
 
@@ -148,7 +142,6 @@ pub(crate) struct KeyPieces<'a, 'j> {
 struct Long {
     track: usize,
     key: usize,
-    pub(crate) sign: f32,
     sample: usize,
 }
 
@@ -186,7 +179,6 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
             self.long = Some(Long {
                 track: first,
                 key: 0,
-                sign: 1.0,
                 sample: 0,
             });
             return Ok(self.next_of_long(most));
@@ -261,10 +253,8 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         self.long = if sample < end {
             Some(Long { sample, ..long })
         } else if sample < samples {
-            let sign = turned(&whole.between(long.key, last_key), long.sign, |_| {});
             Some(Long {
                 key: last_key,
-                sign,
                 sample,
                 ..long
             })
@@ -274,11 +264,9 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         // Cubics look at the keys beside their own too.
         let beside = usize::from(self.job.weights().is_some());
         let first = long.key.saturating_sub(beside);
-        let before = whole.between(first, long.key);
         Part {
             stretch: whole.between(first, (last_key + beside).min(last)),
             window: long.sample..sample,
-            sign: long.sign * turned(&before, 1.0, |_| {}),
         }
     }
 }
@@ -300,7 +288,6 @@ impl<'a> KeyJob<'a> {
         Part {
             stretch: Stretch::whole(self.set, index),
             window: 0..self.timeline.len(),
-            sign: 1.0,
         }
     }
 

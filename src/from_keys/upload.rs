@@ -15,8 +15,6 @@ use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks};
 use crate::time::key_samples::{FramePlan, Stretch, TimeLanes, key_before};
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::any_turns;
-use crate::tracks::signs::flip;
 
 impl KeyPiece<'_, '_> {
     pub(crate) fn rows(&self) -> RowShape {
@@ -46,14 +44,24 @@ impl KeyPiece<'_, '_> {
         ]
     }
 
-    /// Writes what the kernel reads; false, and nothing that counts, where keys are lent of
-    /// which one is turned by those before it, or may be.
+    /// Whether none of its keys is turned: a kernel may then read them as they were given.
+    pub(crate) fn keys_are_as_given(&self) -> bool {
+        self.tasks.iter().all(|task| {
+            let signs = match &task.what {
+                What::Tracks(tracks) => self.job.set.signs_of(tracks.clone()),
+                What::Part(part) => part.stretch.signs,
+            };
+            !signs.any()
+        })
+    }
+
+    /// Writes what the kernel reads.
     pub(crate) fn write(
         &self,
         keys: Keys<'_>,
         mut samples: &mut [KeySample],
         mut weights: &mut [TangentWeights],
-    ) -> Result<bool, FramesError> {
+    ) -> Result<(), FramesError> {
         let (mut keys, lent) = match keys {
             Keys::Copied(keys) => (keys, None),
             Keys::Lent(first) => (&mut [][..], Some(first)),
@@ -86,44 +94,32 @@ impl KeyPiece<'_, '_> {
             frames: FramePlan::new(),
             weights: rule.map(|rule| TrackWeights::new(rule, ends)),
         };
-        let written =
-            places
-                .into_par_iter()
-                .try_for_each_init(new, |known, (task, mut written)| {
-                    let tracks = match &task.what {
-                        What::Part(part) => return self.write_part(part, known, &mut written),
-                        What::Tracks(tracks) => tracks.clone(),
+        places
+            .into_par_iter()
+            .try_for_each_init(new, |known, (task, mut written)| {
+                let tracks = match &task.what {
+                    What::Part(part) => return self.write_part(part, known, &mut written),
+                    What::Tracks(tracks) => tracks.clone(),
+                };
+                if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
+                    let mut of_tracks = TimesOfTracks {
+                        set: self.job.set,
+                        tracks: tracks.clone(),
+                        times,
+                        stride: *stride,
+                        each: self.job.timeline.len(),
+                        first_key: written.place_of(self.job.set, tracks.start, 0),
+                        samples: std::mem::take(&mut written.samples),
                     };
-                    if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
-                        let mut of_tracks = TimesOfTracks {
-                            set: self.job.set,
-                            tracks: tracks.clone(),
-                            times,
-                            stride: *stride,
-                            each: self.job.timeline.len(),
-                            first_key: written.place_of(self.job.set, tracks.start, 0),
-                            samples: std::mem::take(&mut written.samples),
-                            looks: written.lent.is_some() && self.job.set.turns(),
-                            turns: false,
-                        };
-                        in_lanes(&mut of_tracks);
-                        if written.lent.is_some() {
-                            return if of_tracks.turns {
-                                Err(Stop::Turned)
-                            } else {
-                                Ok(())
-                            };
-                        }
+                    in_lanes(&mut of_tracks);
+                    if written.lent.is_some() {
+                        return Ok(());
                     }
-                    tracks.into_iter().try_for_each(|index| {
-                        self.write_part(&self.job.track(index), known, &mut written)
-                    })
-                });
-        match written {
-            Ok(()) => Ok(true),
-            Err(Stop::Turned) => Ok(false),
-            Err(Stop::Frames(error)) => Err(error),
-        }
+                }
+                tracks.into_iter().try_for_each(|index| {
+                    self.write_part(&self.job.track(index), known, &mut written)
+                })
+            })
     }
 
     fn write_part<'p>(
@@ -131,16 +127,19 @@ impl KeyPiece<'_, '_> {
         part: &Part<'p>,
         known: &mut Known<'p>,
         written: &mut Written<'_>,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), FramesError> {
         let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
         let first_key = written.place_of(self.job.set, part.stretch.index, part.stretch.first_key);
         if written.lent.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
             own.copy_from_slice(keys);
-            turned(&part.stretch, part.sign, |key| own[key][0] |= SIGN_TURNED);
+            let signs = part.stretch.signs;
+            if signs.any() {
+                for (i, key) in own.iter_mut().enumerate() {
+                    key[0] |= if signs.is_turned(i) { SIGN_TURNED } else { 0 };
+                }
+            }
             written.keys = others;
-        } else if part.sign < 0.0 || part.stretch.turns() {
-            return Err(Stop::Turned);
         }
         if !written.samples.is_empty() {
             let all = std::mem::take(&mut written.samples);
@@ -201,10 +200,6 @@ struct TimesOfTracks<'a> {
     /// The place of the tracks' first key.
     first_key: usize,
     samples: &'a mut [KeySample],
-    /// Whether to look for keys that those before them turn.
-    looks: bool,
-    /// Whether there are any, or may be.
-    turns: bool,
 }
 
 impl InLanes for TimesOfTracks<'_> {
@@ -214,10 +209,6 @@ impl InLanes for TimesOfTracks<'_> {
         let mut found = TimeLanes::new();
         for index in self.tracks.clone() {
             let (starts, keys) = self.set.times_and_keys(index);
-            if self.looks && any_turns(bytemuck::cast_slice(keys)) {
-                self.turns = true;
-                return;
-            }
             let mut near = 0;
             for &time in &self.times[index * self.stride..][..self.each] {
                 let key = key_before(starts, time, near);
@@ -285,36 +276,4 @@ impl Written<'_> {
         self.lent
             .map_or(self.next_key, |first| first + set.keys_of(0..track) + key)
     }
-}
-
-/// Why a thread writes no more.
-enum Stop {
-    /// A key that is lent is turned.
-    Turned,
-    Frames(FramesError),
-}
-
-impl From<FramesError> for Stop {
-    fn from(error: FramesError) -> Self {
-        Self::Frames(error)
-    }
-}
-
-/// Calls `turn` for each key whose sign those before it turn, where the first one's is
-/// given; the sign of the last.
-pub(crate) fn turned(stretch: &Stretch<'_>, first: f32, mut turn: impl FnMut(usize)) -> f32 {
-    if first > 0.0 && !stretch.turns() {
-        return first;
-    }
-    let keys: &[[f32; 4]] = bytemuck::cast_slice(stretch.keys);
-    let mut sign = first;
-    for (i, key) in keys.iter().enumerate() {
-        if i > 0 {
-            sign *= flip(keys[i - 1], *key);
-        }
-        if sign < 0.0 {
-            turn(i);
-        }
-    }
-    sign
 }

@@ -196,7 +196,10 @@ impl KeySlot {
             )
         };
         let keys = match &lent.keys {
-            Some(keys) if write(Keys::Lent(keys.start() / size_of::<Quat>()))? => keys.binding(),
+            Some(keys) if piece.keys_are_as_given() => {
+                write(Keys::Lent(keys.start() / size_of::<Quat>()))?;
+                keys.binding()
+            }
             _ => {
                 room(&mut self.keys, key_bytes, Residence::Upload)?;
                 let Some(keys) = &mut self.keys else {

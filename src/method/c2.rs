@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{Vector, log, scaled, sine_cosine, sum};
+use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::End;
 use crate::method::interpolation::{Ends, Interpolation};
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
@@ -14,6 +13,7 @@ use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::tracks::set::Track;
+use crate::tracks::signs::Signs;
 
 /// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
 /// and the angular velocities at the keys are such that the angular acceleration is
@@ -77,14 +77,19 @@ const MARGIN: usize = 64;
 
 /// The angular velocities at the keys of some intervals. They do not depend on which
 /// intervals are asked for together: windows lie where they lie.
-fn velocities(track: Track, intervals: Range<usize>, interpolation: &Interpolation) -> Vec<Vector> {
+fn velocities(
+    track: Track,
+    signs: Signs<'_>,
+    intervals: Range<usize>,
+    interpolation: &Interpolation,
+) -> Vec<Vector> {
     let mut velocities = Vec::with_capacity(intervals.len() + 1);
     let mut key = intervals.start;
     while key <= intervals.end {
         let window = key / WINDOW * WINDOW;
         let from = window as isize - MARGIN as isize;
         let to = (window + WINDOW + MARGIN) as isize;
-        let (first, solved) = solve(track, from..to, interpolation);
+        let (first, solved) = solve(track, signs, from..to, interpolation);
         while key <= intervals.end && key < window + WINDOW {
             let place = (key as isize - first) as usize;
             velocities.push(solved[place].to_array());
@@ -95,7 +100,12 @@ fn velocities(track: Track, intervals: Range<usize>, interpolation: &Interpolati
 }
 
 /// The velocities at a window of keys, and which key is the first of them.
-fn solve(track: Track, window: Range<isize>, interpolation: &Interpolation) -> (isize, Vec<DVec3>) {
+fn solve(
+    track: Track,
+    signs: Signs<'_>,
+    window: Range<isize>,
+    interpolation: &Interpolation,
+) -> (isize, Vec<DVec3>) {
     let all = track.keys.len() as isize - 1;
     let closed = matches!(interpolation.ends, Ends::Loop) && all > 1;
     let (first, last) = if closed {
@@ -103,9 +113,8 @@ fn solve(track: Track, window: Range<isize>, interpolation: &Interpolation) -> (
     } else {
         (window.start.max(0), window.end.min(all))
     };
-    let noise = interpolation.path.flips_below();
     let steps: Vec<Step> = (first..last)
-        .map(|i| Step::new(track, i.rem_euclid(all.max(1)) as usize, noise))
+        .map(|i| Step::new(track, signs, i.rem_euclid(all.max(1)) as usize))
         .collect();
     // Two keys are joined by slerp, whatever the ends.
     let end_at = |at_end: bool, end: End| match at_end && all > 1 {
@@ -128,13 +137,15 @@ struct Step {
 }
 
 impl Step {
-    fn new(track: Track, i: usize, noise: f64) -> Self {
-        let [from, to] = [i, i + 1].map(|key| branchless::unit(track.keys[key].to_array()));
-        let step = branchless::step(from, to);
-        let sign = if step[3] < noise { -1.0 } else { 1.0 };
+    fn new(track: Track, signs: Signs<'_>, i: usize) -> Self {
+        let key = |key: usize| {
+            let sign = signs.sign(key);
+            quaternion::unit(track.keys[key].to_array().map(|component| component * sign))
+        };
+        let step = quaternion::step(key(i), key(i + 1));
         Self {
             duration: (track.times[i + 1] - track.times[i]).max(SHORTEST),
-            turn: Turn::new(DVec3::from_array(scaled(log(step.map(|c| c * sign)), 2.0))),
+            turn: Turn::new(DVec3::from_array(scaled(log(step), 2.0))),
         }
     }
 

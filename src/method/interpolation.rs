@@ -1,15 +1,17 @@
 //! What can be asked of a method: the path, the ends, what lies outside, which quantity.
 
-use crate::tracks::signs::DOT_NOISE;
+use std::ops::Range;
+
 use glam::Quat;
 
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{length, log, unit};
+use crate::math::quaternion::{self, dot, length, log, unit};
 use crate::method::{Curves, Method};
 use crate::prepare::tangent_weights::WeightRule;
 use crate::shader::Form;
 use crate::time::wrap::{Outside, Sides};
 use crate::tracks::key_data::Tcb;
+use crate::tracks::set::TrackSet;
+use crate::tracks::signs::Signs;
 
 /// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
 /// takes. A bare [`Method`] has the default options.
@@ -145,18 +147,32 @@ pub enum Path {
 }
 
 impl Path {
-    /// A key counts with the other sign where its dot product with its predecessor
-    /// is below this.
-    pub(crate) fn flips_below(self) -> f64 {
+    /// The signs that the keys of a track count with.
+    pub(crate) fn signs(self, set: &TrackSet, index: usize) -> Signs<'_> {
         match self {
-            Self::Shortest => -DOT_NOISE,
-            Self::AsAuthored => f64::NEG_INFINITY,
+            Self::Shortest => set.signs(index),
+            Self::AsAuthored => Signs::AS_GIVEN,
         }
     }
 
-    /// Whether there is no path between keys with that dot product.
-    pub(crate) fn refuses(self, dot: f64) -> bool {
-        self == Self::AsAuthored && dot < -1.0 + f64::from(f32::EPSILON)
+    /// Refuses some intervals of the `index`th track of a set where there is no path between
+    /// their keys.
+    pub(crate) fn check(
+        self,
+        keys: &[Quat],
+        intervals: Range<usize>,
+        index: usize,
+    ) -> Result<(), InterpolationError> {
+        if self == Self::Shortest {
+            return Ok(());
+        }
+        for key in intervals {
+            let [from, to] = [key, key + 1].map(|key| unit(keys[key].to_array()));
+            if dot(from, to) < -1.0 + f64::from(f32::EPSILON) {
+                return Err(InterpolationError::Antipodal { track: index, key });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -206,7 +222,7 @@ impl Ends {
         let (Self::Loop, [first, .., last]) = (self, keys) else {
             return Ok(());
         };
-        let seam = branchless::step(unit(first.to_array()), unit(last.to_array()));
+        let seam = quaternion::step(unit(first.to_array()), unit(last.to_array()));
         let half_angle = length(log([seam[0], seam[1], seam[2], seam[3].abs()]));
         if half_angle > LOOP_TOLERANCE {
             let degrees = (2.0 * half_angle).to_degrees();

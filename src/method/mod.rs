@@ -42,6 +42,7 @@ pub use crate::method::slerp::SLERP;
 pub use crate::method::squad::SQUAD;
 pub use crate::method::step::STEP;
 
+use crate::tracks::signs::Signs;
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
@@ -165,7 +166,7 @@ pub(crate) enum Given {
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
     /// The angular velocity at every key of some intervals (rad/s, body frame), where
     /// each depends on all keys.
-    Velocities(fn(Track, Range<usize>, &Interpolation) -> Vec<Vector>),
+    Velocities(fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>),
 }
 
 impl Smooth {

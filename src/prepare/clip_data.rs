@@ -27,8 +27,6 @@ pub(crate) struct ClipData {
     /// Where each track's parts start in `parts`, and one end more.
     tracks: Vec<usize>,
     span: Option<(f64, f64)>,
-    /// What the signs of a long track's keys make of that of its last.
-    pub(crate) sign: f32,
 }
 
 /// A part and the lists that it points into.
@@ -49,9 +47,8 @@ pub(crate) struct Wanted<'a> {
     pub(crate) few_groups: bool,
     /// The samples of one timeline: what is prepared serves no other then.
     pub(crate) only_for: Option<&'a Timeline>,
-    /// Only these intervals of the one track that is wanted, as prepared by so many; and the
-    /// sign of the first of their keys.
-    pub(crate) intervals: Option<(Range<usize>, f32)>,
+    /// Only these intervals of the one track that is wanted.
+    pub(crate) intervals: Option<Range<usize>>,
     /// Memory to use again.
     pub(crate) spare: Vec<Prepared>,
 }
@@ -83,11 +80,8 @@ impl ClipData {
             return Err(InterpolationError::MirroredVelocity);
         }
         let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
-        let (groups, sign) = prepare(set, &interpolation, wanted)?;
-        Ok(Self {
-            sign,
-            ..Self::of_groups(groups, set, interpolation, merged_bytes)
-        })
+        let groups = prepare(set, &interpolation, wanted)?;
+        Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
     }
 
     /// Prepares a set's translations or scales.
@@ -146,7 +140,6 @@ impl ClipData {
             parts,
             tracks,
             span: set.time_span(),
-            sign: 1.0,
         }
     }
 

@@ -7,31 +7,29 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::curve::segment::segment_size;
-use crate::math::canonical::canonical;
 use crate::method::Curves;
-use crate::method::interpolation::{Ends, Interpolation, InterpolationError, Quantity, Speed};
+use crate::method::interpolation::{Interpolation, InterpolationError, Speed};
+use crate::prepare::Prepared;
 use crate::prepare::arcs::arcs::ArcPreparation;
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::double::smooth::SmoothPreparation;
 use crate::prepare::steps::StepPreparation;
-use crate::prepare::{NONE, Prepared};
 use crate::shader::Form;
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::wrap::Sides;
-use crate::tracks::set::{Track, TrackSet};
+use crate::tracks::set::TrackSet;
 
 /// Key intervals prepared as one piece of work.
 pub(crate) const BATCH: usize = 4096;
 
 /// Prepares tracks of a set, in parallel: one [`Prepared`] for each batch of tracks, or of
-/// intervals where a track is long, in order; and what the signs of the last long track's
-/// keys make of that of its last.
+/// intervals where a track is long, in order.
 pub(crate) fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
     wanted: Wanted<'_>,
-) -> Result<(Vec<Prepared>, f32), InterpolationError> {
+) -> Result<Vec<Prepared>, InterpolationError> {
     let tracks = wanted.tracks.clone();
     let intervals = wanted.intervals.clone();
     let batch = wanted.batch(set, interpolation.form());
@@ -45,31 +43,30 @@ pub(crate) fn prepare(
         }
         preparation
     };
-    let batches: Vec<(Vec<Prepared>, f32)> = batches(set, tracks.clone(), batch)
+    let batches: Vec<Vec<Prepared>> = batches(set, tracks.clone(), batch)
         .into_par_iter()
         .map(|tracks| {
             let alone = tracks.clone().next().filter(|_| tracks.len() == 1);
             let in_pieces = interpolation.speed == Speed::AsKeyed;
             if let (Some(long), true) = (alone, in_pieces) {
-                let all = (0..set.track(long).keys.len() - 1, 1.0);
-                let (own, sign) = intervals.clone().unwrap_or(all);
-                return prepare_long(set, long, own, sign, interpolation, &preparation, &spare);
+                let all = 0..set.track(long).keys.len() - 1;
+                let own = intervals.clone().unwrap_or(all);
+                return prepare_long(set, long, own, interpolation, &preparation, &spare);
             }
             let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
             prepared.clear();
             prepared.reserve(keys_of(set, tracks.clone()));
-            preparation().push(&mut prepared, set, tracks)?;
-            Ok((vec![prepared], 1.0))
+            preparation().push(&mut prepared, set, whole_tracks(set, tracks))?;
+            Ok(vec![prepared])
         })
         .collect::<Result<_, _>>()?;
-    let sign = batches.last().map_or(1.0, |&(_, sign)| sign);
-    let mut groups: Vec<Prepared> = batches.into_iter().flat_map(|(own, _)| own).collect();
+    let mut groups: Vec<Prepared> = batches.into_iter().flatten().collect();
     // Their places are those among the tracks asked for.
     for part in groups.iter_mut().flat_map(|group| &mut group.parts) {
         part.track -= tracks.start as u32;
     }
-    Ok((groups, sign))
+    Ok(groups)
 }
 
 impl Wanted<'_> {
@@ -103,19 +100,15 @@ fn batches(set: &TrackSet, tracks: Range<usize>, batch: usize) -> Vec<Range<usiz
     batches
 }
 
-/// Intervals of a track in pieces, each prepared as if its first key had the sign it is
-/// stored with, and turned round afterwards where the keys before it say so; `sign` is that
-/// of the first, and comes back as that of the last.
+/// Intervals of a track in pieces.
 fn prepare_long(
     set: &TrackSet,
     index: usize,
     intervals: Range<usize>,
-    mut sign: f32,
     interpolation: &Interpolation,
     preparation: &(impl Fn() -> Preparation + Sync),
     spare: &Mutex<Vec<Prepared>>,
-) -> Result<(Vec<Prepared>, f32), InterpolationError> {
-    let track = set.track(index);
+) -> Result<Vec<Prepared>, InterpolationError> {
     let pieces = intervals.len().div_ceil(BATCH).max(1);
     let piece = |i: usize| {
         let start = intervals.start + i * BATCH;
@@ -123,60 +116,25 @@ fn prepare_long(
         let memory = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut prepared = memory.unwrap_or_else(|| Prepared::new(interpolation));
         prepared.clear();
-        let sign = preparation().push_piece(&mut prepared, track, index, own)?;
-        Ok((prepared, sign))
+        preparation().push(&mut prepared, set, [(index, own)])?;
+        Ok(prepared)
     };
-    let pieces: Vec<(Prepared, f32)> = (0..pieces)
-        .into_par_iter()
-        .map(piece)
-        .collect::<Result<_, _>>()?;
-    let with_sign = |(mut prepared, own): (Prepared, f32)| {
-        if sign < 0.0 {
-            prepared.negate(interpolation);
-        }
-        sign *= own;
-        prepared
-    };
-    let prepared = pieces.into_iter().map(with_sign).collect();
-    Ok((prepared, sign))
-}
-
-impl Prepared {
-    /// The same rotations with the other sign, but for those that are the keys' own.
-    pub(crate) fn negate(&mut self, interpolation: &Interpolation) {
-        if interpolation.quantity != Quantity::Rotation {
-            return; // both signs move alike
-        }
-        self.segments.negate();
-        for curve in &mut self.exact {
-            curve.negate();
-        }
-        let frozen = matches!(interpolation.ends, Ends::Frozen);
-        if !interpolation.method.interpolates && !frozen {
-            let ends = self.parts.iter().map(|part| part.after);
-            for constant in ends.filter(|&constant| constant != NONE) {
-                let value = &mut self.constants[constant as usize];
-                *value = value.map(|component| canonical(-component));
-            }
-        }
-    }
+    (0..pieces).into_par_iter().map(piece).collect()
 }
 
 /// Makes segments from key intervals, in blocks that may hold several tracks'.
 pub(crate) trait Prepare: Send {
-    /// Adds some intervals of a track, the `index`th of its set, as a part of their own, as
-    /// if their first key had the sign it is stored with.
+    /// Adds some intervals of a track, the `index`th of its set, as a part of their own.
     fn add(
         &mut self,
         prepared: &mut Prepared,
-        track: Track,
+        set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError>;
 
-    /// Finishes what was added; what the signs of the last intervals' keys make of the
-    /// next.
-    fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError>;
+    /// Finishes what was added.
+    fn finish(&mut self, prepared: &mut Prepared);
 
     /// From now on only intervals that hold a frame need segments; or all.
     fn only_frames(&mut self, _frames: Option<(FrameRate, f64)>) {}
@@ -207,47 +165,27 @@ impl Preparation {
         });
     }
 
-    /// Prepares some tracks of a set, one part for each.
+    /// Prepares some intervals of tracks of a set, each time a part of their own.
     pub(crate) fn push(
         &mut self,
         prepared: &mut Prepared,
         set: &TrackSet,
-        tracks: Range<usize>,
+        pieces: impl IntoIterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), InterpolationError> {
-        for index in tracks {
-            let track = set.track(index);
-            let all = 0..track.keys.len() - 1;
-            self.0.add(prepared, track, index, all)?;
+        for (track, intervals) in pieces {
+            self.0.add(prepared, set, track, intervals)?;
         }
-        self.0.finish(prepared).map(drop)
+        self.0.finish(prepared);
+        Ok(())
     }
+}
 
-    /// Prepares some intervals of a track, the `index`th of its set, as if the first of their
-    /// keys had the sign it is stored with; what it would make of the sign of the last.
-    pub(crate) fn push_piece(
-        &mut self,
-        prepared: &mut Prepared,
-        track: Track,
-        index: usize,
-        intervals: Range<usize>,
-    ) -> Result<f32, InterpolationError> {
-        self.0.add(prepared, track, index, intervals)?;
-        self.0.finish(prepared)
-    }
-
-    /// As [`Preparation::push_piece`], several pieces, each a part of its own.
-    pub(crate) fn push_pieces(
-        &mut self,
-        prepared: &mut Prepared,
-        track: Track,
-        index: usize,
-        pieces: impl Iterator<Item = Range<usize>>,
-    ) -> Result<(), InterpolationError> {
-        for intervals in pieces {
-            self.0.add(prepared, track, index, intervals)?;
-        }
-        self.0.finish(prepared).map(drop)
-    }
+/// All intervals of some tracks.
+pub(crate) fn whole_tracks(
+    set: &TrackSet,
+    tracks: Range<usize>,
+) -> impl Iterator<Item = (usize, Range<usize>)> {
+    tracks.map(|track| (track, 0..set.times_and_keys(track).1.len() - 1))
 }
 
 #[cfg(test)]
@@ -290,9 +228,9 @@ mod tests {
             let interpolation = method.into();
             let mut whole = Prepared::new(&interpolation);
             Preparation::new(&interpolation)
-                .push(&mut whole, &set, 0..1)
+                .push(&mut whole, &set, whole_tracks(&set, 0..1))
                 .unwrap();
-            let (pieces, _) = prepare(&set, &interpolation, Wanted::all(&set, None)).unwrap();
+            let pieces = prepare(&set, &interpolation, Wanted::all(&set, None)).unwrap();
             assert!(pieces.len() > 3, "{method}");
             let mut together = Prepared::new(&interpolation);
             pieces.into_iter().for_each(|piece| together.append(piece));
@@ -326,7 +264,11 @@ mod tests {
                 let interpolation = method.into();
                 let mut prepared = Prepared::new(&interpolation);
                 Preparation::new(&interpolation)
-                    .push(&mut prepared, &set, 0..set.track_count())
+                    .push(
+                        &mut prepared,
+                        &set,
+                        whole_tracks(&set, 0..set.track_count()),
+                    )
                     .unwrap();
                 prepared
             });

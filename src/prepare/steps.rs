@@ -7,7 +7,7 @@ use glam::Quat;
 use crate::method::interpolation::{Interpolation, InterpolationError, Quantity};
 use crate::prepare::set::Prepare;
 use crate::prepare::{NONE, Part, Prepared, Source};
-use crate::tracks::set::Track;
+use crate::tracks::set::TrackSet;
 
 /// Prepares tracks whose keys are held.
 pub(crate) struct StepPreparation {
@@ -26,10 +26,11 @@ impl Prepare for StepPreparation {
     fn add(
         &mut self,
         prepared: &mut Prepared,
-        track: Track,
+        set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
+        let track = set.track(index);
         self.interpolation.ends.check(track.keys, index)?;
         let first = prepared.constants.len() as u32;
         let last = first + intervals.len() as u32;
@@ -61,7 +62,5 @@ impl Prepare for StepPreparation {
         Ok(())
     }
 
-    fn finish(&mut self, _: &mut Prepared) -> Result<f32, InterpolationError> {
-        Ok(1.0)
-    }
+    fn finish(&mut self, _: &mut Prepared) {}
 }

@@ -9,7 +9,6 @@ use crate::math::quaternion::ratio;
 use crate::method::interpolation::{Ends, Interpolation, Quantity};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::double::curve::{Curve, Piece};
-use crate::prepare::double::fitting::polynomials;
 use crate::prepare::double::shape::Shape;
 use crate::prepare::{Beyond, NONE, Part, Prepared, Source};
 use crate::shader::PolynomialSegment;
@@ -54,7 +53,7 @@ pub(crate) fn add(
         }
         let [start, end] = [i, i + 1].map(|key| track.keys[key].as_dvec3());
         let [leaving, arriving] = slopes.of(i);
-        let segments = polynomials(prepared);
+        let segments = &mut prepared.segments.polynomials;
         let source = Source::Segment(segments.len() as u32);
         segments.push(cubic(start, leaving, arriving, end));
         prepared.push_span(track.times[i], source, key);

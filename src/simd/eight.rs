@@ -296,11 +296,6 @@ impl Lanes for Eight {
             _mm256_movemask_ps(within) != 0
         }
     }
-
-    #[inline(always)]
-    fn any_within(self, limit: f32) -> bool {
-        self.magnitude().any_at_most(limit)
-    }
 }
 
 #[cfg(test)]

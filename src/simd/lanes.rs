@@ -139,9 +139,6 @@ pub(crate) trait Lanes: Number {
 
     /// Whether any is at most `limit`.
     fn any_at_most(self, limit: f32) -> bool;
-
-    /// Whether the magnitude of any is at most `limit`.
-    fn any_within(self, limit: f32) -> bool;
 }
 
 /// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
@@ -296,11 +293,6 @@ impl Lanes for Vec4 {
     fn any_at_most(self, limit: f32) -> bool {
         self.cmple(Self::splat(limit)).any()
     }
-
-    #[inline(always)]
-    fn any_within(self, limit: f32) -> bool {
-        self.abs().any_at_most(limit)
-    }
 }
 
 #[inline(always)]
@@ -389,10 +381,6 @@ pub(crate) mod tests {
             loaded[c].sign().store(&mut stored);
             let signs = columns[c].iter().map(|&v| if v < 0.0 { -1.0 } else { 1.0 });
             assert!(stored.iter().copied().eq(signs));
-            let least = columns[c]
-                .iter()
-                .fold(f32::MAX, |least, v| least.min(v.abs()));
-            assert!(loaded[c].any_within(least) && !loaded[c].any_within(least.next_down()));
             let least = columns[c].iter().copied().fold(f32::MAX, f32::min);
             assert!(loaded[c].any_at_most(least) && !loaded[c].any_at_most(least.next_down()));
         }

@@ -315,11 +315,6 @@ impl Lanes for Sixteen {
         let limit = Self::all(limit);
         avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, limit.0) != 0)
     }
-
-    #[inline(always)]
-    fn any_within(self, limit: f32) -> bool {
-        self.magnitude().any_at_most(limit)
-    }
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::time::frames::FramesError;
 use crate::time::interval_block::Occupied;
 use crate::time::runs::COUNTABLE;
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::any_turns;
+use crate::tracks::signs::Signs;
 
 /// Boundaries, or samples, worked out together.
 const LANES: usize = 64;
@@ -33,8 +33,8 @@ pub(crate) struct Stretch<'a> {
     pub(crate) first_key: usize,
     /// Keys of the whole track.
     pub(crate) all: usize,
-    /// Whether the sign of any key of the set is turned by those before it, or may be.
-    turns: bool,
+    /// The signs that they count with.
+    pub(crate) signs: Signs<'a>,
 }
 
 impl<'a> Stretch<'a> {
@@ -48,7 +48,7 @@ impl<'a> Stretch<'a> {
             index,
             first_key: 0,
             all: keys.len(),
-            turns: set.turns(),
+            signs: set.signs(index),
         }
     }
 
@@ -57,15 +57,10 @@ impl<'a> Stretch<'a> {
         Self {
             times: &self.times[first_key..=last_key],
             keys: &self.keys[first_key..=last_key],
+            signs: self.signs.between(first_key..last_key + 1),
             first_key,
             ..self
         }
-    }
-
-    /// Whether the sign of any key after the first is turned by those before it, or may be.
-    #[inline(always)]
-    pub(crate) fn turns(&self) -> bool {
-        self.turns && any_turns(bytemuck::cast_slice(self.keys))
     }
 }
 

@@ -64,38 +64,3 @@ pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, Tra
     }
     Ok(unit_f32(exact))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tracks::set::TrackSet;
-
-    #[test]
-    fn a_set_knows_whether_a_key_is_turned_by_the_one_before_it() {
-        let [near, far] = [1.0, 3.0].map(Quat::from_rotation_x);
-        let tracks = |second: Quat| [Quat::IDENTITY, near, near, second];
-        for (second, turns) in [(far, false), (-far, true), (-near, true)] {
-            let times = [0.0, 1.0];
-            let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
-            let mut pushed = TrackSet::new();
-            // Nothing is kept of a track that is refused.
-            let refused = [
-                Quat::IDENTITY,
-                -Quat::IDENTITY,
-                Quat::from_xyzw(0.0, 0.0, 0.0, 2.0),
-            ];
-            pushed.push("", &[0.0, 1.0, 2.0], &refused).unwrap_err();
-            for keys in tracks(second).chunks(2) {
-                pushed.push("", &times, keys).unwrap();
-            }
-            assert_eq!((shared.turns(), pushed.turns()), (turns, turns), "{second}");
-        }
-        // From one track to the next nothing turns.
-        let apart = [Quat::IDENTITY, near, -near, -far];
-        assert!(
-            !TrackSet::with_shared_times(&[0.0, 1.0], &apart)
-                .unwrap()
-                .turns()
-        );
-    }
-}

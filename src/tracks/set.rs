@@ -10,7 +10,7 @@ use crate::TrackError;
 use std::ops::Range;
 
 use crate::tracks::check::{check_times, unit_key};
-use crate::tracks::signs::any_turns;
+use crate::tracks::signs::{SignBits, Signs};
 
 use crate::tracks::key_data::KeyData;
 use glam::{DVec3, Quat};
@@ -45,8 +45,7 @@ pub struct TrackSet {
     pub(crate) span: Option<(f64, f64)>,
     /// Keys of the longest track.
     longest: usize,
-    /// Whether the sign of a key may be turned by the one before it.
-    turns: bool,
+    signs: SignBits,
 }
 
 /// Where a track's keys and times lie in the pools of its set; tracks whose
@@ -108,7 +107,8 @@ impl TrackSet {
                 }
             }
         }
-        self.turns = self.turns || any_turns(bytemuck::cast_slice(&self.keys[first_key..]));
+        let own = bytemuck::cast_slice(&self.keys[first_key..]);
+        self.signs.push_track(first_key, own);
         let first_time = self.share_or_append(times);
         self.tracks.push(TrackRange {
             first_key,
@@ -150,9 +150,10 @@ impl TrackSet {
         for (place, key) in keys.iter_mut().enumerate() {
             *key = unit_key(place / len, place % len, *key)?;
         }
-        let turns = keys
-            .chunks(len)
-            .any(|track| any_turns(bytemuck::cast_slice(track)));
+        let mut signs = SignBits::default();
+        for (track, keys) in keys.chunks(len).enumerate() {
+            signs.push_track(track * len, bytemuck::cast_slice(keys));
+        }
         let range = |track| TrackRange {
             first_key: track * len,
             first_time: 0,
@@ -164,7 +165,7 @@ impl TrackSet {
             span: (!keys.is_empty()).then(|| (times[0], times[len - 1])),
             keys,
             times,
-            turns,
+            signs,
             ..Self::default()
         })
     }
@@ -186,11 +187,24 @@ impl TrackSet {
         self.longest
     }
 
-    /// Whether the sign of any key may be turned by the one before it in its track: where
-    /// none is, which is usual, nobody need look at them all again.
+    /// Whether every two neighbouring keys of a track are less than half a turn apart as they
+    /// were given: then the shortest path and the path as authored are the same.
+    pub(crate) fn arcs_are_short(&self) -> bool {
+        self.signs.arcs_are_short()
+    }
+
+    /// The signs that the keys of tracks that follow one another count with by the shortest
+    /// path.
+    pub(crate) fn signs_of(&self, tracks: Range<usize>) -> Signs<'_> {
+        let first = self.first_key(tracks.start);
+        self.signs.of(first..self.first_key(tracks.end))
+    }
+
+    /// The signs that a track's keys count with by the shortest path.
     #[inline]
-    pub(crate) fn turns(&self) -> bool {
-        self.turns
+    pub(crate) fn signs(&self, index: usize) -> Signs<'_> {
+        let TrackRange { first_key, len, .. } = self.tracks[index];
+        self.signs.of(first_key..first_key + len)
     }
 
     /// Whether the set has no tracks.
@@ -244,12 +258,13 @@ impl TrackSet {
     /// How many keys tracks that follow one another have: those of all lie one behind the
     /// other.
     pub(crate) fn keys_of(&self, tracks: Range<usize>) -> usize {
-        let first = |track: usize| {
-            self.tracks
-                .get(track)
-                .map_or(self.keys.len(), |t| t.first_key)
-        };
-        first(tracks.end) - first(tracks.start)
+        self.first_key(tracks.end) - self.first_key(tracks.start)
+    }
+
+    /// The place of a track's first key among all; behind the last track, how many there are.
+    fn first_key(&self, track: usize) -> usize {
+        let range = self.tracks.get(track);
+        range.map_or(self.keys.len(), |range| range.first_key)
     }
 
     /// Every track in order.
@@ -283,6 +298,8 @@ impl TrackSet {
             let first_time = set.share_or_append(track.times);
             let first_key = set.keys.len();
             set.keys.extend_from_slice(track.keys);
+            let keys = bytemuck::cast_slice(track.keys);
+            set.signs.push_track(first_key, keys);
             let own = set.tracks.len();
             set.velocities.set(own, track.velocities);
             set.tangents.set(own, track.tangents);
@@ -420,5 +437,36 @@ mod tests {
         assert_eq!(keys[0].to_array(), unit.to_array());
         assert!(keys[1].angle_between(unit) < 1e-6);
         assert!((f64::from(keys[1].length()) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_set_knows_which_keys_the_one_before_turns() {
+        let [near, far] = [1.0, 3.0].map(Quat::from_rotation_x);
+        let tracks = |second: Quat| [Quat::IDENTITY, near, near, second];
+        for (second, is_turned) in [(far, false), (-far, true), (-near, true)] {
+            let times = [0.0, 1.0];
+            let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
+            let mut pushed = TrackSet::new();
+            // Nothing is kept of a track that is refused.
+            let refused = [
+                Quat::IDENTITY,
+                -Quat::IDENTITY,
+                Quat::from_xyzw(0.0, 0.0, 0.0, 2.0),
+            ];
+            pushed.push("", &[0.0, 1.0, 2.0], &refused).unwrap_err();
+            for keys in tracks(second).chunks(2) {
+                pushed.push("", &times, keys).unwrap();
+            }
+            for set in [&shared, &pushed, &pushed.select(0..2)] {
+                assert_eq!(set.signs(1).is_turned(1), is_turned, "{second}");
+                assert_eq!(set.arcs_are_short(), !is_turned);
+                assert!(!set.signs(0).any());
+            }
+            assert_eq!(pushed.select(1..2).signs(0).is_turned(1), is_turned);
+        }
+        // From one track to the next nothing turns.
+        let apart = [Quat::IDENTITY, near, -near, -far];
+        let set = TrackSet::with_shared_times(&[0.0, 1.0], &apart).unwrap();
+        assert!(set.arcs_are_short());
     }
 }

@@ -1,75 +1,268 @@
-//! Which of a rotation's two quaternions a key counts with.
+//! Sign continuation. `q` and `-q` are one rotation, and by the shortest path each key counts
+//! with the sign that is nearer to the key before it. That is worked out once, when keys come
+//! into a set, and kept as one bit for each key.
 
-use crate::cpu::evaluate::FEW;
+use std::ops::Range;
+
 use crate::math::quaternion::{dot, unit};
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Lanes, Number};
+use crate::simd::lanes::Lanes;
 
-/// Dot products nearer to zero than this are rounding noise of f32 keys: the signs
-/// given decide, never the noise.
-pub(crate) const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
+/// Two keys whose inner product is nearer to zero than this are half a turn apart but for the
+/// rounding of f32: the signs given decide, never the rounding.
+const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// What f32 makes of the inner product of two keys is within 1e-6 of it: beyond this its
-/// sign is not in doubt.
-pub(crate) const IN_DOUBT: f32 = 1e-5;
+/// In f32 an inner product is within 1e-6 of its value: beyond this its sign is not in doubt.
+const IN_DOUBT: f32 = 1e-5;
 
-/// The inner product in f32.
-#[inline(always)]
-pub(crate) fn inner<N: Number>(a: [N; 4], b: [N; 4]) -> N {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+/// Pairs of keys up to which a loop over them is faster than vectors.
+const FEW: usize = 4;
+
+const BITS: usize = u64::BITS as usize;
+
+/// For each key of a set, whether it counts with the other sign than it was given; a track's
+/// first key counts as given. Nothing is stored until a key turns, which is rare.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct SignBits {
+    bits: Vec<u64>,
+    /// Whether two neighbouring keys are about half a turn apart or more as they were given.
+    any_long: bool,
 }
 
-/// -1 where the shortest path from one key to the other turns the second one's sign.
-#[inline]
-pub(crate) fn flip(from: [f32; 4], to: [f32; 4]) -> f32 {
-    let inner = inner(from, to);
-    let turns = if inner.abs() <= IN_DOUBT {
+impl SignBits {
+    /// Adds a track, the first of whose keys has that place among all keys of the set.
+    pub(crate) fn push_track(&mut self, first: usize, keys: &[[f32; 4]]) {
+        if !any_is_long(keys) {
+            return;
+        }
+        self.any_long = true;
+        let mut is_turned = false;
+        for (key, pair) in (first + 1..).zip(keys.windows(2)) {
+            is_turned ^= turns(pair[0], pair[1]);
+            if is_turned {
+                let words = self.bits.len().max(key / BITS + 1);
+                self.bits.resize(words, 0);
+                self.bits[key / BITS] |= 1 << (key % BITS);
+            }
+        }
+    }
+
+    /// Whether every two neighbouring keys are less than half a turn apart as they were given:
+    /// then the shortest path and the path as authored are the same.
+    pub(crate) fn arcs_are_short(&self) -> bool {
+        !self.any_long
+    }
+
+    /// The signs of some keys that follow one another.
+    #[inline]
+    pub(crate) fn of(&self, keys: Range<usize>) -> Signs<'_> {
+        Signs {
+            bits: &self.bits,
+            first: keys.start,
+            count: keys.len(),
+        }
+    }
+}
+
+/// The signs of some keys that follow one another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Signs<'a> {
+    bits: &'a [u64],
+    first: usize,
+    count: usize,
+}
+
+impl Signs<'_> {
+    /// Every key with the sign that it was given.
+    pub(crate) const AS_GIVEN: Self = Self {
+        bits: &[],
+        first: 0,
+        count: usize::MAX,
+    };
+
+    /// Those of some of the keys.
+    #[inline]
+    pub(crate) fn between(self, keys: Range<usize>) -> Self {
+        Self {
+            first: self.first.saturating_add(keys.start),
+            count: keys.len(),
+            ..self
+        }
+    }
+
+    /// Whether the `i`th key counts with the other sign than it was given.
+    #[inline]
+    pub(crate) fn is_turned(self, i: usize) -> bool {
+        let key = self.first + i;
+        (self.bits.get(key / BITS)).is_some_and(|word| word >> (key % BITS) & 1 == 1)
+    }
+
+    /// -1 where it does, else 1.
+    #[inline]
+    pub(crate) fn sign(self, i: usize) -> f32 {
+        if self.is_turned(i) { -1.0 } else { 1.0 }
+    }
+
+    /// Whether any key is turned.
+    #[inline]
+    pub(crate) fn any(self) -> bool {
+        !self.bits.is_empty() && self.bits_of(|word, mask| word & mask != 0).any(|any| any)
+    }
+
+    /// The sign that all keys share, where they do.
+    pub(crate) fn shared(self) -> Option<f32> {
+        if !self.any() {
+            return Some(1.0);
+        }
+        let end = self.first.saturating_add(self.count);
+        let all = end <= self.bits.len() * BITS
+            && self
+                .bits_of(|word, mask| word & mask == mask)
+                .all(|all| all);
+        all.then_some(-1.0)
+    }
+
+    /// Each word of bits that are kept of the keys, with the mask of those that are theirs.
+    #[inline]
+    fn bits_of<R>(self, look: impl Fn(u64, u64) -> R) -> impl Iterator<Item = R> {
+        let end = (self.first.saturating_add(self.count)).min(self.bits.len() * BITS);
+        let start = self.first.min(end);
+        let words = start / BITS..end.div_ceil(BITS);
+        words.map(move |place| {
+            let from = start.saturating_sub(place * BITS);
+            let to = (end - place * BITS).min(BITS);
+            let mask = (u64::MAX << from) & (u64::MAX >> (BITS - to));
+            look(self.bits[place], mask)
+        })
+    }
+
+    /// Copies the keys, each with the sign that it counts with.
+    #[inline]
+    pub(crate) fn copy(self, keys: &[[f32; 4]], to: &mut [[f32; 4]]) {
+        if !self.any() {
+            to.copy_from_slice(keys);
+            return;
+        }
+        for (i, (to, key)) in to.iter_mut().zip(keys).enumerate() {
+            let sign = self.sign(i);
+            *to = key.map(|component| component * sign);
+        }
+    }
+}
+
+/// Whether the second key turns its sign to be the nearer one to the first.
+fn turns(from: [f32; 4], to: [f32; 4]) -> bool {
+    let inner = dot(from, to);
+    if inner.abs() <= IN_DOUBT {
         dot(unit(from), unit(to)) < -DOT_NOISE
     } else {
         inner < 0.0
-    };
-    if turns { -1.0 } else { 1.0 }
-}
-
-/// Whether the second key's sign is turned, or in doubt.
-#[inline(always)]
-pub(crate) fn may_turn(from: [f32; 4], to: [f32; 4]) -> bool {
-    inner(from, to) <= IN_DOUBT
-}
-
-/// Whether the sign of any key after the first of some is turned, or in doubt.
-#[inline(always)]
-pub(crate) fn any_turns_in_lanes<L: Lanes>(keys: &[[f32; 4]]) -> bool {
-    let mut first = 0;
-    while first + L::COUNT < keys.len() {
-        if L::inner(&keys[first..], &keys[first + 1..]).any_at_most(IN_DOUBT) {
-            return true;
-        }
-        first += L::COUNT;
     }
-    let rest = keys[first..].windows(2);
-    rest.into_iter().any(|pair| may_turn(pair[0], pair[1]))
 }
 
-/// Whether the sign of any key after the first of some is turned, or in doubt.
-#[inline]
-pub(crate) fn any_turns(keys: &[[f32; 4]]) -> bool {
+/// Whether any two neighbouring keys are half a turn apart or more, or f32 cannot tell.
+fn any_is_long(keys: &[[f32; 4]]) -> bool {
     if keys.len() <= FEW {
-        return (keys.windows(2)).any(|pair| may_turn(pair[0], pair[1]));
+        return keys.windows(2).any(is_long);
     }
-    let mut turns = Turns { keys, any: false };
-    in_lanes(&mut turns);
-    turns.any
+    let mut look = Look { keys, found: false };
+    in_lanes(&mut look);
+    look.found
 }
 
-struct Turns<'a> {
+#[inline(always)]
+fn is_long(pair: &[[f32; 4]]) -> bool {
+    dot(pair[0], pair[1]) <= IN_DOUBT
+}
+
+struct Look<'a> {
     keys: &'a [[f32; 4]],
-    any: bool,
+    found: bool,
 }
 
-impl InLanes for Turns<'_> {
+impl InLanes for Look<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        self.any = any_turns_in_lanes::<L>(self.keys);
+        let mut first = 0;
+        while first + L::COUNT < self.keys.len() {
+            let inner = L::inner(&self.keys[first..], &self.keys[first + 1..]);
+            if inner.any_at_most(IN_DOUBT) {
+                self.found = true;
+                return;
+            }
+            first += L::COUNT;
+        }
+        self.found = self.keys[first..].windows(2).any(is_long);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    fn continued(keys: &[[f32; 4]]) -> Vec<f32> {
+        let mut bits = SignBits::default();
+        bits.push_track(100, keys);
+        let signs = bits.of(100..100 + keys.len());
+        let each: Vec<f32> = (0..keys.len()).map(|i| signs.sign(i)).collect();
+        let turned = |sign: &f32| *sign < 0.0;
+        assert_eq!(signs.any(), each.iter().any(turned));
+        let shared = match () {
+            () if !each.iter().any(turned) => Some(1.0),
+            () if each.iter().all(turned) => Some(-1.0),
+            () => None,
+        };
+        assert_eq!(signs.shared(), shared);
+        for from in 0..keys.len() {
+            for to in from..=keys.len() {
+                let own = signs.between(from..to);
+                assert_eq!(own.any(), each[from..to].iter().any(turned), "{from}..{to}");
+                if from < to && each[from..to].iter().all(turned) {
+                    assert_eq!(own.shared(), Some(-1.0), "{from}..{to}");
+                }
+            }
+        }
+        each
+    }
+
+    #[test]
+    fn a_key_turns_where_the_other_sign_is_nearer() {
+        let turn = |degrees: f32, sign: f32| {
+            (Quat::from_rotation_x(degrees.to_radians()) * sign).to_array()
+        };
+        let keys = [
+            turn(0.0, 1.0),
+            turn(90.0, -1.0),
+            turn(150.0, -1.0),
+            turn(200.0, 1.0),
+            turn(250.0, -1.0),
+        ];
+        assert_eq!(continued(&keys), [1.0, -1.0, -1.0, 1.0, -1.0]);
+        // Half a turn apart: the sign given counts.
+        let half = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+        assert_eq!(continued(&half), [1.0, 1.0]);
+        assert_eq!(continued(&[half[0], half[1].map(|c| -c)]), [1.0, 1.0]);
+        assert_eq!(continued(&keys[..1]), [1.0]);
+    }
+
+    #[test]
+    fn bits_are_those_of_their_keys_across_words() {
+        let key = Quat::IDENTITY.to_array();
+        let keys: Vec<[f32; 4]> = (0..200)
+            .map(|i| key.map(|c| if i % 7 < 3 || i > 150 { -c } else { c }))
+            .collect();
+        let each = continued(&keys);
+        let first = keys[0][3];
+        for (i, sign) in each.iter().enumerate() {
+            assert_eq!(keys[i][3] * sign, first, "{i}");
+        }
+        let mut copied = vec![[9.0; 4]; 200];
+        let mut bits = SignBits::default();
+        bits.push_track(0, &keys);
+        bits.of(0..200).copy(&keys, &mut copied);
+        assert!(copied.iter().all(|own| own[3] == first));
+        assert!(!Signs::AS_GIVEN.between(3..90).any());
     }
 }

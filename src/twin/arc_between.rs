@@ -1,6 +1,5 @@
 //! Twin of `shaders/arc_between.wgsl`: the same names, the same order.
 
-use crate::shader::ArcSegment;
 use crate::shader::{
     ARC_SINE_1, ARC_SINE_2, ARC_SINE_3, ARC_SINE_4, ARC_SINE_5, ARC_SINE_6, ARC_SINE_7, ARC_SINE_8,
     SECANT_1, SECANT_2, SECANT_3, SECANT_4, SECANT_5, SECANT_6, SECANT_7, SECANT_8, SECANT_9,
@@ -8,15 +7,10 @@ use crate::shader::{
 use crate::simd::lanes::{Number, canonical};
 use crate::twin::evaluate_arc::square;
 
-/// The arc_between between two unit quaternions, at most pi/2 apart in R⁴.
-pub(crate) fn arc_between(start: [f32; 4], end: [f32; 4]) -> ArcSegment {
-    let (middle, tangent) = middle_and_tangent(start, end);
-    ArcSegment { middle, tangent }
-}
-
-/// The same in numbers of any kind.
+/// The middle and the tangent there of the arc between two unit quaternions that are at most
+/// pi/2 apart in R⁴.
 #[inline(always)]
-pub(crate) fn middle_and_tangent<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 4], [N; 4]) {
+pub(crate) fn arc_between<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 4], [N; 4]) {
     let [ax, ay, az, aw] = start;
     let [bx, by, bz, bw] = end;
     let one_half = N::all(0.5);
@@ -67,7 +61,7 @@ mod tests {
             let angle = f64::from(step) / 10_000.0 * FRAC_PI_2;
             let (sine, cosine) = angle.sin_cos();
             let end = [sine as f32, 0.0, 0.0, cosine as f32];
-            let ArcSegment { middle, tangent } = arc_between([0.0, 0.0, 0.0, 1.0], end);
+            let (middle, tangent) = arc_between([0.0, 0.0, 0.0, 1.0], end);
             let (sine, cosine) = (angle * 0.5).sin_cos();
             let expected = [sine, cosine, cosine * angle, -sine * angle];
             let found = [middle[0], middle[3], tangent[0], tangent[3]];

@@ -109,12 +109,6 @@ fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
     ]
 }
 
-/// A key in the sign that those before it give.
-#[inline(always)]
-pub(crate) fn signed([x, y, z, w]: Quaternion, sign: f32) -> Quaternion {
-    [x * sign, y * sign, z * sign, w * sign]
-}
-
 /// Between `start` and `end`, four keys each in the sign nearer to its predecessor's.
 #[inline(always)]
 pub(crate) fn small_angle_cubic(

@@ -103,11 +103,6 @@ impl Curve {
     pub(crate) fn moving(&self, parameter: Jet) -> [Jet; 4] {
         (self.shape.moving)(&self.numbers, parameter)
     }
-
-    /// The same rotations with the other sign.
-    pub(crate) fn negate(&mut self) {
-        self.numbers = self.shape.negated(&self.numbers);
-    }
 }
 
 impl std::fmt::Debug for Curve {

@@ -2,8 +2,7 @@
 
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{Real as _, product, scaled, square};
+use crate::math::quaternion::{self, Real as _, product, scaled, square};
 use crate::math::ranges::{LONG_SQUARE, SHORT_SQUARE, long_waves, short_waves};
 use crate::prepare::both_sides::Sides;
 use crate::prepare::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
@@ -161,7 +160,7 @@ impl Turns {
             let vector = self.vectors.map(|lanes| lanes[lane]);
             let squared = square(vector);
             if squared > limit || squared.is_nan() {
-                let turn = branchless::exp(vector);
+                let turn = quaternion::exp(vector);
                 for (lanes, component) in self.turns.iter_mut().zip(turn) {
                     lanes[lane] = component;
                 }

@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 
-use crate::curve::segment::Segments;
 use crate::method::interpolation::Quantity;
 use crate::prepare::constant_velocity::SteadyBlock;
 use crate::prepare::double::curve::Curve;
@@ -134,7 +133,7 @@ impl Fitting {
         block.push(keys, segment as u32);
         if block.is_full() {
             in_lanes(&mut **block);
-            block.write(polynomials(prepared));
+            block.write(&mut prepared.segments.polynomials);
         }
         source
     }
@@ -155,9 +154,9 @@ impl Fitting {
         }
         if let Some(block) = &mut self.steady {
             in_lanes(&mut **block);
-            block.write(polynomials(prepared));
+            block.write(&mut prepared.segments.polynomials);
         }
-        self.cutter.cut(polynomials(prepared));
+        self.cutter.cut(&mut prepared.segments.polynomials);
         prepared.put_parts(&self.cutter, &mut self.uncut);
         self.cutter.clear();
     }
@@ -171,9 +170,7 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
         Source::Segment(place) => Some(place as usize),
         _ => None,
     });
-    let Segments::Polynomial(segments) = &mut prepared.segments else {
-        unreachable!("the method's form")
-    };
+    let segments = &mut prepared.segments.polynomials;
     block.run(segments, places);
     if !block.is_trusted() {
         for (lane, &span) in own.iter().enumerate() {
@@ -196,7 +193,7 @@ const UNTRIED: Source = Source::Segment(NONE);
 
 /// A segment, which is zero; and its place.
 pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
-    let segments = polynomials(prepared);
+    let segments = &mut prepared.segments.polynomials;
     let place = segments.len();
     segments.push(PolynomialSegment::zeroed());
     (Source::Segment(place as u32), place)
@@ -207,7 +204,7 @@ impl Prepared {
     /// span; the first of these spans.
     #[inline]
     pub(crate) fn new_segments(&mut self, count: usize) -> usize {
-        let segments = polynomials(self);
+        let segments = &mut self.segments.polynomials;
         let places = segments.len()..segments.len() + count;
         segments.extend_from_slice(&ZERO[..count]);
         let sources = &mut self.spans.sources;
@@ -282,12 +279,5 @@ impl Prepared {
             self.push_span(start, source, key);
         }
         others
-    }
-}
-
-pub(crate) fn polynomials(prepared: &mut Prepared) -> &mut Vec<PolynomialSegment> {
-    match &mut prepared.segments {
-        Segments::Polynomial(segments) => segments,
-        Segments::Arc(_) => unreachable!("the method's form"),
     }
 }

@@ -4,12 +4,11 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::curve::formula::product::Product;
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{Quaternion, Real, Vector, normalised, product, scaled, sum};
+use crate::math::quaternion::{self, Quaternion, Real, Vector, normalised, product, scaled, sum};
 use crate::math::ranges::{Algebra, Anywhere, Near};
 use crate::prepare::double::fit::MOST;
 use crate::prepare::double::intervals::{
-    Intervals, LANES, Lane, ROOM, Stretch, aligned, at, energy, load, load3, load4, put, store,
+    Intervals, LANES, Lane, ROOM, Stretch, at, energy, load, load3, load4, put, store,
 };
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
@@ -22,21 +21,16 @@ impl InLanes for Steps<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.0;
-        let noise = L::Doubles::all(own.noise);
-        let (one, minus_one) = (L::Doubles::all(1.0), L::Doubles::all(-1.0));
         for lane in (0..own.whole()).step_by(L::COUNT) {
             let (from, to) = (units::<L>(&own.from, lane), units::<L>(&own.to, lane));
-            let [x, y, z, w] = branchless::step(from, to);
-            let flip = noise.up_to(w, one, minus_one);
-            let step = [x * flip, y * flip, z * flip, w * flip];
+            let step = quaternion::step(from, to);
             let mut near = Near::new();
             let log = near.log(step);
-            w.store(&mut own.dots[lane..]);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
             if near.is_in_doubt() {
                 for j in near.lanes(lane, own.count) {
-                    put(&mut own.logs, j, branchless::log(at(&own.steps, j)));
+                    put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
                 }
             }
         }
@@ -64,14 +58,6 @@ impl<D: Doubles> Near<D> {
 fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
     let [x, y, z, w] = L::load_rotations(&keys[lane..]);
     normalised([x.widened(), y.widened(), z.widened(), w.widened()])
-}
-
-/// As [`aligned`], of the lanes from `lane` on.
-#[inline(always)]
-fn keys<L: Lanes>(keys: &[[f32; 4]; ROOM], signs: &Lane, lane: usize) -> [L::Doubles; 4] {
-    let [x, y, z, w] = units::<L>(keys, lane);
-    let sign = load::<L>(signs, lane);
-    [x * sign, y * sign, z * sign, w * sign]
 }
 
 /// Whether intervals hold a frame.
@@ -229,7 +215,7 @@ impl InLanes for BetweenHandles<'_> {
             let mut near = Near::new();
             let middle = between(&mut near, first, step, last);
             let (bases, vectors) = product_numbers(&mut own.numbers);
-            store(bases, lane, keys::<L>(&own.from, &own.signs, lane));
+            store(bases, lane, units::<L>(&own.from, lane));
             store_vectors(vectors, lane, [first, middle, last]);
             energy([first, middle, last]).store(&mut own.energies[lane..]);
             if near.is_in_doubt() {
@@ -285,7 +271,7 @@ fn between<A: Algebra>(
 }
 
 /// Control rotations from keys and handles: `q0`, `a = q0 exp(out)`, `b = q1 exp(-in)`,
-/// `q1`, in the signs that the steps between them give.
+/// `q1`.
 pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for ControlRotations<'_> {
@@ -294,7 +280,6 @@ impl InLanes for ControlRotations<'_> {
         let whole = self.0.whole();
         let Intervals {
             from,
-            signs,
             steps,
             logs,
             incoming,
@@ -303,7 +288,7 @@ impl InLanes for ControlRotations<'_> {
             energies,
             ..
         } = &mut *self.0;
-        let key = |j: usize| aligned(from[j], signs[j]);
+        let key = |j: usize| quaternion::unit(from[j]);
         let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
         let log = |j: usize| at(logs, j);
         let controls = (&mut numbers[..16]).try_into().expect("four rotations");
@@ -324,8 +309,8 @@ fn control_lanes(
         let (first, step, last) = handles(j);
         let start = key(j);
         let end = product(start, step);
-        let a = product(start, branchless::exp(first));
-        let b = product(end, branchless::exp(scaled(last, -1.0)));
+        let a = product(start, quaternion::exp(first));
+        let b = product(end, quaternion::exp(scaled(last, -1.0)));
         for (place, control) in [start, a, b, end].into_iter().enumerate() {
             for c in 0..4 {
                 controls[4 * place + c][j] = control[c];
@@ -349,14 +334,14 @@ impl InLanes for BetweenNeighbours<'_> {
             let after = load3::<L, ROOM>(&own.logs, lane + 2);
             let mut near = Near::new();
             let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
-            let base = product(keys::<L>(&own.from, &own.signs, lane + 1), back);
+            let base = product(units::<L>(&own.from, lane + 1), back);
             let (bases, vectors) = product_numbers(&mut own.numbers);
             store(bases, lane + 1, base);
             store_vectors(vectors, lane + 1, [before, log, after]);
             energy([before, log, after]).store(&mut own.energies[lane + 1..]);
             if near.is_in_doubt() {
                 for j in near.lanes(lane + 1, own.count) {
-                    let back = branchless::exp(scaled(own.log(j - 1), -1.0));
+                    let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
                     let base = product(own.key(j), back);
                     own.set_numbers(j, 0, &base);
                 }

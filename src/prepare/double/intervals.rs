@@ -8,14 +8,14 @@
 
 use std::ops::Range;
 
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{Arithmetic, Quaternion, Vector, square};
+use crate::math::quaternion::{self, Arithmetic, Quaternion, Vector, square};
 use crate::method::interpolation::Quantity;
 use crate::prepare::NONE;
 use crate::prepare::double::curve::{Curve, Piece};
 use crate::prepare::double::shape::Shape;
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::tracks::set::Track;
+use crate::tracks::signs::Signs;
 
 /// Lanes worked out together.
 pub(crate) const LANES: usize = 128;
@@ -33,19 +33,17 @@ pub(crate) struct Stretch {
     pub(crate) lane: usize,
     /// Which intervals of the track.
     pub(crate) intervals: Range<usize>,
-    /// Whether the first of them is the first that was added: its key counts as stored.
-    pub(crate) begins: bool,
     /// Intervals of the whole track.
     pub(crate) all: usize,
     /// When the whole track starts and ends, seconds.
     pub(crate) span: (f64, f64),
-    /// The track's place in the set.
-    pub(crate) track: usize,
     /// Its place in the prepared parts.
     pub(crate) part: usize,
     /// The constant of its first key; [`NONE`] where the curve does not
     /// meet its keys.
     pub(crate) key: u32,
+    /// The same where curves stand still at their ends, whether they meet their keys or not.
+    pub(crate) still: u32,
 }
 
 impl Stretch {
@@ -75,7 +73,7 @@ impl Stretch {
 
 /// A block of intervals.
 pub(crate) struct Intervals {
-    /// Keys at both ends, as stored.
+    /// Keys at both ends, in the signs that they count with.
     pub(crate) from: [[f32; 4]; ROOM],
     pub(crate) to: [[f32; 4]; ROOM],
     /// Where it starts and ends, and how long it is; seconds.
@@ -83,11 +81,7 @@ pub(crate) struct Intervals {
     pub(crate) ends: Lane,
     pub(crate) durations: Lane,
     pub(crate) count: usize,
-    /// Dot products below this turn the second key's sign.
-    pub(crate) noise: f64,
-    /// Inner products of the two keys as stored.
-    pub(crate) dots: Lane,
-    /// `q_i⁻¹ q_{i+1}`, their signs aligned.
+    /// `q_i⁻¹ q_{i+1}`.
     pub(crate) steps: [Lane; 4],
     /// Its logarithm.
     pub(crate) logs: [Lane; 3],
@@ -95,8 +89,6 @@ pub(crate) struct Intervals {
     /// it and towards this one.
     pub(crate) incoming: [Lane; 3],
     pub(crate) outgoing: [Lane; 3],
-    /// The sign of the interval's first key after those before it in its track.
-    pub(crate) signs: Lane,
     /// Numbers that the method has for the interval: of the key that it starts with, and
     /// one lane further of the key that it ends with.
     pub(crate) outward: [Lane; 4],
@@ -109,7 +101,7 @@ pub(crate) struct Intervals {
 
 impl Intervals {
     /// For curves that take so many numbers of their own.
-    pub(crate) fn new(noise: f64, numbers: usize) -> Self {
+    pub(crate) fn new(numbers: usize) -> Self {
         let lane = [0.0; ROOM];
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
@@ -119,13 +111,10 @@ impl Intervals {
             ends: lane,
             durations: [1.0; ROOM],
             count: 0,
-            noise,
-            dots: lane,
             steps: [lane; 4],
             logs: [lane; 3],
             incoming: [lane; 3],
             outgoing: [lane; 3],
-            signs: [1.0; ROOM],
             outward: [lane; 4],
             inward: [lane; 4],
             numbers: vec![lane; numbers],
@@ -133,13 +122,16 @@ impl Intervals {
         }
     }
 
-    /// Adds some intervals of a track; the block has room for them.
-    pub(crate) fn push(&mut self, track: Track, intervals: Range<usize>) {
+    /// Adds some intervals of a track, whose keys count with these signs; the block has room for
+    /// them.
+    pub(crate) fn push(&mut self, track: Track, signs: Signs<'_>, intervals: Range<usize>) {
         let lanes = self.count..self.count + intervals.len();
         let Range { start, end } = intervals;
         let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
-        self.from[lanes.clone()].copy_from_slice(&keys[start..end]);
-        self.to[lanes.clone()].copy_from_slice(&keys[start + 1..=end]);
+        let (from, to) = (start..end, start + 1..end + 1);
+        let own = [&from, &to].map(|keys| signs.between(keys.clone()));
+        own[0].copy(&keys[from], &mut self.from[lanes.clone()]);
+        own[1].copy(&keys[to], &mut self.to[lanes.clone()]);
         let (starts, ends) = (&track.times[start..end], &track.times[start + 1..=end]);
         self.starts[lanes.clone()].copy_from_slice(starts);
         self.ends[lanes.clone()].copy_from_slice(ends);
@@ -150,15 +142,20 @@ impl Intervals {
         self.count = lanes.end;
     }
 
-    /// Adds some lanes of other intervals, as they were pushed, with their signs; there is
-    /// room for them.
+    /// Adds some lanes of other intervals, as they were pushed; there is room for them.
     pub(crate) fn push_from(&mut self, other: &Self, lanes: Range<usize>) {
         let own = self.count..self.count + lanes.len();
         self.from[own.clone()].copy_from_slice(&other.from[lanes.clone()]);
         self.to[own.clone()].copy_from_slice(&other.to[lanes.clone()]);
-        self.durations[own.clone()].copy_from_slice(&other.durations[lanes.clone()]);
-        self.signs[own.clone()].copy_from_slice(&other.signs[lanes]);
+        self.durations[own.clone()].copy_from_slice(&other.durations[lanes]);
         self.count = own.end;
+    }
+
+    /// Gives a lane's keys the other sign where `sign` is -1.
+    pub(crate) fn turn(&mut self, lane: usize, sign: f32) {
+        for key in [&mut self.from[lane], &mut self.to[lane]] {
+            *key = key.map(|component| component * sign);
+        }
     }
 
     /// Sets the method's own numbers of the keys that an interval starts and ends with.
@@ -187,7 +184,7 @@ impl Intervals {
 
     /// How fast the parameter runs, per second.
     pub(crate) fn rate(&self, lane: usize) -> f64 {
-        branchless::ratio(1.0, self.durations[lane])
+        quaternion::ratio(1.0, self.durations[lane])
     }
 
     pub(crate) fn log(&self, lane: usize) -> Vector {
@@ -228,15 +225,15 @@ impl Intervals {
         at(&self.inward, lane)
     }
 
-    /// The key that the interval starts with, in the sign that the keys before it give.
+    /// The key that the interval starts with.
     #[inline(always)]
     pub(crate) fn key(&self, lane: usize) -> Quaternion {
-        aligned(self.from[lane], self.signs[lane])
+        quaternion::unit(self.from[lane])
     }
 
-    /// The key that the interval ends with, in the sign that the step gives.
+    /// The key that the interval ends with, by the step to it.
     pub(crate) fn end_key(&self, lane: usize) -> Quaternion {
-        branchless::product(self.key(lane), self.step(lane))
+        quaternion::product(self.key(lane), self.step(lane))
     }
 
     /// Gives the interval numbers of its curve, from a place on.
@@ -263,7 +260,7 @@ impl Intervals {
         }
     }
 
-    /// The keys at both ends of an interval, as stored.
+    /// The keys at both ends of an interval.
     pub(crate) fn keys(&self, lane: usize) -> [[f32; 4]; 2] {
         [self.from[lane], self.to[lane]]
     }
@@ -280,13 +277,6 @@ impl Intervals {
     pub(crate) fn whole32(&self) -> usize {
         self.count.next_multiple_of(16).min(LANES)
     }
-}
-
-/// A key in that sign.
-#[inline(always)]
-pub(crate) fn aligned(key: [f32; 4], sign: f64) -> Quaternion {
-    let [x, y, z, w] = branchless::unit(key);
-    [x * sign, y * sign, z * sign, w * sign]
 }
 
 #[inline(always)]

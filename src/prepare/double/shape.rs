@@ -25,8 +25,6 @@ pub(crate) struct Shape {
     pub(crate) own: usize,
     /// The others, the same for all.
     pub(crate) shared: Numbers,
-    /// Quaternions that change sign with the rotation: how many, from the first number on.
-    signed: usize,
     /// Whether it is made of exponentials alone, whose Chebyshev coefficients fall ever
     /// faster: a gentle curve's fit then needs no check.
     pub(crate) entire: bool,
@@ -39,11 +37,10 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    const fn of<F: Formula>(own: usize, signed: usize) -> Self {
+    const fn of<F: Formula>(own: usize) -> Self {
         Self {
             own,
             shared: [0.0; NUMBERS],
-            signed,
             entire: false,
             is_unit: true,
             rotation: F::rotation::<f64>,
@@ -60,15 +57,6 @@ impl Shape {
         }
         numbers
     }
-
-    /// The numbers of the same rotations with the other sign.
-    pub(crate) fn negated(&self, numbers: &Numbers) -> Numbers {
-        let mut negated = *numbers;
-        for number in &mut negated[..4 * self.signed] {
-            *number = -*number;
-        }
-        negated
-    }
 }
 
 impl Shape {
@@ -78,29 +66,29 @@ impl Shape {
         shared: Product::BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
-        ..Self::of::<Product>(NUMBERS, 1)
+        ..Self::of::<Product>(NUMBERS)
     };
     /// [`Product`] with a basis of each curve's own.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
         fit: fit::<Expansion<true>>,
-        ..Self::of::<Product>(NUMBERS, 1)
+        ..Self::of::<Product>(NUMBERS)
     };
     /// [`DeCasteljau`].
-    pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16, 4);
+    pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
     /// [`Squad`].
-    pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16, 4);
+    pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16);
     /// [`Linear`].
-    pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16, 4);
+    pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16);
     /// [`Hermite`].
-    pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16, 4);
+    pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16);
     /// [`Line`].
     pub(crate) const LINE: &'static Self = &Self {
         is_unit: false,
-        ..Self::of::<Line>(8, 2)
+        ..Self::of::<Line>(8)
     };
     /// [`RotationVector`].
-    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13, 1);
+    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
 }
 
 /// A way to sample the curves of a block.

@@ -18,7 +18,8 @@ use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frame_rate::FrameRate;
 use crate::time::wrap::Outside;
-use crate::tracks::set::Track;
+use crate::tracks::set::{Track, TrackSet};
+use crate::tracks::signs::Signs;
 
 /// What moves neither nor turns faster.
 const STILL: [f32; 4] = [0.0; 4];
@@ -41,8 +42,6 @@ pub(crate) struct SmoothPreparation {
     direct: Option<Box<Direct>>,
     /// Curves that are to be run through at constant speed.
     waiting: Waiting,
-    /// What the signs of the keys so far make of the next.
-    sign: f64,
     /// Where only intervals with a frame are wanted: the frames' rate and start.
     frames: Option<(FrameRate, f64)>,
 }
@@ -54,17 +53,16 @@ impl SmoothPreparation {
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
         let direct = smooth.direct.filter(|_| suits);
         Self {
-            direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends, path))),
+            direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends))),
             interpolation: Interpolation {
                 path,
                 ..*interpolation
             },
             smooth,
-            intervals: Intervals::new(path.flips_below(), smooth.shape.own),
+            intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
             waiting: Waiting::default(),
-            sign: 1.0,
             frames: None,
         }
     }
@@ -78,18 +76,27 @@ impl Prepare for SmoothPreparation {
     fn add(
         &mut self,
         prepared: &mut Prepared,
-        track: Track,
+        set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
+        let track = set.track(index);
         self.interpolation.ends.check(track.keys, index)?;
+        // A method that takes its own path has its own way between opposite keys.
+        if self.interpolation.method.path.is_none() {
+            self.interpolation
+                .path
+                .check(track.keys, intervals.clone(), index)?;
+        }
+        let signs = self.interpolation.path.signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
         // A curve that does not pass through its keys has end values of its own.
         let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
         let last_key = first_key + intervals.len() as u32;
-        if of_rotations && meets_keys {
+        // What stands still stands at its keys.
+        if of_rotations && (meets_keys || self.is_frozen()) {
             let keys = &track.keys[intervals.start..=intervals.end];
             prepared
                 .constants
@@ -121,67 +128,78 @@ impl Prepare for SmoothPreparation {
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
         let velocities = match self.smooth.given {
-            Given::Velocities(solve) => solve(track, intervals.clone(), &self.interpolation),
+            Given::Velocities(solve) => solve(track, signs, intervals.clone(), &self.interpolation),
             _ => Vec::new(),
         };
         let mut from = intervals.start;
         while from < intervals.end {
             let left = intervals.end - from;
             if self.intervals.count + context + left.min(SHORTEST) > LANES {
-                self.flush(prepared)?;
+                self.flush(prepared);
             }
             let to = from + left.min(LANES - context - self.intervals.count);
+            // Across the seam of a loop keys count as seen from the last one.
+            let beyond = signs.sign(all);
             if context > 0 {
-                self.neighbour(track, from.checked_sub(1).or(looped.then_some(all - 1)));
+                match from.checked_sub(1) {
+                    Some(before) => self.push(track, signs, before..before + 1, None),
+                    None if looped => self.push_beyond(track, signs, all - 1, beyond),
+                    None => self.intervals.push_nothing(),
+                }
             }
+            let own_key = first_key + (from - intervals.start) as u32;
             self.stretches.push(Stretch {
                 lane: self.intervals.count,
                 intervals: from..to,
-                begins: from == intervals.start,
                 all,
                 span: (track.times[0], track.times[all]),
-                track: index,
                 part,
-                key: if meets_keys {
-                    first_key + (from - intervals.start) as u32
-                } else {
-                    NONE
-                },
+                key: if meets_keys { own_key } else { NONE },
+                still: if self.is_frozen() { own_key } else { NONE },
             });
-            self.push(track, from..to, velocities.get(from - intervals.start..));
+            let own = velocities.get(from - intervals.start..);
+            self.push(track, signs, from..to, own);
             if context > 0 {
-                self.neighbour(track, (to < all).then_some(to).or(looped.then_some(0)));
+                match to < all {
+                    true => self.push(track, signs, to..to + 1, None),
+                    false if looped => self.push_beyond(track, signs, 0, beyond),
+                    false => self.intervals.push_nothing(),
+                }
             }
             from = to;
         }
         Ok(())
     }
 
-    fn finish(&mut self, prepared: &mut Prepared) -> Result<f32, InterpolationError> {
-        self.flush(prepared)?;
+    fn finish(&mut self, prepared: &mut Prepared) {
+        self.flush(prepared);
         if let Some(direct) = &mut self.direct {
             direct.finish(prepared, &mut self.fitting);
         }
         self.waiting.finish(prepared, &mut self.fitting);
         self.fitting.finish(prepared);
-        Ok(std::mem::replace(&mut self.sign, 1.0) as f32)
     }
 }
 
 impl SmoothPreparation {
-    /// Adds a lane of context.
-    fn neighbour(&mut self, track: Track, interval: Option<usize>) {
-        match interval {
-            Some(i) => self.push(track, i..i + 1, None),
-            None => self.intervals.push_nothing(),
-        }
+    /// Adds an interval on the other side of a loop's seam, as context.
+    fn push_beyond(&mut self, track: Track, signs: Signs<'_>, interval: usize, sign: f32) {
+        let lane = self.intervals.count;
+        self.push(track, signs, interval..interval + 1, None);
+        self.intervals.turn(lane, sign);
     }
 
     /// Adds some intervals of a track; `velocities` start with that of the first one's
     /// first key.
-    fn push(&mut self, track: Track, intervals: Range<usize>, velocities: Option<&[Vector]>) {
+    fn push(
+        &mut self,
+        track: Track,
+        signs: Signs<'_>,
+        intervals: Range<usize>,
+        velocities: Option<&[Vector]>,
+    ) {
         let first = self.intervals.count;
-        self.intervals.push(track, intervals.clone());
+        self.intervals.push(track, signs, intervals.clone());
         for (i, interval) in intervals.enumerate() {
             let velocities = velocities.and_then(|all| all.get(i..));
             let Some([outward, inward]) = self.given(track, interval, velocities) else {
@@ -209,8 +227,8 @@ impl SmoothPreparation {
     }
 
     /// Makes the intervals that wait into curves, and has them fitted.
-    fn flush(&mut self, prepared: &mut Prepared) -> Result<(), InterpolationError> {
-        let is_exact = self.curves()?;
+    fn flush(&mut self, prepared: &mut Prepared) {
+        let is_exact = self.curves();
         let stretches = std::mem::take(&mut self.stretches);
         for stretch in &stretches {
             self.end_values(prepared, stretch);
@@ -240,7 +258,6 @@ impl SmoothPreparation {
         self.intervals.clear();
         self.stretches = stretches;
         self.stretches.clear();
-        Ok(())
     }
 
     /// Lets a stretch wait until all of its track is there.
@@ -283,13 +300,10 @@ impl SmoothPreparation {
             } else if !self.holds(stretch, lane) {
                 self.take(prepared, stretch, lane..lane + 1);
                 continue;
-            } else if stretch.key != NONE {
-                Source::Constant(stretch.key_at(i))
+            } else if self.interpolation.quantity == Quantity::Rotation {
+                Source::Constant(stretch.still + i as u32)
             } else {
-                Source::Constant(prepared.constant(match self.interpolation.quantity {
-                    Quantity::Rotation => self.intervals.keys(lane)[0],
-                    _ => STILL,
-                }))
+                Source::Constant(prepared.constant(STILL))
             };
             let key = match source {
                 Source::Constant(_) => NONE,
@@ -315,60 +329,19 @@ impl SmoothPreparation {
     }
 
     /// Makes the intervals that wait into curves; whether in f64.
-    fn curves(&mut self) -> Result<bool, InterpolationError> {
-        let is_sure = match &mut self.direct {
-            Some(direct) => direct.find_steps(&self.intervals),
-            None => false,
-        };
-        if !is_sure {
-            in_lanes(&mut Steps(&mut self.intervals));
-        }
-        self.align(!is_sure)?;
+    fn curves(&mut self) -> bool {
         if let Some(direct) = &mut self.direct {
             direct.find_curves(&self.intervals, &self.stretches);
             let sides = [self.interpolation.before, self.interpolation.after];
             let is_wanted = sides.into_iter().any(|side| self.goes_on(side)) || self.is_frozen();
             if !is_wanted {
-                return Ok(false);
+                return false;
             }
         }
-        if is_sure {
-            in_lanes(&mut Steps(&mut self.intervals));
-        }
-        (self.smooth.curves)(
-            &mut self.intervals,
-            &self.stretches,
-            self.interpolation.ends,
-        );
-        Ok(true)
-    }
-
-    /// The signs of the intervals' first keys; by the steps between them, or where all are
-    /// short without.
-    fn align(&mut self, by_steps: bool) -> Result<(), InterpolationError> {
-        for stretch in &self.stretches {
-            if stretch.begins {
-                self.sign = 1.0;
-            }
-            if let (false, Some(direct)) = (by_steps, &self.direct) {
-                self.sign = direct.align(&mut self.intervals, stretch, self.sign);
-                continue;
-            }
-            for (lane, key) in stretch.lanes().zip(stretch.intervals.clone()) {
-                self.intervals.signs[lane] = self.sign;
-                let dot = self.intervals.dots[lane];
-                // A method that takes its own path has its own way between opposites.
-                let refuses = self.interpolation.method.path.is_none();
-                if refuses && self.interpolation.path.refuses(dot) {
-                    let track = stretch.track;
-                    return Err(InterpolationError::Antipodal { track, key });
-                }
-                if dot < self.intervals.noise {
-                    self.sign = -self.sign;
-                }
-            }
-        }
-        Ok(())
+        in_lanes(&mut Steps(&mut self.intervals));
+        let ends = self.interpolation.ends;
+        (self.smooth.curves)(&mut self.intervals, &self.stretches, ends);
+        true
     }
 
     /// Whether an interval stands still.
@@ -417,23 +390,28 @@ impl SmoothPreparation {
             return;
         }
         let quantity = self.interpolation.quantity;
-        let value = |lane: usize, end: usize| match (self.is_frozen(), quantity) {
-            (true, Quantity::Rotation) => self.intervals.keys(lane)[end],
-            (true, _) => STILL,
-            _ => {
-                let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
-                round_quat(curve.value(end as f64))
-            }
-        };
+        let value =
+            |constants: &[[f32; 4]], lane: usize, end: usize| match (self.is_frozen(), quantity) {
+                (true, Quantity::Rotation) => {
+                    let place = stretch.still as usize + (lane - stretch.lane) + end;
+                    constants[place]
+                }
+                (true, _) => STILL,
+                _ => {
+                    let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
+                    round_quat(curve.value(end as f64))
+                }
+            };
         let held = |value| match quantity {
             Quantity::Rotation => value,
             _ => STILL,
         };
         if let (Some(lane), false) = (stretch.first(), self.goes_on(self.interpolation.before)) {
-            prepared.parts[stretch.part].before = prepared.constant(held(value(lane, 0)));
+            let at_start = value(&prepared.constants, lane, 0);
+            prepared.parts[stretch.part].before = prepared.constant(held(at_start));
         }
         if let Some(lane) = stretch.last() {
-            let at_end = value(lane, 1);
+            let at_end = value(&prepared.constants, lane, 1);
             if !self.goes_on(self.interpolation.after) {
                 let after = prepared.constant(held(at_end));
                 prepared.parts[stretch.part].after = after;

@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
-use crate::method::interpolation::{Ends, Path};
+use crate::method::interpolation::Ends;
 use crate::method::{FromKeys, Smooth};
-use crate::prepare::double::fitting::{Fitting, polynomials};
+use crate::prepare::double::fitting::Fitting;
 use crate::prepare::double::handles::Steps;
 use crate::prepare::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::prepare::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
@@ -55,13 +55,12 @@ pub(crate) struct Direct {
     find_far: fn(&mut FarKeys),
     smooth: Smooth,
     ends: Ends,
-    path: Path,
 }
 
 impl Direct {
-    pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends, path: Path) -> Self {
+    pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends) -> Self {
         Self {
-            steps: KeySteps::new(path),
+            steps: KeySteps::new(),
             weights: KeyWeights::new(how.weights, ends),
             gentle: GentleLanes::new(),
             whole: WholeLanes::new(),
@@ -79,41 +78,19 @@ impl Direct {
             find_far: how.find_far,
             smooth,
             ends,
-            path,
         }
     }
 
-    /// Finds the steps between keys; whether it is sure of their signs.
-    pub(crate) fn find_steps(&mut self, intervals: &Intervals) -> bool {
+    /// Finds what curves are made of.
+    pub(crate) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         in_lanes(&mut FindSteps {
             steps: &mut self.steps,
             intervals,
         });
-        !self.steps.are_in_doubt
-    }
-
-    /// Sets the signs of the first keys of a stretch, the first of which has this one; that of
-    /// the key that it ends with.
-    pub(crate) fn align(&self, intervals: &mut Intervals, stretch: &Stretch, first: f64) -> f64 {
-        let signs = &mut intervals.signs[stretch.lanes()];
-        if !self.steps.any_flips {
-            signs.fill(first);
-            return first;
-        }
-        let mut next = first;
-        for (sign, &flip) in signs.iter_mut().zip(&self.steps.flips[stretch.lanes()]) {
-            *sign = next;
-            next *= f64::from(flip);
-        }
-        next
-    }
-
-    /// Finds what curves are made of; the signs of the intervals' first keys are known.
-    pub(crate) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         self.weights.bring(intervals, stretches);
         self.gentle.look(&self.steps, stretches);
         if self.gentle.may_hold() {
-            (self.gentle).prepare(intervals, &self.steps, &self.weights, stretches);
+            (self.gentle).prepare(intervals, &self.weights, stretches);
         }
         self.whole.wanted = self.gentle.holds.map(|is_gentle| !is_gentle);
         in_lanes(&mut FindHandles {
@@ -151,7 +128,8 @@ impl Direct {
         if self.gentle.may_hold() {
             for lane in lanes.filter(|&lane| self.gentle.holds[lane]) {
                 let place = self.places[lane] as usize;
-                self.gentle.write(lane, &mut polynomials(prepared)[place]);
+                self.gentle
+                    .write(lane, &mut prepared.segments.polynomials[place]);
             }
         }
     }
@@ -190,7 +168,7 @@ impl Direct {
         lanes: Range<usize>,
         key: u32,
     ) {
-        let first_place = polynomials(prepared).len() as u32;
+        let first_place = prepared.segments.polynomials.len() as u32;
         let first_span = prepared.spans.sources.len() as u32;
         let mut next = 0;
         for (i, lane) in lanes.clone().enumerate() {
@@ -256,7 +234,7 @@ impl Direct {
                 while lanes.end < end && left_over.next_if_eq(&lanes.end).is_some() {
                     lanes.end += 1;
                 }
-                let new = || Box::new(Rest::new(self.path, self.smooth, self.ends));
+                let new = || Box::new(Rest::new(self.smooth, self.ends));
                 let rest = self.rest.get_or_insert_with(new);
                 if !rest.has_room(lanes.len()) {
                     rest.flush(prepared, fitting);
@@ -286,9 +264,9 @@ struct Rest {
 }
 
 impl Rest {
-    fn new(path: Path, smooth: Smooth, ends: Ends) -> Self {
+    fn new(smooth: Smooth, ends: Ends) -> Self {
         Self {
-            intervals: Intervals::new(path.flips_below(), smooth.shape.own),
+            intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
             spans: Vec::new(),
             smooth,

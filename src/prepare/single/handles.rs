@@ -6,10 +6,9 @@
 //! where the curve turns little. One number is found in f64: the vector between the handles,
 //! in which all of the others' roundings would come together.
 
-use crate::math::quaternion as branchless;
-use crate::math::quaternion::{Real as _, dot, product, scaled, square, sum};
+use crate::math::quaternion::{self, Real as _, dot, product, scaled, square, sum};
 use crate::math::ranges::MEDIUM_SQUARE;
-use crate::prepare::double::intervals::{Intervals, ROOM, energy, load};
+use crate::prepare::double::intervals::{Intervals, ROOM, energy};
 use crate::prepare::single::exp_log::{
     LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened,
 };
@@ -41,7 +40,7 @@ const LONGEST_FALL: f32 = 0.5645;
 /// other branch of its logarithm is nearer.
 const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 
-/// The first key of each curve in its sign, its three half-rotation vectors, and its last key.
+/// The first key of each curve, its three half-rotation vectors, and its last key.
 pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
 /// Such curves of a block's intervals.
@@ -119,7 +118,7 @@ impl InLanes for FindHandles<'_> {
             }
         }
         for keys in far_keys[..far_count].chunks(AT_ONCE) {
-            own.set_far(keys, steps, intervals, self.find_far);
+            own.set_far(keys, intervals, self.find_far);
         }
     }
 }
@@ -163,8 +162,7 @@ impl InLanes for FindCurves<'_> {
             let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
             let start = L::load_rotations(&intervals.from[own..]);
             let end = L::load_rotations(&intervals.to[own..]);
-            let flip = L::load(&steps.flips[own..]);
-            let (w2, fall) = between::<L>(w1, [start, end], flip, w3);
+            let (w2, fall) = between::<L>(w1, [start, end], w3);
             let chord = L::load(&steps.chords[own..]);
             let before = L::load(&steps.chords[lane..]);
             let after = L::load(&steps.chords[next..]);
@@ -177,24 +175,13 @@ impl InLanes for FindCurves<'_> {
             let half = L::all(0.5 * IN_DOUBT as f32);
             let doubt = (far - L::all(1.0)).sign() * half + half;
             let energy = energy([w1, w2, w3]) + doubt;
-            let sign = L::rounded(load::<L>(&intervals.signs, own));
-            let end_sign = sign * flip;
+            let none = L::all(0.0);
             let numbers = [
-                [
-                    start[0] * sign,
-                    start[1] * sign,
-                    start[2] * sign,
-                    start[3] * sign,
-                ],
-                [w1[0], w1[1], w1[2], sign],
-                [w2[0], w2[1], w2[2], sign],
-                [w3[0], w3[1], w3[2], sign],
-                [
-                    end[0] * end_sign,
-                    end[1] * end_sign,
-                    end[2] * end_sign,
-                    end[3] * end_sign,
-                ],
+                start,
+                [w1[0], w1[1], w1[2], none],
+                [w2[0], w2[1], w2[2], none],
+                [w3[0], w3[1], w3[2], none],
+                end,
             ];
             energy.store(&mut whole.energies[own..own + L::COUNT]);
             for (i, all) in whole.numbers.iter_mut().enumerate() {
@@ -206,13 +193,12 @@ impl InLanes for FindCurves<'_> {
 
 /// `log(exp(-w₁) q₀⁻¹ q₁ exp(-w₃))`, and its cosine less 1.
 #[inline(always)]
-fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], flip: L, w3: [L; 3]) -> ([L; 3], L) {
+fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 3], L) {
     let all = L::Doubles::all;
     let (start, end) = (widened(start), widened(end));
-    let [x, y, z, w] = branchless::step(start, end);
+    let [x, y, z, w] = quaternion::step(start, end);
     // Keys are unit to f32: one step of Newton's.
     let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
-    let scale = scale * flip.widened();
     let step = [x * scale, y * scale, z * scale, w * scale];
     let [x, y, z, w] = product(product(exact_exp(w1, -1.0), step), exact_exp(w3, -1.0));
     let u = all(1.0) - w;

@@ -8,7 +8,6 @@ use crate::math::ranges::Anywhere;
 use crate::prepare::double::handles::{HandleRule, Handles, Interval};
 use crate::prepare::double::intervals::Intervals;
 use crate::prepare::single::handles::WholeLanes;
-use crate::prepare::single::key_steps::KeySteps;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
@@ -31,8 +30,6 @@ pub(crate) struct FarKeys {
 struct Side {
     from: [Row; 4],
     to: [Row; 4],
-    /// -1 where the sign of the second key is turned.
-    flips: Row,
     durations: Row,
 }
 
@@ -52,7 +49,6 @@ impl WholeLanes {
     pub(crate) fn set_far(
         &mut self,
         keys: &[usize],
-        steps: &KeySteps,
         intervals: &Intervals,
         find: fn(&mut FarKeys),
     ) {
@@ -63,8 +59,8 @@ impl WholeLanes {
             outgoing: [[0.0; AT_ONCE]; 3],
         };
         for (i, &key) in keys.iter().enumerate() {
-            far.before.set(i, steps, intervals, key - 1);
-            far.after.set(i, steps, intervals, key);
+            far.before.set(i, intervals, key - 1);
+            far.after.set(i, intervals, key);
         }
         find(&mut far);
         for (i, &key) in keys.iter().enumerate() {
@@ -82,18 +78,16 @@ impl Side {
         Self {
             from: [[0.0; AT_ONCE]; 4],
             to: [[0.0; AT_ONCE]; 4],
-            flips: [1.0; AT_ONCE],
             durations: [1.0; AT_ONCE],
         }
     }
 
-    fn set(&mut self, i: usize, steps: &KeySteps, intervals: &Intervals, lane: usize) {
+    fn set(&mut self, i: usize, intervals: &Intervals, lane: usize) {
         let [from, to] = intervals.keys(lane);
         for c in 0..4 {
             self.from[c][i] = f64::from(from[c]);
             self.to[c][i] = f64::from(to[c]);
         }
-        self.flips[i] = f64::from(steps.flips[lane]);
         self.durations[i] = intervals.durations[lane];
     }
 
@@ -103,9 +97,7 @@ impl Side {
         let [x1, y1, z1, w1] = &self.to;
         let from = normalised([x0[i], y0[i], z0[i], w0[i]]);
         let to = normalised([x1[i], y1[i], z1[i], w1[i]]);
-        let flip = self.flips[i];
-        let [x, y, z, w] = step(from, to);
-        let step = [x * flip, y * flip, z * flip, w * flip];
+        let step = step(from, to);
         Interval {
             duration: self.durations[i],
             step,

@@ -10,8 +10,8 @@ use crate::shader::PolynomialSegment;
 use crate::shader::{KEY_INNER, LONGEST_STEP};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
+use crate::twin::small_angle::SmallAngleCubic;
 use crate::twin::small_angle::small_angle_cubic;
-use crate::twin::small_angle::{SmallAngleCubic, signed};
 
 /// Lanes of the widest vectors.
 const VECTOR: usize = 16;
@@ -58,11 +58,10 @@ impl GentleLanes {
         self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
     }
 
-    /// Prepares them; the signs of the intervals' first keys are known.
+    /// Prepares them.
     pub(crate) fn prepare(
         &mut self,
         intervals: &Intervals,
-        steps: &KeySteps,
         weights: &KeyWeights,
         stretches: &[Stretch],
     ) {
@@ -71,7 +70,6 @@ impl GentleLanes {
         let mut curves = Curves {
             lanes: self,
             intervals,
-            steps,
             weights,
         };
         if near.len() > FEW {
@@ -105,7 +103,6 @@ impl GentleLanes {
 struct Curves<'a> {
     lanes: &'a mut GentleLanes,
     intervals: &'a Intervals,
-    steps: &'a KeySteps,
     weights: &'a KeyWeights,
 }
 
@@ -113,22 +110,12 @@ impl Curves<'_> {
     /// The curve of lane `j + 1`.
     #[inline(always)]
     fn curve(&self, j: usize) -> SmallAngleCubic {
-        let Intervals {
-            from, to, signs, ..
-        } = self.intervals;
-        let flips = &self.steps.flips;
-        let own = signs[j + 1] as f32;
-        let sign_before = own * flips[j];
-        let sign_end = own * flips[j + 1];
-        let sign_after = sign_end * flips[j + 2];
+        let Intervals { from, to, .. } = self.intervals;
         let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
-        let start = signed(from[j + 1], own);
-        let end = signed(to[j + 1], sign_end);
-        let before = signed(from[j], sign_before);
-        let after = signed(to[j + 2], sign_after);
+        let (start, end) = (from[j + 1], to[j + 1]);
         // Where there is no neighbour, the key again.
-        let before = either(first.kind == KEY_INNER, before, start);
-        let after = either(last.kind == KEY_INNER, after, end);
+        let before = either(first.kind == KEY_INNER, from[j], start);
+        let after = either(last.kind == KEY_INNER, to[j + 2], end);
         small_angle_cubic([before, start, end, after], first, last)
     }
 }

@@ -7,7 +7,6 @@ use bytemuck::Zeroable as _;
 
 use crate::prepare::Prepared;
 use crate::prepare::double::fit::{MOST, Samples};
-use crate::prepare::double::fitting::polynomials;
 use crate::prepare::double::intervals::{LANES, ROOM};
 use crate::prepare::single::handles::CurveNumbers;
 use crate::prepare::single::hermite_fit::{BetweenKeys, KeyFit};
@@ -159,7 +158,7 @@ pub(crate) fn fit<const PAIRS: usize>(
     if list.count == 0 {
         return;
     }
-    let segments = polynomials(prepared);
+    let segments = &mut prepared.segments.polynomials;
     let count = segments.len();
     // For the last vector's lanes that have no curve.
     segments.extend([PolynomialSegment::zeroed(); 2]);
