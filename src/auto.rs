@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use glam::Quat;
 
 use crate::device::Device;
-use crate::engine::{Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
 use crate::output::rotations::Layout;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;

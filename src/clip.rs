@@ -1,36 +1,26 @@
 //! A clip: a set prepared for one method, on a device, ready for any frames.
 
-use std::sync::{Arc, Mutex, PoisonError};
-
 use glam::Quat;
 
-use crate::engine::{Backend, Engine, Error};
-use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
-use crate::gpu::error::VulkanError;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Quantity;
-use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
-use crate::output::rotations::{Layout, Rotations, Storage};
-use crate::prepare::Prepared;
-use crate::prepare::clip_data::ClipData;
+use crate::output::rotations::{Layout, Rotations};
 use crate::time::frames::{Frames, FramesError, Timeline};
 use crate::time::window::Window;
 
 /// A set prepared for one method, on its engine's device; evaluate it as often as
 /// needed, at any frames.
 pub struct Clip {
-    pub(crate) engine: Engine,
-    pub(crate) data: ClipData,
-    /// On a Vulkan device; brought there again when it was lost.
-    pub(crate) buffers: Mutex<Option<Arc<ClipBuffers>>>,
+    engine: Engine,
+    pub(crate) uploaded: Uploaded,
 }
 
 impl Clip {
-    /// What the next clip can use again: its segments, and their buffers on a device.
-    pub(crate) fn into_spare(self) -> (Vec<Prepared>, Option<ClipBuffers>) {
-        let buffers = self.buffers.into_inner();
-        let buffers = buffers.unwrap_or_else(PoisonError::into_inner);
-        (self.data.groups, buffers.and_then(Arc::into_inner))
+    pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
+        Self { engine, uploaded }
     }
 
     /// The engine that it was uploaded to.
@@ -40,7 +30,7 @@ impl Clip {
 
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
-        self.data.track_count()
+        self.uploaded.data.track_count()
     }
 
     /// The samples that `frames` means for this clip.
@@ -48,7 +38,10 @@ impl Clip {
     /// # Errors
     /// When they do not fit it.
     pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
-        frames.resolve(self.data.track_count(), self.data.time_span())
+        frames.resolve(
+            self.uploaded.data.track_count(),
+            self.uploaded.data.time_span(),
+        )
     }
 
     /// The rotation of every track at every sample, `[track][frame]`.
@@ -65,21 +58,8 @@ impl Clip {
     /// When the frames do not fit the clip, or the device fails.
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
         let timeline = self.timeline(frames)?;
-        let (tracks, samples) = (self.data.track_count(), timeline.len());
-        let storage: Box<dyn Storage> = match &*self.engine.backend {
-            Backend::Vulkan(opened) => {
-                let timeline = self.data.folded(&timeline);
-                opened.attempt_smaller(|engine| {
-                    let buffers = self.buffers_on(engine)?;
-                    engine.evaluate(&self.data, &buffers, &timeline, layout)
-                })?
-            }
-            Backend::Cpu(_) => {
-                let mut quats = OutputBuffer::new(tracks * samples);
-                self.evaluate_timeline_into(&timeline, layout, &mut quats)?;
-                Box::new(quats)
-            }
-        };
+        let storage = (self.uploaded).evaluate(&self.engine.backend, &timeline, layout)?;
+        let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Rotations::new(storage, tracks, samples, layout))
     }
 
@@ -95,24 +75,13 @@ impl Clip {
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), Error> {
-        self.evaluate_timeline_into(&self.timeline(frames)?, layout, output)
-    }
-
-    pub(crate) fn evaluate_timeline_into(
-        &self,
-        timeline: &Timeline,
-        layout: Layout,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let needed = self.data.track_count() * timeline.len();
-        if output.len() != needed {
-            return Err(Error::OutputLength {
-                given: output.len(),
-                needed,
-            });
+        let timeline = self.timeline(frames)?;
+        let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let (given, needed) = (output.len(), whole.len());
+        if given != needed {
+            return Err(Error::OutputLength { given, needed });
         }
-        let timeline = self.data.folded(timeline);
-        let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
+        let timeline = self.uploaded.data.folded(&timeline);
         self.evaluate_window_into(&timeline, &whole, output)
     }
 
@@ -124,13 +93,9 @@ impl Clip {
         window: &Window,
         output: &mut [Quat],
     ) -> Result<(), Error> {
-        match &*self.engine.backend {
-            Backend::Cpu(engine) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
-            Backend::Vulkan(_) => {
-                let bytes = bytemuck::cast_slice_mut(output);
-                self.evaluate_bytes_into(timeline, window, Encoding::F32, bytes)
-            }
-        }
+        let backend = &self.engine.backend;
+        (self.uploaded).evaluate_window(backend, timeline, window, output)?;
+        Ok(())
     }
 
     fn evaluate_bytes_into(
@@ -141,43 +106,13 @@ impl Clip {
         output: &mut [u8],
     ) -> Result<(), Error> {
         self.check_encoding(encoding)?;
-        match &*self.engine.backend {
-            Backend::Cpu(engine) => {
-                Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
-            }
-            Backend::Vulkan(opened) => {
-                let done = opened.attempt_smaller(|engine| {
-                    let buffers = self.buffers_on(engine)?;
-                    let job = Job {
-                        clip: &self.data,
-                        buffers: &buffers,
-                        timeline,
-                        encoding,
-                    };
-                    engine.evaluate_into(job, window, output)
-                });
-                Ok(done?)
-            }
-        }
-    }
-
-    /// The segments on a device; brought there where it is not the one that had them.
-    pub(crate) fn buffers_on(
-        &self,
-        engine: &VulkanEngine,
-    ) -> Result<Arc<ClipBuffers>, VulkanError> {
-        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
-            return Ok(Arc::clone(there));
-        }
-        *buffers = None;
-        let there = Arc::new(engine.upload(&self.data, None)?);
-        *buffers = Some(Arc::clone(&there));
-        Ok(there)
+        let backend = &self.engine.backend;
+        (self.uploaded).evaluate_encoded(backend, timeline, window, encoding, output)?;
+        Ok(())
     }
 
     pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {
-        let of_rotations = self.data.interpolation.quantity == Quantity::Rotation;
+        let of_rotations = self.uploaded.data.interpolation.quantity == Quantity::Rotation;
         if encoding.needs_rotations() && !of_rotations {
             return Err(Error::NotRotations { encoding });
         }
@@ -199,7 +134,7 @@ impl Clip {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let mut output = bytemuck::zeroed_vec(whole.len() * encoding.bytes());
-        let timeline = self.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline);
         self.evaluate_bytes_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
     }
@@ -221,7 +156,7 @@ impl Clip {
         if given != needed {
             return Err(Error::OutputBytes { given, needed });
         }
-        let timeline = self.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline);
         self.evaluate_bytes_into(&timeline, &whole, encoding, output)
     }
 }
@@ -230,7 +165,7 @@ impl std::fmt::Debug for Clip {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Clip")
             .field("engine", &self.engine)
-            .field("method", &self.data.interpolation.method)
+            .field("method", &self.uploaded.data.interpolation.method)
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
     }

@@ -1,12 +1,8 @@
 //! Where to evaluate, and how: a device is a value, never a global.
 
-use std::ops::AddAssign;
-use std::time::Duration;
-
 use crate::gpu;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::{DeviceInfo, DeviceKind, PhysicalDevice};
-use crate::simd::dispatch::VectorWidth;
 
 /// Where an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
@@ -83,75 +79,5 @@ impl Device {
 impl std::fmt::Debug for Device {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_tuple("Device").field(&self.name()).finish()
-    }
-}
-
-/// How results of a Vulkan device reach the host.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Transfer {
-    /// In place where the device shares the host's memory, else staged. Software devices
-    /// work on the caller's own memory where they can, without a copy.
-    #[default]
-    Automatic,
-    /// The kernel writes into memory that the host reads.
-    InPlace,
-    /// The kernel writes into the device's memory; copies bring it over.
-    Staged,
-}
-
-/// How kernels of a Vulkan device read keys, segments and work lists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Reads {
-    /// Texel buffers on software devices that can, else storage buffers.
-    #[default]
-    Automatic,
-    /// Storage buffers.
-    StorageBuffers,
-    /// Texel buffers, and stores of 64 bits; where the device has such integers, and can
-    /// hold in one buffer what it may allocate at once.
-    TexelBuffers,
-}
-
-/// Choices for an [`Engine`](crate::engine::Engine); none of them changes a bit of any result.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub struct EngineOptions {
-    /// Bytes of device memory to use besides results; no limit by default.
-    pub memory: Option<u64>,
-    /// Worker threads of the CPU; by default the process's shared ones.
-    pub threads: Option<usize>,
-    /// The widest vector instructions to evaluate with on the CPU; by default
-    /// [`VectorWidth::widest`].
-    pub vector_width: Option<VectorWidth>,
-    /// How results come back from a Vulkan device.
-    pub transfer: Transfer,
-    /// How a Vulkan device's kernels read.
-    pub reads: Reads,
-    /// Use a device although its canaries fail: its bits may differ.
-    pub allow_inexact: bool,
-}
-
-/// Where the time of a Vulkan device's evaluations went
-/// ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Timings {
-    /// The host made work lists and recorded commands; the device may have worked on
-    /// another window meanwhile.
-    pub work_lists: Duration,
-    /// From handing work over to seeing its fence; windows in flight together are
-    /// counted once.
-    pub submit_to_fence: Duration,
-    /// By the device's own clock; zero where it has none.
-    pub on_device: Duration,
-    /// The host copied results to where they were asked for.
-    pub read_back: Duration,
-}
-
-impl AddAssign for Timings {
-    fn add_assign(&mut self, more: Self) {
-        self.work_lists += more.work_lists;
-        self.submit_to_fence += more.submit_to_fence;
-        self.on_device += more.on_device;
-        self.read_back += more.read_back;
     }
 }

@@ -1,88 +1,25 @@
 //! The engine: sets go in, clips stay on its device, rotations come out.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use glam::Quat;
 
 use crate::clip::Clip;
 use crate::cpu::engine::CpuEngine;
-use crate::device::{Device, EngineOptions, Timings, VulkanDevice};
-use crate::from_keys::evaluate::straight;
-use crate::gpu::engine::{ClipBuffers, EvaluateError};
-use crate::gpu::error::VulkanError;
+use crate::device::{Device, VulkanDevice};
+use crate::error::Error;
+use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Uploaded;
+use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
 use crate::gpu::self_test::CanaryReport;
-use crate::method::interpolation::{Interpolation, InterpolationError};
-use crate::output::buffer::OutputBuffer;
-use crate::output::encoding::Encoding;
+use crate::method::interpolation::Interpolation;
 use crate::output::rotations::{Layout, Rotations};
-use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::simd::dispatch::{UnknownWidth, VectorWidth};
-use crate::time::frames::{Frames, FramesError};
-use crate::time::wrap::Sides;
+use crate::prepare::clip_data::Wanted;
+use crate::simd::dispatch::VectorWidth;
+use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
-
-/// Why an evaluation failed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The samples asked for do not fit the set.
-    #[error(transparent)]
-    Frames(#[from] FramesError),
-    /// A track cannot be interpolated as asked.
-    #[error(transparent)]
-    Interpolation(#[from] InterpolationError),
-    /// The Vulkan device could not be used, or stopped working.
-    #[error(transparent)]
-    Vulkan(#[from] VulkanError),
-    /// The output given is not as large as the result.
-    #[error("the output has room for {given} rotations; the result has {needed}")]
-    OutputLength {
-        /// Rotations that it holds.
-        given: usize,
-        /// Rotations of the result.
-        needed: usize,
-    },
-    /// The memory given for an encoded result is not as large as it.
-    #[error("the output has {given} bytes; the result has {needed}")]
-    OutputBytes {
-        /// Bytes that it holds.
-        given: usize,
-        /// Bytes of the result.
-        needed: usize,
-    },
-    /// Poses cannot be put together as asked.
-    #[error("{0}")]
-    Poses(&'static str),
-    /// Velocities and accelerations are no rotations, and cannot be stored as such.
-    #[error("{encoding:?} stores rotations, not velocities or accelerations; use F32 or Vector")]
-    NotRotations {
-        /// What was asked for.
-        encoding: Encoding,
-    },
-    /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
-    #[error("TUMBLE_VECTOR_WIDTH: {0}")]
-    VectorWidth(#[from] UnknownWidth),
-    /// The system refused worker threads.
-    #[error("worker threads could not be started: {reason}")]
-    Threads {
-        /// What the system said.
-        reason: String,
-    },
-}
-
-impl From<EvaluateError> for Error {
-    fn from(error: EvaluateError) -> Self {
-        match error {
-            EvaluateError::Vulkan(error) => Self::Vulkan(error),
-            EvaluateError::Frames(error) => Self::Frames(error),
-        }
-    }
-}
-
-/// Keys a track of a set that is prepared as a whole, before it is evaluated.
-const LONG_TRACK: usize = 16 * 1024;
 
 /// Evaluates sets on one device.
 ///
@@ -107,11 +44,6 @@ const LONG_TRACK: usize = 16 * 1024;
 #[derive(Clone)]
 pub struct Engine {
     pub(crate) backend: Arc<Backend>,
-}
-
-pub(crate) enum Backend {
-    Cpu(CpuEngine),
-    Vulkan(Box<Opened>),
 }
 
 impl Engine {
@@ -219,31 +151,17 @@ impl Engine {
         set: &TrackSet,
         interpolation: impl Into<Interpolation>,
     ) -> Result<Clip, Error> {
-        self.upload_wanted(set, interpolation.into(), Wanted::all(set, None), None)
+        self.upload_wanted(set, interpolation.into(), Wanted::all(set))
     }
 
-    /// As [`Engine::upload`], what is wanted, into buffers that are no longer needed.
     pub(crate) fn upload_wanted(
         &self,
         set: &TrackSet,
         interpolation: Interpolation,
-        mut wanted: Wanted<'_>,
-        spare: Option<ClipBuffers>,
+        wanted: Wanted<'_>,
     ) -> Result<Clip, Error> {
-        let (data, buffers) = match &*self.backend {
-            Backend::Cpu(_) => (ClipData::new(set, interpolation, wanted)?, None),
-            Backend::Vulkan(opened) => {
-                wanted.group_bytes = Some(opened.engine().group_bytes());
-                let data = ClipData::new(set, interpolation, wanted)?;
-                let buffers = opened.upload(&data, spare)?;
-                (data, Some(Arc::new(buffers)))
-            }
-        };
-        Ok(Clip {
-            engine: self.clone(),
-            data,
-            buffers: Mutex::new(buffers),
-        })
+        let uploaded = Uploaded::new(&self.backend, set, interpolation, wanted, None)?;
+        Ok(Clip::new(self.clone(), uploaded))
     }
 
     /// Prepares and evaluates in one go, `[track][frame]`. On a Vulkan device a set
@@ -272,33 +190,11 @@ impl Engine {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Rotations, Error> {
+        let timeline = frames.resolve(set.track_count(), set.time_span())?;
         let interpolation = interpolation.into();
-        let tracks = set.track_count();
-        let timeline = frames.resolve(tracks, set.time_span())?;
-        let samples = timeline.len();
-        let on_cpu = matches!(*self.backend, Backend::Cpu(_));
-        let by_segments = !(self.is_fused(set, &interpolation, layout)
-            || on_cpu && straight(set, &interpolation, &timeline).is_some()
-            || self.is_in_stretches(set, &interpolation, &timeline, layout)
-            || self
-                .key_job(set, 0..tracks, &interpolation, &timeline, layout)
-                .is_some());
-        if by_segments
-            && self
-                .pieces(set, 0..tracks, &interpolation, &timeline, layout)
-                .len()
-                == 1
-        {
-            let wanted = Wanted {
-                only_for: Some(&timeline),
-                ..Wanted::all(set, None)
-            };
-            let clip = self.upload_wanted(set, interpolation, wanted, None)?;
-            return clip.evaluate_as(frames, layout);
-        }
-        let mut quats = OutputBuffer::new(tracks * samples);
-        self.evaluate_tracks_into(set, 0..tracks, interpolation, &timeline, layout, &mut quats)?;
-        Ok(Rotations::new(Box::new(quats), tracks, samples, layout))
+        let storage = (self.backend).evaluate(set, interpolation, &timeline, layout)?;
+        let (tracks, samples) = (set.track_count(), timeline.len());
+        Ok(Rotations::new(storage, tracks, samples, layout))
     }
 
     /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
@@ -322,28 +218,26 @@ impl Engine {
             let given = output.len();
             return Err(Error::OutputLength { given, needed });
         }
-        self.evaluate_tracks_into(
-            set,
-            0..tracks,
-            interpolation.into(),
-            &timeline,
-            layout,
-            output,
-        )
+        let interpolation = interpolation.into();
+        (self.backend).evaluate_tracks(set, 0..tracks, interpolation, &timeline, layout, output)?;
+        Ok(())
     }
 
-    /// Whether preparing and evaluating go hand in hand, track by track: on the CPU,
-    /// unless a few long tracks must be shared among the threads.
-    pub(crate) fn is_fused(
+    /// Which way a set takes to its rotations, in words: whether it is prepared, and in what
+    /// pieces. All ways give the same bits.
+    ///
+    /// # Errors
+    /// When the frames do not fit the set.
+    pub fn explain_route(
         &self,
         set: &TrackSet,
-        interpolation: &Interpolation,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
         layout: Layout,
-    ) -> bool {
-        let short = set.key_count() <= LONG_TRACK * set.track_count();
-        let held = interpolation.sides() == Sides::default();
-        let on_cpu = matches!(*self.backend, Backend::Cpu(_));
-        on_cpu && layout == Layout::TrackMajor && short && held
+    ) -> Result<String, Error> {
+        let timeline = frames.resolve(set.track_count(), set.time_span())?;
+        let route = (self.backend).route(set, &interpolation.into(), &timeline, layout);
+        Ok(route.to_string())
     }
 }
 

@@ -8,7 +8,8 @@ use std::thread;
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::engine::{Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::Layout;
@@ -70,7 +71,7 @@ impl Clip {
     ) -> Result<(), E> {
         let timeline = self.timeline(frames).map_err(Error::from)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let timeline = self.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline);
         let fill = |window: &Window, output: &mut [Quat]| {
             self.evaluate_window_into(&timeline, window, output)
         };
@@ -101,15 +102,17 @@ impl Engine {
             // A chunk has some samples of many tracks, or some of one track.
             let wanted = Wanted {
                 only_for: Some(&timeline),
-                ..Wanted::all(set, None)
+                ..Wanted::all(set)
             };
-            let clip = self.upload_wanted(set, interpolation, wanted, None)?;
+            let clip = self.upload_wanted(set, interpolation, wanted)?;
             return clip.stream(frames, layout, chunk, sink);
         }
         let whole = Window::whole(set.track_count(), timeline.len(), layout);
         let fill = |window: &Window, output: &mut [Quat]| {
             let tracks = window.tracks.clone();
-            self.evaluate_tracks_into(set, tracks, interpolation, &timeline, layout, output)
+            (self.backend)
+                .evaluate_tracks(set, tracks, interpolation, &timeline, layout, output)
+                .map_err(Error::from)
         };
         run(whole.cut(chunk), fill, sink)
     }

@@ -1,10 +1,13 @@
 //! The CPU: the f32 twins of the shaders, and the walk over tracks and samples
 //! that feeds them.
 
+pub(crate) mod batches;
+pub(crate) mod clip;
 pub(crate) mod destination;
 pub(crate) mod engine;
 pub(crate) mod evaluate;
-pub(crate) mod long;
+pub(crate) mod fallback;
+pub(crate) mod from_keys;
 pub(crate) mod row;
 pub(crate) mod scratch;
 pub(crate) mod sparse_times;

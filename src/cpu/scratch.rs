@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::method::interpolation::Interpolation;
 use crate::prepare::Prepared;
-use crate::prepare::set::Preparation;
+use crate::prepare::preparation::Preparation;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 

@@ -338,8 +338,9 @@ pub(crate) mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::device::{Device, EngineOptions};
+    use crate::device::Device;
     use crate::engine::Engine;
+    use crate::gpu::options::EngineOptions;
     use crate::method;
     use crate::method::interpolation::Interpolation;
     use crate::output::rotations::Layout;

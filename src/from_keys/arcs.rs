@@ -20,7 +20,7 @@ use crate::twin::evaluate_polynomial::polynomial;
 pub(crate) const LANES: usize = ARC_LANES;
 
 /// Samples that wait, one behind the other in the result.
-pub(crate) struct SampleBlock {
+pub(crate) struct TwoKeyBlock {
     pub(crate) form: Form,
     /// The keys beside each, in the signs that they count with; the same one twice, as it was
     /// given, where the sample is that key.
@@ -31,7 +31,7 @@ pub(crate) struct SampleBlock {
     pub(crate) rotations: [[f32; 4]; LANES],
 }
 
-impl SampleBlock {
+impl TwoKeyBlock {
     pub(crate) fn new(form: Form) -> Self {
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
@@ -45,7 +45,7 @@ impl SampleBlock {
     }
 }
 
-impl InLanes for SampleBlock {
+impl InLanes for TwoKeyBlock {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
@@ -56,7 +56,7 @@ impl InLanes for SampleBlock {
     }
 }
 
-impl SampleBlock {
+impl TwoKeyBlock {
     #[inline(always)]
     fn arcs<L: Lanes>(&mut self) {
         let mut arcs = Arcs::<L>::new();

@@ -22,10 +22,10 @@ pub(crate) struct CubicBlock {
     /// 1 where the sample is the key before it.
     pub(crate) held: [f32; LANES],
     pub(crate) count: usize,
-    /// 0 where the curve turns too much.
+    /// UNRESOLVED where the curve turns too far.
     pub(crate) rotations: [[f32; 4]; LANES],
     /// How many of those there were.
-    pub(crate) wild: usize,
+    pub(crate) unresolved: usize,
 }
 
 impl CubicBlock {
@@ -38,7 +38,7 @@ impl CubicBlock {
             held: [0.0; LANES],
             count: 0,
             rotations: [identity; LANES],
-            wild: 0,
+            unresolved: 0,
         }
     }
 }
@@ -47,7 +47,7 @@ impl InLanes for CubicBlock {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
-        let mut wild = 0;
+        let mut unresolved = 0;
         let [before, start, end, after] = &self.keys;
         let [first, last] = &self.weights;
         for j in 0..whole(self.count) {
@@ -69,12 +69,12 @@ impl InLanes for CubicBlock {
                 }};
             }
             (x[j], y[j], z[j], w[j]) = (component!(0), component!(1), component!(2), component!(3));
-            wild += u32::from(found + self.held[j] == 0.0);
+            unresolved += u32::from(found + self.held[j] == 0.0);
         }
         for j in 0..whole(self.count) {
             self.rotations[j] = [x[j], y[j], z[j], w[j]];
         }
-        self.wild += wild as usize;
+        self.unresolved += unresolved as usize;
     }
 }
 
@@ -113,7 +113,7 @@ mod tests {
         });
         let (_, expected) = &results[0];
         for (width, found) in &results {
-            assert_eq!(found.wild, 0, "{width:?}");
+            assert_eq!(found.unresolved, 0, "{width:?}");
             for lane in 0..LANES {
                 let [one, other] = [expected, found].map(|all| all.rotations[lane]);
                 assert_eq!(one.map(f32::to_bits), other.map(f32::to_bits), "{width:?}");
@@ -142,7 +142,7 @@ mod tests {
         block.weights[0][2] = UNKNOWN;
         block.held[3..].fill(1.0);
         in_lanes(&mut block);
-        assert_eq!(block.wild, 2);
+        assert_eq!(block.unresolved, 2);
         assert_ne!(block.rotations[0], [0.0; 4]);
         assert_eq!(block.rotations[1..3], [[0.0; 4]; 2]);
     }

@@ -1,81 +1,27 @@
-//! Twin of `shaders/sampled.wgsl`. Fewer samples than keys: a sample to a lane, straight
-//! from the keys beside it. No segment is kept, and none is made where no sample falls. The
-//! same operations as by way of segments, and so the same bits. Cubics that turn too much
-//! for it stay 0.
+//! Evaluates samples straight from keys, a sample to a lane: the same operations as by way of
+//! segments, and so the same bits.
+//! Twin: `shaders/from_keys.wgsl`.
 
 use std::ops::Range;
 
-use crate::engine::Error;
-use crate::from_keys::arcs::{ArcRun, LANES, SampleBlock};
+use crate::from_keys::KeyCurve;
+use crate::from_keys::arcs::{ArcRun, LANES, TwoKeyBlock};
 use crate::from_keys::cubics::CubicBlock;
-use crate::method::interpolation::{Interpolation, Path};
-use crate::prepare::tangent_weights::{TrackWeights, WeightRule};
-use crate::shader::Form;
-use crate::shader::{IS_KEY, KEY_INNER, LONGEST_STEP};
-use crate::shader::{KeySample, TangentWeights};
+use crate::method::interpolation::Interpolation;
+use crate::prepare::batch::Batch;
+use crate::prepare::error::SetError;
+use crate::prepare::tangent_weights::TrackWeights;
+use crate::shader::{Form, IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{Ticks, Timeline};
-use crate::time::key_samples::{FramePlan, Stretch, TimePlan};
-use crate::time::wrap::Sides;
+use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::key_samples::{FramePlan, TimePlan};
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
-
-/// What samples are made of, straight from keys.
-#[derive(Clone, Copy)]
-pub(crate) enum Straight {
-    /// Arcs between two keys.
-    Arcs,
-    /// Two keys alone by a smooth method.
-    Pairs,
-    /// Cubics by four keys.
-    Cubics(WeightRule),
-}
-
-/// What every sample is made of where it is worked out straight from its keys: where there
-/// are fewer samples than keys, and nothing but arcs between these, or cubics most of which
-/// turn little.
-pub(crate) fn straight(
-    set: &TrackSet,
-    interpolation: &Interpolation,
-    timeline: &Timeline,
-) -> Option<Straight> {
-    let few = timeline.len() * set.track_count() < set.key_count();
-    // As authored an arc may be of more than half a turn, and is then two segments.
-    let arcs_are_short = interpolation.path == Path::Shortest || set.arcs_are_short();
-    if !few || !arcs_are_short || interpolation.sides() != Sides::default() {
-        return None;
-    }
-    match interpolation.form() {
-        Form::Arc => Some(Straight::Arcs),
-        Form::Polynomial if set.longest() <= 2 => {
-            interpolation.is_steady_alone().then_some(Straight::Pairs)
-        }
-        Form::Polynomial => {
-            let weights = interpolation.small_angle_weights()?;
-            turns_little(set).then_some(Straight::Cubics(weights))
-        }
-    }
-}
-
-/// Whether two thirds of some keys looked at are near those before them: with fewer, to
-/// prepare all of them takes no longer. Nothing but time depends on it.
-fn turns_little(set: &TrackSet) -> bool {
-    const LOOKS: usize = 64;
-    let (mut near, mut looks) = (0, 0);
-    for look in 0..LOOKS {
-        let (_, keys) = set.times_and_keys(look * set.track_count() / LOOKS);
-        let place = keys.len() * look / LOOKS;
-        if let [from, to, ..] = keys[place..] {
-            looks += 1;
-            near += usize::from(1.0 - from.dot(to).abs() <= 0.5 * LONGEST_STEP);
-        }
-    }
-    3 * near > 2 * looks
-}
+use crate::tracks::track_keys::TrackKeys;
 
 /// Evaluates tracks; what it needs for that is kept.
-pub(crate) struct Sampled<'a> {
+pub(crate) struct KeyEvaluator<'a> {
     interpolation: &'a Interpolation,
     block: Block<'a>,
     plan: FramePlan<'a>,
@@ -83,18 +29,18 @@ pub(crate) struct Sampled<'a> {
 }
 
 enum Block<'a> {
-    ByTwo(Box<SampleBlock>),
-    ByFour(Box<CubicBlock>, TrackWeights<'a>),
+    TwoKeys(Box<TwoKeyBlock>),
+    Cubics(Box<CubicBlock>, TrackWeights<'a>),
 }
 
-impl<'a> Sampled<'a> {
-    pub(crate) fn new(interpolation: &'a Interpolation, straight: Straight) -> Self {
-        let block = match straight {
-            Straight::Arcs => Block::ByTwo(Box::new(SampleBlock::new(Form::Arc))),
-            Straight::Pairs => Block::ByTwo(Box::new(SampleBlock::new(Form::Polynomial))),
-            Straight::Cubics(weights) => {
+impl<'a> KeyEvaluator<'a> {
+    pub(crate) fn new(interpolation: &'a Interpolation, curve: KeyCurve) -> Self {
+        let block = match curve {
+            KeyCurve::Arcs => Block::TwoKeys(Box::new(TwoKeyBlock::new(Form::Arc))),
+            KeyCurve::TwoKeys => Block::TwoKeys(Box::new(TwoKeyBlock::new(Form::Polynomial))),
+            KeyCurve::Cubics(weights) => {
                 let weights = TrackWeights::new(weights, interpolation.ends);
-                Block::ByFour(Box::new(CubicBlock::new()), weights)
+                Block::Cubics(Box::new(CubicBlock::new()), weights)
             }
         };
         Self {
@@ -105,71 +51,59 @@ impl<'a> Sampled<'a> {
         }
     }
 
-    /// Every sample of some tracks, `[track][sample]`; whether any was left out.
-    pub(crate) fn tracks(
+    /// The samples of a batch, `[track][sample]`, those in `window` where it is some intervals
+    /// of a track; whether all of them are resolved.
+    pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,
-        tracks: Range<usize>,
+        batch: &Batch,
         timeline: &Timeline,
+        window: &Range<usize>,
         output: &mut [[f32; 4]],
-    ) -> Result<bool, Error> {
-        let samples = timeline.len();
+    ) -> Result<bool, SetError> {
         let mut output = output.iter_mut();
-        for index in tracks {
-            let stretch = Stretch::whole(set, index);
-            self.interpolation.ends.check(stretch.keys, index)?;
+        for (index, own) in batch.intervals(set) {
+            let whole = TrackKeys::whole(set, index);
+            self.interpolation.ends.check(whole.keys, index)?;
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
-                    let latest = stretch.times[stretch.times.len() - 1];
-                    let clock = FrameClock::new(*rate, *start, latest);
-                    self.frames(stretch, clock, &(0..samples), &mut output)?;
+                    let last = whole.all - 1;
+                    let clock = FrameClock::new(*rate, *start, whole.times[last]);
+                    // Cubics look at the keys beside their own too.
+                    let beside = usize::from(matches!(self.block, Block::Cubics(..)));
+                    let first = own.start.saturating_sub(beside);
+                    let keys = whole.between(first, (own.end + beside).min(last));
+                    self.frames(keys, clock, window, &mut output)?;
                 }
-                Ticks::Times {
-                    times: asked,
-                    stride,
-                } => {
-                    let own = &asked[index * stride..][..samples];
-                    self.times(stretch, own, &mut output);
+                Ticks::Times { times, stride } => {
+                    let own = &times[index * stride..][..timeline.len()];
+                    self.times(whole, own, &mut output);
                 }
             }
         }
         Ok(self.block.flush(&mut output))
     }
 
-    /// The samples of some intervals of a track, `window`; whether any was left out.
-    pub(crate) fn stretch(
-        &mut self,
-        stretch: Stretch<'a>,
-        clock: FrameClock,
-        window: &Range<usize>,
-        output: &mut [[f32; 4]],
-    ) -> Result<bool, Error> {
-        let mut output = output.iter_mut();
-        self.frames(stretch, clock, window, &mut output)?;
-        Ok(self.block.flush(&mut output))
-    }
-
-    /// The samples in `window` of a stretch's intervals, and of what lies beside the
-    /// track where it ends, one behind the other.
+    /// The frames in `window`, which lie between these keys or beside the whole track.
     fn frames(
         &mut self,
-        stretch: Stretch<'a>,
+        keys: TrackKeys<'a>,
         clock: FrameClock,
         window: &Range<usize>,
         output: &mut Output<'_>,
-    ) -> Result<(), Error> {
-        let samples = self.plan.samples(stretch, clock, window)?;
+    ) -> Result<(), FramesError> {
+        let samples = self.plan.samples(keys, clock, window)?;
         match &mut self.block {
-            Block::ByTwo(block) => {
+            Block::TwoKeys(block) => {
                 let mut samples = samples;
                 if block.form == Form::Arc
-                    && let Some(sign) = stretch.signs.shared()
+                    && let Some(sign) = keys.signs.shared()
                 {
                     block.flush(output);
                     let left = std::mem::take(output).into_slice();
                     let mut run = ArcRun {
                         samples,
-                        keys: bytemuck::cast_slice(stretch.keys),
+                        keys: bytemuck::cast_slice(keys.keys),
                         sign,
                         output: &mut *left,
                         done: 0,
@@ -179,13 +113,13 @@ impl<'a> Sampled<'a> {
                     samples = &samples[done..];
                     *output = left[done..].iter_mut();
                 }
-                let keys = SignedKeys::new(stretch);
+                let keys = SignedKeys::new(keys);
                 for &sample in samples {
                     block.push(keys, sample, output);
                 }
             }
-            Block::ByFour(block, weights) => {
-                let keys = CubicKeys::new(stretch, weights);
+            Block::Cubics(block, weights) => {
+                let keys = CubicKeys::new(keys, weights);
                 for &sample in samples {
                     block.push(keys, sample, output);
                 }
@@ -194,22 +128,22 @@ impl<'a> Sampled<'a> {
         Ok(())
     }
 
-    fn times(&mut self, stretch: Stretch<'a>, times: &[f64], output: &mut Output<'_>) {
+    fn times(&mut self, keys: TrackKeys<'a>, times: &[f64], output: &mut Output<'_>) {
         let (mut near, plan) = (0, &mut self.time_plan);
         let mut next = |time: f64| {
-            let sample = plan.sample(stretch.times, time, near);
+            let sample = plan.sample(keys.times, time, near);
             near = (sample.key & !IS_KEY) as usize;
             sample
         };
         match &mut self.block {
-            Block::ByTwo(block) => {
-                let keys = SignedKeys::new(stretch);
+            Block::TwoKeys(block) => {
+                let keys = SignedKeys::new(keys);
                 for &time in times {
                     block.push(keys, next(time), output);
                 }
             }
-            Block::ByFour(block, weights) => {
-                let keys = CubicKeys::new(stretch, weights);
+            Block::Cubics(block, weights) => {
+                let keys = CubicKeys::new(keys, weights);
                 for &time in times {
                     block.push(keys, next(time), output);
                 }
@@ -219,16 +153,16 @@ impl<'a> Sampled<'a> {
 }
 
 impl Block<'_> {
-    /// Works out what waits; whether anything was left out since the last time.
+    /// Works out what waits; whether all since the last time was resolved.
     fn flush(&mut self, output: &mut Output<'_>) -> bool {
         match self {
-            Block::ByTwo(block) => {
+            Block::TwoKeys(block) => {
                 block.flush(output);
-                false
+                true
             }
-            Block::ByFour(block, _) => {
+            Block::Cubics(block, _) => {
                 block.flush(output);
-                std::mem::take(&mut block.wild) > 0
+                std::mem::take(&mut block.unresolved) == 0
             }
         }
     }
@@ -242,10 +176,10 @@ struct SignedKeys<'a> {
 }
 
 impl<'a> SignedKeys<'a> {
-    fn new(stretch: Stretch<'a>) -> Self {
+    fn new(keys: TrackKeys<'a>) -> Self {
         Self {
-            as_given: bytemuck::cast_slice(stretch.keys),
-            signs: Some(stretch.signs).filter(|signs| signs.any()),
+            as_given: bytemuck::cast_slice(keys.keys),
+            signs: Some(keys.signs).filter(|signs| signs.any()),
         }
     }
 
@@ -270,10 +204,10 @@ struct CubicKeys<'a> {
 }
 
 impl<'a> CubicKeys<'a> {
-    fn new<'t: 'a>(stretch: Stretch<'t>, weights: &'a mut TrackWeights<'t>) -> Self {
+    fn new<'t: 'a>(keys: TrackKeys<'t>, weights: &'a mut TrackWeights<'t>) -> Self {
         Self {
-            keys: SignedKeys::new(stretch),
-            weights: weights.of(stretch.times, stretch.first_key, stretch.all),
+            keys: SignedKeys::new(keys),
+            weights: weights.of(keys.times, keys.first_key, keys.all),
         }
     }
 }
@@ -281,7 +215,7 @@ impl<'a> CubicKeys<'a> {
 /// What is still to be written.
 type Output<'a> = std::slice::IterMut<'a, [f32; 4]>;
 
-impl SampleBlock {
+impl TwoKeyBlock {
     /// Adds a sample, and works the block out when it is full.
     #[inline(always)]
     fn push(&mut self, keys: SignedKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
@@ -313,7 +247,7 @@ impl SampleBlock {
 }
 
 impl CubicBlock {
-    /// As [`SampleBlock::push`].
+    /// As [`TwoKeyBlock::push`].
     #[inline(always)]
     fn push(&mut self, from: CubicKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
         let lane = self.count;

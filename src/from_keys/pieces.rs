@@ -4,19 +4,14 @@
 use std::ops::Range;
 
 use glam::Quat;
-use rayon::prelude::*;
 
-use crate::cpu::engine::CpuEngine;
-use crate::engine::Error;
-use crate::from_keys::evaluate::{Straight, straight};
-use crate::from_keys::fallback::{LEFT_OUT, Row};
-use crate::method::interpolation::{Ends, Interpolation};
-use crate::output::rotations::Layout;
+use crate::from_keys::KeyCurve;
+use crate::method::interpolation::{Ends, Interpolation, InterpolationError};
 use crate::prepare::tangent_weights::WeightRule;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::key_samples::Stretch;
 use crate::tracks::set::TrackSet;
+use crate::tracks::track_keys::TrackKeys;
 
 /// Rows of one piece: workgroups along y.
 const ROWS: usize = 65_535;
@@ -30,41 +25,16 @@ pub(crate) struct KeyJob<'a> {
     pub(crate) tracks: Range<usize>,
     pub(crate) interpolation: &'a Interpolation,
     pub(crate) timeline: &'a Timeline,
-    /// What its samples are made of.
-    pub(crate) straight: Straight,
+    /// The curves that its samples lie on.
+    pub(crate) curve: KeyCurve,
 }
 
 impl<'a> KeyJob<'a> {
-    /// Nothing where a device needs segments. It gets about `most` keys and samples at
-    /// once.
-    pub(crate) fn new(
-        set: &'a TrackSet,
-        tracks: Range<usize>,
-        interpolation: &'a Interpolation,
-        timeline: &'a Timeline,
-        layout: Layout,
-        most: usize,
-    ) -> Option<Self> {
-        let is_row = layout == Layout::TrackMajor || timeline.len() == 1;
-        let straight = straight(set, interpolation, timeline)?;
-        // Where samples are explicit times, a track is not cut.
-        let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
-        let by_pieces = in_order || set.longest().max(timeline.len()) <= most;
-        let suits = is_row && by_pieces;
-        suits.then_some(Self {
-            set,
-            tracks,
-            interpolation,
-            timeline,
-            straight,
-        })
-    }
-
     /// Those of cubics; arcs have none.
     pub(crate) fn weights(&self) -> Option<WeightRule> {
-        match self.straight {
-            Straight::Cubics(weights) => Some(weights),
-            Straight::Arcs | Straight::Pairs => None,
+        match self.curve {
+            KeyCurve::Cubics(weights) => Some(weights),
+            KeyCurve::Arcs | KeyCurve::TwoKeys => None,
         }
     }
 
@@ -72,20 +42,6 @@ impl<'a> KeyJob<'a> {
     /// the keys of a piece do.
     pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
         self.weights().is_none().then_some(self.set.keys())
-    }
-
-    /// Works out on the CPU what the device left 0, because it turns too much.
-    pub(crate) fn mend(&self, output: &mut [[f32; 4]]) -> Result<(), Error> {
-        let left_out = |some: &[[f32; 4]]| some.contains(&LEFT_OUT);
-        if self.weights().is_none() || !output.par_chunks(TASK_KEYS).any(left_out) {
-            return Ok(());
-        }
-        let engine = CpuEngine::widest();
-        let rows = output.par_chunks_mut(self.timeline.len());
-        (rows.zip(self.tracks.clone())).try_for_each(|(row, index)| {
-            let whole = Row::whole(self.set, index, self.interpolation, self.timeline);
-            engine.mend(whole, row)
-        })
     }
 
     /// The pieces of it, which lie in the result one behind the other.
@@ -100,7 +56,7 @@ impl<'a> KeyJob<'a> {
 
 /// Some samples of a track, and the keys that they lie among.
 pub(crate) struct Part<'a> {
-    pub(crate) stretch: Stretch<'a>,
+    pub(crate) keys: TrackKeys<'a>,
     pub(crate) window: Range<usize>,
 }
 
@@ -147,26 +103,17 @@ struct Long {
 
 impl<'a, 'j> KeyPieces<'a, 'j> {
     /// The next piece, of about so many keys and so many samples at most.
-    pub(crate) fn next(&mut self, most: usize) -> Result<Option<KeyPiece<'a, 'j>>, Error> {
+    pub(crate) fn next(
+        &mut self,
+        most: usize,
+    ) -> Result<Option<KeyPiece<'a, 'j>>, InterpolationError> {
         let job = self.job;
         if let Some(piece) = self.next_of_long(most) {
             return Ok(Some(piece));
         }
         let (set, samples, first) = (job.set, job.timeline.len(), self.next);
         let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
-        // The first track of `tracks` that is not among those with so many keys together.
-        let within = |tracks: Range<usize>, most: usize| {
-            let (mut low, mut high) = (tracks.start, tracks.end);
-            while low < high {
-                let middle = low.midpoint(high);
-                if set.keys_of(tracks.start..middle + 1) <= most {
-                    low = middle + 1;
-                } else {
-                    high = middle;
-                }
-            }
-            low
-        };
+        let within = |tracks: Range<usize>, most| set.tracks_within(tracks, most);
         let rows = most / samples.max(1);
         let end = within(first..job.tracks.end, most).min(first.saturating_add(rows));
         let is_long = end == first;
@@ -225,7 +172,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
                 break;
             }
             let part = self.part_of(long, each);
-            let (keys, samples) = (part.stretch.keys.len(), part.window.len());
+            let (keys, samples) = (part.keys.keys.len(), part.window.len());
             piece.keys += keys;
             piece.samples += samples;
             piece.tasks.push(Task {
@@ -239,7 +186,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
 
     /// A stretch of a track that is more than a piece, and what of it is left.
     fn part_of(&mut self, long: Long, most: usize) -> Part<'a> {
-        let whole = Stretch::whole(self.job.set, long.track);
+        let whole = TrackKeys::whole(self.job.set, long.track);
         let times = whole.times;
         let samples = self.job.timeline.len();
         let last = whole.all - 1;
@@ -265,7 +212,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         let beside = usize::from(self.job.weights().is_some());
         let first = long.key.saturating_sub(beside);
         Part {
-            stretch: whole.between(first, (last_key + beside).min(last)),
+            keys: whole.between(first, (last_key + beside).min(last)),
             window: long.sample..sample,
         }
     }
@@ -273,7 +220,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
 
 impl<'a> KeyJob<'a> {
     /// Refuses tracks that do not end as they must.
-    fn check(&self, tracks: Range<usize>) -> Result<(), Error> {
+    fn check(&self, tracks: Range<usize>) -> Result<(), InterpolationError> {
         let ends = self.interpolation.ends;
         if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
             for track in tracks {
@@ -286,7 +233,7 @@ impl<'a> KeyJob<'a> {
     /// All of a track.
     pub(crate) fn track(&self, index: usize) -> Part<'a> {
         Part {
-            stretch: Stretch::whole(self.set, index),
+            keys: TrackKeys::whole(self.set, index),
             window: 0..self.timeline.len(),
         }
     }

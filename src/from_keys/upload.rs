@@ -13,8 +13,9 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks};
-use crate::time::key_samples::{FramePlan, Stretch, TimeLanes, key_before};
+use crate::time::key_samples::{FramePlan, TimeLanes, key_before};
 use crate::tracks::set::TrackSet;
+use crate::tracks::track_keys::TrackKeys;
 
 impl KeyPiece<'_, '_> {
     pub(crate) fn rows(&self) -> RowShape {
@@ -49,7 +50,7 @@ impl KeyPiece<'_, '_> {
         self.tasks.iter().all(|task| {
             let signs = match &task.what {
                 What::Tracks(tracks) => self.job.set.signs_of(tracks.clone()),
-                What::Part(part) => part.stretch.signs,
+                What::Part(part) => part.keys.signs,
             };
             !signs.any()
         })
@@ -128,12 +129,12 @@ impl KeyPiece<'_, '_> {
         known: &mut Known<'p>,
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
-        let keys: &[[u32; 4]] = bytemuck::cast_slice(part.stretch.keys);
-        let first_key = written.place_of(self.job.set, part.stretch.index, part.stretch.first_key);
+        let keys: &[[u32; 4]] = bytemuck::cast_slice(part.keys.keys);
+        let first_key = written.place_of(self.job.set, part.keys.index, part.keys.first_key);
         if written.lent.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
             own.copy_from_slice(keys);
-            let signs = part.stretch.signs;
+            let signs = part.keys.signs;
             if signs.any() {
                 for (i, key) in own.iter_mut().enumerate() {
                     key[0] |= if signs.is_turned(i) { SIGN_TURNED } else { 0 };
@@ -150,12 +151,12 @@ impl KeyPiece<'_, '_> {
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
             let all = std::mem::take(&mut written.weights);
             let (own, others) = all.split_at_mut(keys.len());
-            let Stretch {
+            let TrackKeys {
                 times,
                 first_key,
                 all,
                 ..
-            } = part.stretch;
+            } = part.keys;
             own.copy_from_slice(weights.of(times, first_key, all));
             written.weights = others;
         }
@@ -175,9 +176,9 @@ impl KeyPiece<'_, '_> {
         let Ticks::Frames { rate, start } = timeline.ticks else {
             return Ok(());
         };
-        let all = set.times_and_keys(part.stretch.index).0;
+        let all = set.times_and_keys(part.keys.index).0;
         let clock = FrameClock::new(rate, start, all[all.len() - 1]);
-        let found = known.frames.samples(part.stretch, clock, &part.window)?;
+        let found = known.frames.samples(part.keys, clock, &part.window)?;
         for (sample, found) in samples.iter_mut().zip(found) {
             *sample = KeySample {
                 key: found.key + first_key,

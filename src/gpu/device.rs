@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::device::Reads;
 use crate::gpu::buffer::may_be_lent;
 use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::options::Reads;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 
 /// An opened device, destroyed with its last user unless it was handed in.

@@ -3,14 +3,14 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::device::{EngineOptions, Timings, Transfer};
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::VulkanError;
+use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeySlot;
 use crate::gpu::imported_memory::Lent;
 use crate::gpu::in_flight::{External, Slot, Target};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
+use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
@@ -19,7 +19,7 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Item, KERNELS, Kernel};
-use crate::time::frames::{FramesError, Timeline};
+use crate::time::frames::Timeline;
 use crate::time::window::Window;
 
 /// Rotations of one window, unless limits, the budget or the device's speed say less:
@@ -78,15 +78,6 @@ impl Job<'_> {
     fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
     }
-}
-
-/// What may fail in an evaluation.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum EvaluateError {
-    #[error(transparent)]
-    Vulkan(#[from] VulkanError),
-    #[error(transparent)]
-    Frames(#[from] FramesError),
 }
 
 impl VulkanEngine {

@@ -2,6 +2,10 @@
 
 use ash::vk;
 
+use crate::method::interpolation::InterpolationError;
+use crate::prepare::error::SetError;
+use crate::time::frames::FramesError;
+
 /// Why a Vulkan device could not be used, or stopped working.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -139,5 +143,26 @@ pub(crate) trait Named<T> {
 impl<T> Named<T> for ash::prelude::VkResult<T> {
     fn named(self, call: &'static str) -> Result<T, VulkanError> {
         self.map_err(|result| VulkanError::Call { call, result })
+    }
+}
+
+/// What may fail in an evaluation.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum EvaluateError {
+    #[error(transparent)]
+    Vulkan(#[from] VulkanError),
+    #[error(transparent)]
+    Set(#[from] SetError),
+}
+
+impl From<FramesError> for EvaluateError {
+    fn from(error: FramesError) -> Self {
+        Self::Set(error.into())
+    }
+}
+
+impl From<InterpolationError> for EvaluateError {
+    fn from(error: InterpolationError) -> Self {
+        Self::Set(error.into())
     }
 }

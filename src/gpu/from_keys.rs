@@ -8,14 +8,13 @@ use std::time::Instant;
 
 use glam::Quat;
 
-use crate::engine::Error;
-use crate::from_keys::evaluate::Straight;
+use crate::from_keys::KeyCurve;
 use crate::from_keys::pieces::{KeyJob, KeyPiece};
 use crate::from_keys::upload::Keys;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{SLOTS, VulkanEngine};
-use crate::gpu::error::VulkanError;
+use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::Lent;
 use crate::gpu::in_flight::{Slot, Stopwatch, Target, copy};
 use crate::gpu::pipeline::Pipeline;
@@ -62,7 +61,7 @@ impl VulkanEngine {
         &self,
         job: &KeyJob<'_>,
         output: &mut [[f32; 4]],
-    ) -> Result<(), Error> {
+    ) -> Result<(), EvaluateError> {
         let mut slots = self
             .key_slots
             .lock()
@@ -95,7 +94,7 @@ impl VulkanEngine {
         // Also after an error: what was submitted uses the slots' buffers.
         for i in 1..=SLOTS {
             let finished = slots[(next + i) % SLOTS].finish(&mut lent.target, &mut stopwatch);
-            result = result.and(finished.map_err(Error::from));
+            result = result.and(finished.map_err(EvaluateError::from));
         }
         if result.is_ok() {
             lent.has_come_back();
@@ -117,11 +116,11 @@ impl VulkanEngine {
         next: &mut usize,
         lent: &mut Borrowed<'_>,
         stopwatch: &mut Stopwatch,
-    ) -> Result<(), Error> {
-        let kernel = match job.straight {
-            Straight::Arcs => Kernel::FromKeysArcs,
-            Straight::Pairs => Kernel::FromKeysTwoKeys,
-            Straight::Cubics(_) => Kernel::FromKeysCubics,
+    ) -> Result<(), EvaluateError> {
+        let kernel = match job.curve {
+            KeyCurve::Arcs => Kernel::FromKeysArcs,
+            KeyCurve::TwoKeys => Kernel::FromKeysTwoKeys,
+            KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
         };
         let pipeline = self.pipeline(kernel)?;
         let mut pieces = job.pieces();
@@ -166,7 +165,7 @@ impl KeySlot {
         piece: &KeyPiece<'_, '_>,
         lent: &Borrowed<'_>,
         output: Range<usize>,
-    ) -> Result<(), Error> {
+    ) -> Result<(), EvaluateError> {
         let [key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
         let place = match &lent.target {
             Target::Lent(memory) if !output.is_empty() => {

@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use rayon::prelude::*;
 
-use crate::device::Timings;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::EvaluateError;
+use crate::gpu::error::EvaluateError;
 use crate::gpu::error::VulkanError;
 use crate::gpu::imported_memory::Lent;
+use crate::gpu::options::Timings;
 use crate::gpu::sample_list::Singles;
 use crate::gpu::submission::{Spent, Submission};
 use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};

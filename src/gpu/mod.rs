@@ -12,6 +12,7 @@ pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
 pub(crate) mod mapped;
+pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
 pub(crate) mod pose_pass;

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::device::Reads;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
+use crate::gpu::options::Reads;
 use crate::shader::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.

@@ -3,10 +3,9 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use crate::device::EngineOptions;
-use crate::engine::Error;
-use crate::gpu::engine::{ClipBuffers, EvaluateError, VulkanEngine};
-use crate::gpu::error::VulkanError;
+use crate::gpu::engine::{ClipBuffers, VulkanEngine};
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::CanaryReport;
 use crate::prepare::clip_data::ClipData;
@@ -38,16 +37,7 @@ impl OfDevice for EvaluateError {
     fn vulkan(&self) -> Option<&VulkanError> {
         match self {
             Self::Vulkan(error) => Some(error),
-            Self::Frames(_) => None,
-        }
-    }
-}
-
-impl OfDevice for Error {
-    fn vulkan(&self) -> Option<&VulkanError> {
-        match self {
-            Self::Vulkan(error) => Some(error),
-            _ => None,
+            Self::Set(_) => None,
         }
     }
 }

@@ -7,7 +7,8 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::gpu::buffer::Residence;
-use crate::gpu::engine::{EvaluateError, Job, SLOTS, VulkanEngine};
+use crate::gpu::engine::{Job, SLOTS, VulkanEngine};
+use crate::gpu::error::EvaluateError;
 use crate::gpu::in_flight::{Finish, Slot, Stopwatch, Target};
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;

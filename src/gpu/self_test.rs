@@ -1,7 +1,7 @@
 //! Canaries: before a device is trusted it computes a fixed set of inputs, and
 //! every bit is compared with the CPU.
 
-use crate::gpu::engine::EvaluateError;
+use crate::gpu::error::EvaluateError;
 use crate::shader::Kernel;
 use std::sync::Arc;
 
@@ -49,9 +49,12 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
         ("polynomial kernel", BESSEL_OVERHAUSER),
     ] {
         let set = hostile_set();
-        let wanted = Wanted::all(&set, Some(engine.group_bytes()));
+        let wanted = Wanted {
+            group_bytes: Some(engine.group_bytes()),
+            ..Wanted::all(&set)
+        };
         let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
-        let cpu = CpuEngine::new(VectorWidth::Baseline, None).expect("no threads of its own");
+        let cpu = CpuEngine::on_shared_threads(VectorWidth::Baseline);
         let buffers = engine.upload(&clip, None)?;
         let mut report = CanaryReport {
             name,
@@ -76,12 +79,10 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
                 timeline: &timeline,
                 encoding: Encoding::F32,
             };
-            engine
-                .evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found))
-                .map_err(|error| match error {
-                    EvaluateError::Vulkan(error) => error,
-                    EvaluateError::Frames(error) => unreachable!("short gaps: {error}"),
-                })?;
+            match engine.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found)) {
+                Err(EvaluateError::Vulkan(error)) => return Err(error),
+                done => done.expect("short gaps"),
+            }
             report.total += whole.len();
             report.differing += differing(&expected, &found);
         }
@@ -224,7 +225,7 @@ fn probes() -> Vec<Probe> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Reads;
+    use crate::gpu::options::Reads;
     use crate::gpu::physical::{DeviceKind, list};
 
     /// A comparison that cannot fail proves nothing: without the decorations

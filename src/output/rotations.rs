@@ -15,6 +15,11 @@ pub enum Layout {
 }
 
 impl Layout {
+    /// The layout of a result of so many samples: one sample lies by tracks either way.
+    pub(crate) fn of(self, samples: usize) -> Self {
+        if samples == 1 { Self::TrackMajor } else { self }
+    }
+
     /// Where a sample of a track lies among `tracks × samples` rotations.
     #[must_use]
     pub fn index(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {

@@ -4,7 +4,9 @@
 use crate::pose::on_cpu;
 use glam::{Quat, Vec3};
 
-use crate::engine::{Backend, Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::backend::Backend;
 use crate::gpu::engine::VulkanEngine;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations};

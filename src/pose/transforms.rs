@@ -1,11 +1,11 @@
 //! Rotations with the translations and the scales beside them.
 
-use std::sync::{Arc, Mutex};
-
 use glam::{Vec3, Vec4};
 
 use crate::clip::Clip;
-use crate::engine::{Backend, Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::output::rotations::{Layout, Rotations};
@@ -93,19 +93,9 @@ impl Engine {
         method: VectorMethod,
         interpolation: &Interpolation,
     ) -> Result<Clip, Error> {
-        let group_bytes = match &*self.backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(opened.engine().group_bytes()),
-        };
+        let group_bytes = self.backend.group_bytes();
         let data = ClipData::of_vectors(set, channel, method, interpolation, group_bytes);
-        let buffers = match &*self.backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, None)?)),
-        };
-        Ok(Clip {
-            engine: self.clone(),
-            data,
-            buffers: Mutex::new(buffers),
-        })
+        let uploaded = Uploaded::of_data(&self.backend, data, None)?;
+        Ok(Clip::new(self.clone(), uploaded))
     }
 }

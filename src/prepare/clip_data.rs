@@ -2,14 +2,18 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use crate::method::interpolation::{Axes, Interpolation, InterpolationError, Quantity};
+use crate::curve::segment::segment_size;
+use crate::method::interpolation::{Axes, Interpolation, InterpolationError, Quantity, Speed};
 use crate::method::vector_method::VectorMethod;
-use crate::prepare::set::prepare;
+use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::preparation::Preparation;
 use crate::prepare::{Part, Prepared, vectors};
+use crate::shader::Form;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::wrap::{Cycle, Outside};
 use crate::tracks::set::TrackSet;
@@ -38,7 +42,7 @@ pub(crate) struct PartRef<'a> {
 
 /// Which tracks of a set to prepare, and for what.
 pub(crate) struct Wanted<'a> {
-    pub(crate) tracks: Range<usize>,
+    pub(crate) batch: Batch,
     /// Groups are merged while their segments stay within so many bytes: each becomes a
     /// buffer of a device. Without a limit they stay as they were prepared.
     pub(crate) group_bytes: Option<usize>,
@@ -47,24 +51,68 @@ pub(crate) struct Wanted<'a> {
     pub(crate) few_groups: bool,
     /// The samples of one timeline: what is prepared serves no other then.
     pub(crate) only_for: Option<&'a Timeline>,
-    /// Only these intervals of the one track that is wanted.
-    pub(crate) intervals: Option<Range<usize>>,
     /// Memory to use again.
     pub(crate) spare: Vec<Prepared>,
 }
 
 impl Wanted<'_> {
     /// All of a set, for any samples.
-    pub(crate) fn all(set: &TrackSet, group_bytes: Option<usize>) -> Self {
+    pub(crate) fn all(set: &TrackSet) -> Self {
         Self {
-            tracks: 0..set.track_count(),
-            group_bytes,
+            batch: Batch::Tracks(0..set.track_count()),
+            group_bytes: None,
             few_groups: false,
             only_for: None,
-            intervals: None,
             spare: Vec::new(),
         }
     }
+
+    /// Keys of a group: so many that the groups are few, where that is wanted, but enough for
+    /// all threads.
+    fn group_keys(&self, set: &TrackSet, form: Form) -> usize {
+        let (Some(limit), true) = (self.group_bytes, self.few_groups) else {
+            return PART;
+        };
+        let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
+        let each = set.keys_of(self.batch.tracks()) / (4 * rayon::current_num_threads());
+        each.min(most).max(PART)
+    }
+}
+
+/// Prepares tracks of a set on all threads, in groups of batches, in order.
+fn prepare(
+    set: &TrackSet,
+    interpolation: &Interpolation,
+    wanted: Wanted<'_>,
+) -> Result<Vec<Prepared>, InterpolationError> {
+    let size = BatchSize {
+        keys: wanted.group_keys(set, interpolation.form()),
+        tracks: usize::MAX,
+        cut: (interpolation.speed == Speed::AsKeyed).then_some(PART),
+    };
+    let only_for = (wanted.only_for).filter(|_| interpolation.sides().are_held());
+    let first_track = wanted.batch.tracks().start as u32;
+    let spare = Mutex::new(wanted.spare);
+    let group = |batch: Batch| {
+        let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
+        prepared.clear();
+        let mut preparation = Preparation::new(interpolation);
+        if let Some(timeline) = only_for {
+            preparation.only_for(timeline, set);
+        }
+        if let Batch::Tracks(tracks) = &batch {
+            prepared.reserve(set.keys_of(tracks.clone()));
+        }
+        preparation.push(&mut prepared, set, batch.intervals(set))?;
+        // Their places are those among the tracks asked for.
+        for part in &mut prepared.parts {
+            part.track -= first_track;
+        }
+        Ok(prepared)
+    };
+    let batches: Vec<Batch> = Batches::new(set, wanted.batch, size).collect();
+    batches.into_par_iter().map(group).collect()
 }
 
 impl ClipData {

@@ -4,13 +4,15 @@
 //! device, so the CPU and every Vulkan device evaluate the same segments.
 
 pub(crate) mod arcs;
+pub(crate) mod batch;
 pub(crate) mod both_sides;
 pub(crate) mod clip_data;
 pub(crate) mod constant_velocity;
 pub(crate) mod double;
+pub(crate) mod error;
 pub(crate) mod motion;
 pub(crate) mod nodes;
-pub(crate) mod set;
+pub(crate) mod preparation;
 pub(crate) mod single;
 pub(crate) mod steps;
 pub(crate) mod tangent_weights;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Quat;
 
 use crate::method::interpolation::{Interpolation, InterpolationError, Quantity};
-use crate::prepare::set::Prepare;
+use crate::prepare::preparation::Prepare;
 use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::tracks::set::TrackSet;
 

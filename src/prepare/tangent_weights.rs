@@ -8,7 +8,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
 /// How the steps on both sides of a key count in its tangent.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WeightRule {
     /// Alike: Catmull-Rom.
     Alike,

@@ -5,8 +5,6 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use crate::math::canonical::{frame_number, round_f32};
 use crate::shader::IS_KEY;
 use crate::shader::KeySample;
@@ -16,53 +14,10 @@ use crate::time::frame_clock::{FrameClock, finite_scale, in_frames};
 use crate::time::frames::FramesError;
 use crate::time::interval_block::Occupied;
 use crate::time::runs::COUNTABLE;
-use crate::tracks::set::TrackSet;
-use crate::tracks::signs::Signs;
+use crate::tracks::track_keys::TrackKeys;
 
 /// Boundaries, or samples, worked out together.
 const LANES: usize = 64;
-
-/// Some intervals of a track that follow one another.
-#[derive(Clone, Copy)]
-pub(crate) struct Stretch<'a> {
-    pub(crate) times: &'a [f64],
-    pub(crate) keys: &'a [Quat],
-    /// The track's place in the set.
-    pub(crate) index: usize,
-    /// The first of their keys.
-    pub(crate) first_key: usize,
-    /// Keys of the whole track.
-    pub(crate) all: usize,
-    /// The signs that they count with.
-    pub(crate) signs: Signs<'a>,
-}
-
-impl<'a> Stretch<'a> {
-    /// All intervals of a track.
-    #[inline(always)]
-    pub(crate) fn whole(set: &'a TrackSet, index: usize) -> Self {
-        let (times, keys) = set.times_and_keys(index);
-        Self {
-            times,
-            keys,
-            index,
-            first_key: 0,
-            all: keys.len(),
-            signs: set.signs(index),
-        }
-    }
-
-    /// Those of a whole track between two of its keys.
-    pub(crate) fn between(self, first_key: usize, last_key: usize) -> Self {
-        Self {
-            times: &self.times[first_key..=last_key],
-            keys: &self.keys[first_key..=last_key],
-            signs: self.signs.between(first_key..last_key + 1),
-            first_key,
-            ..self
-        }
-    }
-}
 
 /// Where the frames of a window lie; what it needs to find out is kept.
 pub(crate) struct FramePlan<'a> {
@@ -95,15 +50,15 @@ impl<'a> FramePlan<'a> {
         }
     }
 
-    /// The samples of a window, their keys counted from the stretch's first; found out
+    /// The samples of a window, their keys counted from the first of those given; found out
     /// unless that is known already.
     pub(crate) fn samples(
         &mut self,
-        stretch: Stretch<'a>,
+        of: TrackKeys<'a>,
         clock: FrameClock,
         window: &Range<usize>,
     ) -> Result<&[KeySample], FramesError> {
-        let times = stretch.times;
+        let times = of.times;
         if std::ptr::eq(self.times, times) && self.clock == Some(clock) && self.window == *window {
             return Ok(&self.samples);
         }
@@ -139,8 +94,8 @@ impl<'a> FramePlan<'a> {
                         || distance(own.end - 1).abs() >= COUNTABLE)
                 {
                     return Err(FramesError::GapTooLong {
-                        track: stretch.index,
-                        key: stretch.first_key + block + j,
+                        track: of.index,
+                        key: of.first_key + block + j,
                         frames,
                     });
                 }

@@ -62,6 +62,11 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
+    /// Whether end values are held on both sides.
+    pub(crate) fn are_held(self) -> bool {
+        self == Self::default()
+    }
+
     pub(crate) fn repeats(self) -> bool {
         self.before.repeats() || self.after.repeats()
     }

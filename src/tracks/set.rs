@@ -261,6 +261,22 @@ impl TrackSet {
         self.first_key(tracks.end) - self.first_key(tracks.start)
     }
 
+    /// The first of some tracks that is not among those which have at most so many keys
+    /// together.
+    pub(crate) fn tracks_within(&self, tracks: Range<usize>, keys: usize) -> usize {
+        let most = self.first_key(tracks.start).saturating_add(keys);
+        let (mut low, mut high) = (tracks.start, tracks.end);
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.first_key(middle + 1) <= most {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
     /// The place of a track's first key among all; behind the last track, how many there are.
     fn first_key(&self, track: usize) -> usize {
         let range = self.tracks.get(track);

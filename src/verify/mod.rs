@@ -11,7 +11,8 @@ use glam::{DQuat, Quat};
 use rayon::prelude::*;
 
 use crate::device::Device;
-use crate::engine::{Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
 use crate::method::interpolation::Interpolation;
 use crate::output::rotations::Rotations;
 use crate::reference;

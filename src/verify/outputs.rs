@@ -4,7 +4,8 @@ use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
 
 use crate::device::Device;
-use crate::engine::{Engine, Error};
+use crate::engine::Engine;
+use crate::error::Error;
 use crate::method::interpolation::{Axes, Interpolation, Quantity, Speed};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations};

@@ -7,7 +7,7 @@ use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
 use crate::method::interpolation::{Ends, Interpolation, InterpolationError, Path};
 use crate::prepare::arcs::arc_lanes::LANES;
-use crate::prepare::set::Prepare;
+use crate::prepare::preparation::Prepare;
 use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::shader::ArcSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};

@@ -11,7 +11,7 @@ use crate::prepare::double::fitting::Fitting;
 use crate::prepare::double::handles::{FramesHeld, Steps};
 use crate::prepare::double::intervals::{Intervals, LANES, Stretch};
 use crate::prepare::motion::constant_speed::{Place, Waiting};
-use crate::prepare::set::Prepare;
+use crate::prepare::preparation::Prepare;
 use crate::prepare::single::curves::Direct;
 use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::simd::dispatch::in_lanes;

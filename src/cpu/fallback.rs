@@ -1,24 +1,20 @@
-//! Samples that were left out because their curves turn too much to be made straight from
-//! the keys: their intervals alone are prepared.
+//! Samples that the keys beside them do not give, because their curves turn too far for the
+//! small-angle series: their intervals alone are prepared.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
-use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Output;
-use crate::engine::Error;
+use crate::from_keys::UNRESOLVED;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::clip_data::PartRef;
-use crate::prepare::set::BATCH;
+use crate::prepare::batch::PART;
+use crate::prepare::error::SetError;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::wrap::Cycle;
 use crate::tracks::set::TrackSet;
-
-/// What stands for a sample that was left out: no rotation is 0.
-pub(crate) const LEFT_OUT: [f32; 4] = [0.0; 4];
 
 /// Intervals between two that are wanted, up to which they are one piece.
 const APART: usize = 2;
@@ -36,7 +32,7 @@ pub(crate) struct Row<'a> {
     pub(crate) key: usize,
 }
 
-/// Samples that were left out, and those between them.
+/// Samples that are not resolved, and those between them.
 struct Piece {
     intervals: Range<usize>,
     samples: Range<usize>,
@@ -46,17 +42,21 @@ struct Piece {
 type Batch<'o> = Vec<(Piece, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
-    /// Works out what was left out of a row.
-    pub(crate) fn mend(&self, row: Row<'_>, mut output: &mut [[f32; 4]]) -> Result<(), Error> {
+    /// Works out what is not resolved in a row.
+    pub(crate) fn resolve(
+        &self,
+        row: Row<'_>,
+        mut output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
         let pieces = row.pieces(output);
         let mut from = row.first;
         let mut batches: Vec<Batch<'_>> = Vec::new();
-        let mut intervals = BATCH;
+        let mut intervals = PART;
         for piece in pieces {
             let others = &mut output[piece.samples.start - from..];
             let (own, others) = others.split_at_mut(piece.samples.len());
             (from, output) = (piece.samples.end, others);
-            if intervals >= BATCH {
+            if intervals >= PART {
                 batches.push(Vec::new());
                 intervals = 0;
             }
@@ -65,53 +65,29 @@ impl CpuEngine {
                 batch.push((piece, own));
             }
         }
-        let mend = |batch: Batch<'_>| -> Result<(), Error> {
+        let resolve = |batch: Batch<'_>| -> Result<(), SetError> {
             let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
-            let Memory {
-                prepared,
-                preparation,
-                ..
-            } = &mut memory;
-            prepared.clear();
-            let pieces = (batch.iter()).map(|(piece, _)| (row.index, piece.intervals.clone()));
-            preparation.push(prepared, row.set, pieces)?;
-            for (part, (piece, own)) in prepared.parts.iter().zip(batch) {
-                let part = PartRef { prepared, part };
+            let intervals = (batch.iter()).map(|(piece, _)| (row.index, piece.intervals.clone()));
+            memory.prepare(row.set, intervals)?;
+            for (part, (piece, own)) in memory.parts().zip(batch) {
                 let own = &mut Output::Here(own);
                 self.part(part, row.timeline, &Cycle::own(piece.samples), own)?;
             }
             self.memories.give_back(memory);
             Ok(())
         };
-        batches.into_par_iter().try_for_each(mend)
+        batches.into_par_iter().try_for_each(resolve)
     }
 }
 
 impl<'a> Row<'a> {
-    /// All samples of a track.
-    pub(crate) fn whole(
-        set: &'a TrackSet,
-        index: usize,
-        interpolation: &'a Interpolation,
-        timeline: &'a Timeline,
-    ) -> Self {
-        Self {
-            set,
-            index,
-            interpolation,
-            timeline,
-            first: 0,
-            key: 0,
-        }
-    }
-
     fn pieces(&self, output: &[[f32; 4]]) -> Vec<Piece> {
         let (times, _) = self.set.times_and_keys(self.index);
         let last = times.len() - 1;
         let mut pieces: Vec<Piece> = Vec::new();
         let Ticks::Frames { rate, start } = self.timeline.ticks else {
             // They may be in any order.
-            if output.contains(&LEFT_OUT) {
+            if output.contains(&UNRESOLVED) {
                 pieces.push(Piece {
                     intervals: 0..last,
                     samples: self.first..self.first + output.len(),
@@ -121,7 +97,7 @@ impl<'a> Row<'a> {
         };
         let clock = FrameClock::new(rate, start, times[last]);
         for (sample, rotation) in (self.first..).zip(output) {
-            if *rotation != LEFT_OUT {
+            if *rotation != UNRESOLVED {
                 continue;
             }
             let time = self.timeline.time(self.index, sample);
@@ -137,7 +113,7 @@ impl<'a> Row<'a> {
             match pieces.last_mut() {
                 Some(Piece {
                     intervals, samples, ..
-                }) if interval <= intervals.end + APART && intervals.len() < BATCH => {
+                }) if interval <= intervals.end + APART && intervals.len() < PART => {
                     (intervals.end, samples.end) = (interval + 1, sample + 1);
                 }
                 _ => pieces.push(Piece {

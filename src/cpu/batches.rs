@@ -1,0 +1,123 @@
+//! Sets on the CPU, batch by batch: a thread prepares some intervals, evaluates them while
+//! their segments are in its cache, and forgets them.
+
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::scratch::Memory;
+use crate::cpu::streaming::Stage;
+use crate::method::interpolation::{Interpolation, InterpolationError};
+use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::clip_data::PartRef;
+use crate::prepare::error::SetError;
+use crate::simd::dispatch::bring_near;
+use crate::time::frames::Timeline;
+use crate::time::wrap::Cycle;
+use crate::tracks::set::TrackSet;
+
+/// Rotations of a batch at most, where results are long.
+const BATCH_ROTATIONS: usize = 3 * TASK;
+
+/// Keys of a batch: their segments stay in the cache.
+const BATCH_KEYS: usize = 1024;
+
+impl CpuEngine {
+    /// Evaluates some tracks, `[track][sample]`; whether long ones may be cut into parts,
+    /// which the threads share.
+    pub(crate) fn evaluate_batches(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        cuts_tracks: bool,
+        output: &mut [Quat],
+    ) -> Result<(), SetError> {
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let (samples, rotations) = (timeline.len(), output.len());
+        let threads = rayon::current_num_threads();
+        // As many tracks as fill blocks best, where there are batches enough for all threads.
+        let shared = tracks.len() / (8 * threads);
+        let size = BatchSize {
+            keys: BATCH_KEYS,
+            tracks: shared.clamp(TASK / samples, BATCH_ROTATIONS / samples),
+            cut: cuts_tracks.then_some(PART),
+        };
+        let keys = set.keys_of(tracks.clone());
+        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        let samples_of_a_run = || rotations / keys.max(1);
+        let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
+            let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);
+            let mut memory = self.memories.take(interpolation, timeline, set);
+            for (i, batch) in batches.iter().enumerate() {
+                memory.prepare(set, batch.intervals(set))?;
+                // By then the results have pushed everything out of the caches.
+                for (times, keys) in
+                    (batches.get(i + 1).into_iter()).flat_map(|next| next.times_and_keys(set))
+                {
+                    let some = keys.len().min(BATCH_KEYS);
+                    bring_near(bytemuck::cast_slice(&times[..some]));
+                    bring_near(bytemuck::cast_slice(&keys[..some]));
+                }
+                let own = batch.samples(set, timeline, PART);
+                for part in memory.parts() {
+                    stage.row(own.len(), |row, output| {
+                        let cycle = Cycle::own(own.start + row.start..own.start + row.end);
+                        self.part(part, timeline, &cycle, output)
+                    })?;
+                }
+            }
+            stage.finish();
+            self.memories.give_back(memory);
+            Ok(())
+        };
+        if batches.len() <= 1 {
+            return task((&batches, output));
+        }
+        // Several batches for each task, whose memory serves them all.
+        let each = batches.len().div_ceil(32 * threads);
+        let tasks = tasks(set, timeline, &batches, each, PART, output);
+        self.on_threads(|| tasks.into_par_iter().try_for_each(task))
+    }
+}
+
+/// Batches that lie in the result one behind the other, so many for each task, with their
+/// places; see [`Batch::samples`] for `part`.
+pub(crate) fn tasks<'b, 'o>(
+    set: &TrackSet,
+    timeline: &Timeline,
+    batches: &'b [Batch],
+    each: usize,
+    part: usize,
+    mut output: &'o mut [[f32; 4]],
+) -> Vec<(&'b [Batch], &'o mut [[f32; 4]])> {
+    let with_place = |batches: &'b [Batch]| {
+        let rotations = (batches.iter())
+            .map(|batch| batch.tracks().len() * batch.samples(set, timeline, part).len());
+        let (own, others) = std::mem::take(&mut output).split_at_mut(rotations.sum());
+        output = others;
+        (batches, own)
+    };
+    batches.chunks(each).map(with_place).collect()
+}
+
+impl Memory {
+    /// Prepares some intervals of tracks together; what was prepared before is forgotten.
+    pub(crate) fn prepare(
+        &mut self,
+        set: &TrackSet,
+        intervals: impl Iterator<Item = (usize, Range<usize>)>,
+    ) -> Result<(), InterpolationError> {
+        self.prepared.clear();
+        self.preparation.push(&mut self.prepared, set, intervals)
+    }
+
+    /// What was prepared.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = PartRef<'_>> {
+        let prepared = &self.prepared;
+        (prepared.parts.iter()).map(move |part| PartRef { prepared, part })
+    }
+}

@@ -1,0 +1,249 @@
+//! Clips on the CPU: windows of a result, cut into tasks for the threads.
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::evaluate::FEW;
+use crate::cpu::sparse_times::FewTimes;
+use crate::cpu::streaming::{Output, Stage};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::prepare::clip_data::ClipData;
+use crate::simd::dispatch::in_lanes_of;
+use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::window::Window;
+use crate::time::wrap::Cycle;
+
+/// Tracks whose rows are made before they are written into frames: whole cache lines.
+const TILE: usize = 16;
+
+/// Frames that one task evaluates: fewer would cost as much as they do.
+const TASK_FRAMES: usize = 256;
+
+impl CpuEngine {
+    /// Fills `output` with a window of the clip's result.
+    pub(crate) fn evaluate(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        output: &mut [Quat],
+    ) -> Result<(), FramesError> {
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        if output.is_empty() {
+            return Ok(());
+        }
+        // Waking a thread costs more than a task's worth of work.
+        if output.len() <= TASK {
+            return self.window(clip, timeline, window, 0, output);
+        }
+        if window.layout == Layout::FrameMajor {
+            let tasks = frame_tasks(window, output);
+            return self.on_threads(|| {
+                tasks
+                    .into_par_iter()
+                    .try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
+            });
+        }
+        let rotations = output.len();
+        self.on_threads(|| {
+            tasks(window, 1, output)
+                .into_par_iter()
+                .try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
+        })
+    }
+
+    /// As [`CpuEngine::evaluate`], encoded: a task's rotations are converted while they
+    /// are in the cache.
+    pub(crate) fn evaluate_encoded(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), FramesError> {
+        let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
+            rotations.resize(window.len(), [0.0; 4]);
+            self.window(clip, timeline, window, 0, rotations)?;
+            encoding.encode(rotations, output);
+            Ok(())
+        };
+        if window.len() <= TASK {
+            return match output {
+                [] => Ok(()),
+                _ => task(&mut Vec::new(), window, output),
+            };
+        }
+        self.on_threads(|| {
+            tasks(window, encoding.bytes(), output)
+                .into_par_iter()
+                .try_for_each_init(Vec::new, |rotations, (window, own)| {
+                    task(rotations, &window, own)
+                })
+        })
+    }
+
+    /// A window of a result of so many `rotations`, on this thread.
+    fn window(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        rotations: usize,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let in_rows = window.layout == Layout::TrackMajor || samples == 1;
+        if let Ticks::Times { times, stride } = &timeline.ticks
+            && samples <= FEW
+            && in_rows
+            && !clip.interpolation.sides().repeats()
+        {
+            let mut few = FewTimes {
+                clip,
+                times,
+                stride: *stride,
+                window,
+                output,
+                others: Vec::new(),
+            };
+            in_lanes_of(self.width, &mut few);
+            return few.others.into_iter().try_for_each(|place| {
+                let row = &mut output[place * samples..][..samples];
+                let track = window.tracks.start + place;
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut Output::Here(row))
+            });
+        }
+        match window.layout {
+            Layout::TrackMajor => {
+                let of_a_run = || clip.samples_of_a_run(timeline);
+                let mut stage = Stage::new(self.width, rotations, samples, of_a_run, output);
+                for track in window.tracks.clone() {
+                    stage.row(samples, |samples, output| {
+                        let first = window.samples.start + samples.start;
+                        self.row(clip, track, timeline, first, output)
+                    })?;
+                }
+                stage.finish();
+                Ok(())
+            }
+            Layout::FrameMajor => {
+                let frames = output.chunks_mut(tracks).collect();
+                self.frames(clip, timeline, window, frames)
+            }
+        }
+    }
+
+    /// A window of which each frame lies in a place of its own, on this thread.
+    fn frames(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        mut frames: Vec<&mut [[f32; 4]]>,
+    ) -> Result<(), FramesError> {
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let mut rows = vec![[0.0; 4]; samples * TILE.min(tracks)];
+        for first in (0..tracks).step_by(TILE) {
+            let own = first..(first + TILE).min(tracks);
+            for (row, place) in rows.chunks_mut(samples).zip(own.clone()) {
+                let track = window.tracks.start + place;
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut Output::Here(row))?;
+            }
+            for (sample, frame) in frames.iter_mut().enumerate() {
+                let column = rows[sample..].iter().step_by(samples);
+                for (place, rotation) in frame[own.clone()].iter_mut().zip(column) {
+                    *place = *rotation;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The samples of one track from `first` on.
+    fn row(
+        &self,
+        clip: &ClipData,
+        track: usize,
+        timeline: &Timeline,
+        first: usize,
+        output: &mut Output<'_, '_>,
+    ) -> Result<(), FramesError> {
+        let samples = first..first + output.samples().len();
+        if !clip.interpolation.sides().repeats() {
+            let cycle = Cycle::own(samples.clone());
+            return clip
+                .parts_of(track, timeline, samples)
+                .try_for_each(|part| self.part(part, timeline, &cycle, output));
+        }
+        for cycle in clip.cycles(track, timeline, samples) {
+            let own = cycle.samples.start - first..cycle.samples.end - first;
+            let own = &mut Output::Here(&mut output.samples()[own]);
+            clip.parts_in(track, &cycle)
+                .try_for_each(|part| self.part(part, timeline, &cycle, own))?;
+        }
+        Ok(())
+    }
+}
+
+/// A window of frames cut into tasks, each some frames of some tracks, with their places.
+fn frame_tasks<'a>(
+    window: &Window,
+    output: &'a mut [[f32; 4]],
+) -> Vec<(Window, Vec<&'a mut [[f32; 4]]>)> {
+    let tracks = window.tracks.len();
+    let frames_each = TASK_FRAMES.min(window.samples.len());
+    let tracks_each = (TASK / frames_each).max(TILE);
+    let mut all = Vec::new();
+    let blocks = output.chunks_mut(frames_each * tracks);
+    for (block, first) in blocks.zip(window.samples.clone().step_by(frames_each)) {
+        let samples = first..first + block.len() / tracks;
+        let starts = window.tracks.clone().step_by(tracks_each);
+        let of_block = all.len();
+        all.extend(starts.map(|start| {
+            let tracks = start..(start + tracks_each).min(window.tracks.end);
+            let window = Window {
+                start: 0,
+                tracks,
+                samples: samples.clone(),
+                layout: Layout::FrameMajor,
+            };
+            (window, Vec::with_capacity(samples.len()))
+        }));
+        for frame in block.chunks_mut(tracks) {
+            for (task, piece) in all[of_block..]
+                .iter_mut()
+                .zip(frame.chunks_mut(tracks_each))
+            {
+                task.1.push(piece);
+            }
+        }
+    }
+    all
+}
+
+/// A window cut into tasks, each with its own part of the output, which has `each`
+/// elements for a rotation.
+fn tasks<'a, T>(
+    window: &Window,
+    each: usize,
+    mut output: &'a mut [T],
+) -> Vec<(Window, &'a mut [T])> {
+    let with_output = |window: Window| {
+        let (own, others) = std::mem::take(&mut output).split_at_mut(window.len() * each);
+        output = others;
+        (window, own)
+    };
+    let limit = match window.layout {
+        Layout::TrackMajor => TASK,
+        Layout::FrameMajor => {
+            let share = window.samples.len() / (4 * rayon::current_num_threads());
+            TASK.max(share.min(TASK_FRAMES / 4) * window.tracks.len())
+        }
+    };
+    window.cut(limit).into_iter().map(with_output).collect()
+}

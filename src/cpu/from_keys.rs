@@ -1,0 +1,75 @@
+//! Sets with fewer samples than keys on the CPU: straight from keys, and by way of segments
+//! where curves turn too far for that.
+
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::batches::tasks;
+use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::fallback::Row;
+use crate::from_keys::KeyCurve;
+use crate::from_keys::evaluate::KeyEvaluator;
+use crate::method::interpolation::Interpolation;
+use crate::prepare::batch::{Batch, BatchSize, Batches};
+use crate::prepare::error::SetError;
+use crate::time::frames::{Ticks, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// Keys of one task.
+const TASK_KEYS: usize = 16 * 1024;
+
+impl CpuEngine {
+    /// Evaluates some tracks, `[track][sample]`.
+    pub(crate) fn evaluate_from_keys<'a>(
+        &self,
+        set: &'a TrackSet,
+        tracks: Range<usize>,
+        interpolation: &'a Interpolation,
+        curve: KeyCurve,
+        timeline: &Timeline,
+        output: &mut [Quat],
+    ) -> Result<(), SetError> {
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
+        let size = BatchSize {
+            keys: TASK_KEYS,
+            tracks: TASK / timeline.len(),
+            cut: in_order.then_some(TASK_KEYS),
+        };
+        let new = || KeyEvaluator::new(interpolation, curve);
+        let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
+            let window = batch.samples(set, timeline, usize::MAX);
+            let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
+            if is_resolved || window.is_empty() {
+                return Ok(());
+            }
+            let rows = output.chunks_mut(window.len());
+            batch
+                .intervals(set)
+                .zip(rows)
+                .try_for_each(|((index, own), output)| {
+                    let row = Row {
+                        set,
+                        index,
+                        interpolation,
+                        timeline,
+                        first: window.start,
+                        key: own.start,
+                    };
+                    self.resolve(row, output)
+                })
+        };
+        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        if let [batch] = &*batches {
+            return task(&mut new(), batch, output);
+        }
+        let tasks = tasks(set, timeline, &batches, 1, usize::MAX, output);
+        self.on_threads(|| {
+            (tasks.into_par_iter()).try_for_each_init(new, |evaluator, (batch, output)| {
+                task(evaluator, &batch[0], output)
+            })
+        })
+    }
+}

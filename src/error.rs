@@ -1,0 +1,85 @@
+//! Why an evaluation failed.
+
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::recovery::OfDevice;
+use crate::method::interpolation::InterpolationError;
+use crate::output::encoding::Encoding;
+use crate::prepare::error::SetError;
+use crate::simd::dispatch::UnknownWidth;
+use crate::time::frames::FramesError;
+
+/// Why an evaluation failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The samples asked for do not fit the set.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// A track cannot be interpolated as asked.
+    #[error(transparent)]
+    Interpolation(#[from] InterpolationError),
+    /// The Vulkan device could not be used, or stopped working.
+    #[error(transparent)]
+    Vulkan(#[from] VulkanError),
+    /// The output given is not as large as the result.
+    #[error("the output has room for {given} rotations; the result has {needed}")]
+    OutputLength {
+        /// Rotations that it holds.
+        given: usize,
+        /// Rotations of the result.
+        needed: usize,
+    },
+    /// The memory given for an encoded result is not as large as it.
+    #[error("the output has {given} bytes; the result has {needed}")]
+    OutputBytes {
+        /// Bytes that it holds.
+        given: usize,
+        /// Bytes of the result.
+        needed: usize,
+    },
+    /// Poses cannot be put together as asked.
+    #[error("{0}")]
+    Poses(&'static str),
+    /// Velocities and accelerations are no rotations, and cannot be stored as such.
+    #[error("{encoding:?} stores rotations, not velocities or accelerations; use F32 or Vector")]
+    NotRotations {
+        /// What was asked for.
+        encoding: Encoding,
+    },
+    /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
+    #[error("TUMBLE_VECTOR_WIDTH: {0}")]
+    VectorWidth(#[from] UnknownWidth),
+    /// The system refused worker threads.
+    #[error("worker threads could not be started: {reason}")]
+    Threads {
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl From<SetError> for Error {
+    fn from(error: SetError) -> Self {
+        match error {
+            SetError::Frames(error) => Self::Frames(error),
+            SetError::Interpolation(error) => Self::Interpolation(error),
+        }
+    }
+}
+
+impl From<EvaluateError> for Error {
+    fn from(error: EvaluateError) -> Self {
+        match error {
+            EvaluateError::Vulkan(error) => Self::Vulkan(error),
+            EvaluateError::Set(error) => error.into(),
+        }
+    }
+}
+
+impl OfDevice for Error {
+    fn vulkan(&self) -> Option<&VulkanError> {
+        match self {
+            Self::Vulkan(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The route of a set to its rotations, chosen once for a call. Every route gives the same
+//! bits; they differ in what they prepare and keep.
+
+use std::fmt;
+
+use crate::evaluate::backend::Backend;
+use crate::from_keys::KeyCurve;
+use crate::method::interpolation::{Interpolation, Speed};
+use crate::output::rotations::Layout;
+use crate::time::frames::{Ticks, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// Keys a track on average up to which tracks are not cut: there are enough of them for all
+/// threads.
+const LONG_TRACK: usize = 16 * 1024;
+
+/// How a set becomes rotations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Route {
+    /// Every sample straight from the keys beside it.
+    FromKeys(KeyCurve),
+    /// In batches: a thread of the CPU prepares some intervals, evaluates them while their
+    /// segments are in its cache, and forgets them.
+    Batches {
+        /// Whether a long track may be cut into several.
+        cuts_tracks: bool,
+    },
+    /// The segments of all tracks are prepared before the first is evaluated; on a Vulkan
+    /// device those of as many tracks at a time as it has memory for.
+    Clips {
+        /// Whether a long track may be cut where it has not.
+        cuts_tracks: bool,
+    },
+}
+
+impl Backend {
+    pub(crate) fn route(
+        &self,
+        set: &TrackSet,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+    ) -> Route {
+        let in_rows = layout.of(timeline.len()) == Layout::TrackMajor;
+        let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
+        let are_held = interpolation.sides().are_held();
+        let cuts_tracks = in_rows && in_order && are_held && interpolation.speed == Speed::AsKeyed;
+        if !in_rows || timeline.is_empty() {
+            return Route::Clips { cuts_tracks };
+        }
+        let curve = KeyCurve::of_set(set, interpolation, timeline);
+        match (self, curve) {
+            (Self::Cpu(_), Some(curve)) => Route::FromKeys(curve),
+            (Self::Cpu(_), None) => {
+                let are_short = set.key_count() <= LONG_TRACK * set.track_count();
+                match are_held && (are_short || cuts_tracks) {
+                    true => Route::Batches { cuts_tracks },
+                    false => Route::Clips { cuts_tracks },
+                }
+            }
+            (Self::Vulkan(opened), Some(curve)) => {
+                // Where samples are explicit times, a track is not cut.
+                let most = opened.engine().window();
+                match in_order || set.longest().max(timeline.len()) <= most {
+                    true => Route::FromKeys(curve),
+                    false => Route::Clips { cuts_tracks },
+                }
+            }
+            (Self::Vulkan(_), None) => Route::Clips { cuts_tracks },
+        }
+    }
+}
+
+impl fmt::Display for Route {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FromKeys(KeyCurve::Arcs) => {
+                f.write_str("fewer samples than keys: each sample straight from the two keys beside it")
+            }
+            Self::FromKeys(KeyCurve::TwoKeys) => f.write_str(
+                "fewer samples than keys, two keys a track: each sample straight from its track's keys",
+            ),
+            Self::FromKeys(KeyCurve::Cubics(_)) => f.write_str(
+                "fewer samples than keys, most of which turn little: each sample straight from the four keys around it; intervals that turn too far are prepared",
+            ),
+            Self::Batches { cuts_tracks } => {
+                f.write_str("in batches: a thread prepares about a thousand keys, evaluates them while their segments are in its cache, and forgets them")?;
+                match cuts_tracks {
+                    true => f.write_str("; long tracks are shared among the threads"),
+                    false => Ok(()),
+                }
+            }
+            Self::Clips { .. } => f.write_str(
+                "as a clip: all segments are prepared and brought to the device, as many tracks at a time as it has memory for, then evaluated",
+            ),
+        }
+    }
+}

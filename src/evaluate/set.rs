@@ -1,0 +1,245 @@
+//! From a set to its rotations, by its route.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::CpuEngine;
+use crate::cpu::fallback::Row;
+use crate::curve::segment::segment_size;
+use crate::evaluate::backend::Backend;
+use crate::evaluate::route::Route;
+use crate::evaluate::uploaded::Uploaded;
+use crate::from_keys::pieces::KeyJob;
+use crate::from_keys::{KeyCurve, UNRESOLVED};
+use crate::gpu::error::EvaluateError;
+use crate::gpu::recovery::Opened;
+use crate::method::interpolation::Interpolation;
+use crate::output::buffer::OutputBuffer;
+use crate::output::rotations::{Layout, Storage};
+use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::clip_data::Wanted;
+use crate::prepare::error::SetError;
+use crate::simd::dispatch::VectorWidth;
+use crate::time::frames::{FramesError, Timeline};
+use crate::time::window::Window;
+use crate::tracks::set::TrackSet;
+
+/// Bytes of segments that a Vulkan device gets at once where keys are many.
+const DENSE_BYTES: usize = 64 << 20;
+
+/// Rotations that one thread looks through for such as are not resolved.
+const LOOK: usize = 16 * 1024;
+
+impl Backend {
+    /// Evaluates a set, into memory of the device's where that saves a copy.
+    pub(crate) fn evaluate(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+    ) -> Result<Box<dyn Storage>, EvaluateError> {
+        let tracks = 0..set.track_count();
+        let route = self.route(set, &interpolation, timeline, layout);
+        if let Route::Clips { cuts_tracks } = route
+            && self
+                .clips(set, tracks.clone(), &interpolation, timeline, cuts_tracks)
+                .len()
+                == 1
+        {
+            let wanted = Wanted {
+                only_for: Some(timeline),
+                ..Wanted::all(set)
+            };
+            let clip = Uploaded::new(self, set, interpolation, wanted, None)?;
+            return clip.evaluate(self, timeline, layout);
+        }
+        let mut quats = OutputBuffer::new(tracks.len() * timeline.len());
+        self.evaluate_tracks(set, tracks, interpolation, timeline, layout, &mut quats)?;
+        Ok(Box::new(quats))
+    }
+
+    /// Some tracks at the samples of a timeline, which is the whole set's; `output` fits
+    /// them.
+    pub(crate) fn evaluate_tracks(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+        output: &mut [Quat],
+    ) -> Result<(), EvaluateError> {
+        let route = self.route(set, &interpolation, timeline, layout);
+        match (route, self) {
+            (Route::FromKeys(curve), Self::Cpu(engine)) => {
+                engine.evaluate_from_keys(set, tracks, &interpolation, curve, timeline, output)?;
+                Ok(())
+            }
+            (Route::FromKeys(curve), Self::Vulkan(opened)) => {
+                let job = KeyJob {
+                    set,
+                    tracks,
+                    interpolation: &interpolation,
+                    timeline,
+                    curve,
+                };
+                opened.evaluate_from_keys(&job, bytemuck::cast_slice_mut(output))
+            }
+            (Route::Batches { cuts_tracks: cut }, Self::Cpu(engine)) => {
+                engine.evaluate_batches(set, tracks, &interpolation, timeline, cut, output)?;
+                Ok(())
+            }
+            (Route::Batches { cuts_tracks } | Route::Clips { cuts_tracks }, _) => {
+                let clips = self.clips(set, tracks.clone(), &interpolation, timeline, cuts_tracks);
+                let layout = layout.of(timeline.len());
+                self.evaluate_clips(set, tracks, interpolation, timeline, layout, clips, output)
+            }
+        }
+    }
+
+    /// Batches of tracks whose segments fit the device's budget; and where keys are far more
+    /// than samples, batches that are quickly done with: fresh memory for all of their segments
+    /// would cost more than making them.
+    fn clips(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: &Interpolation,
+        timeline: &Timeline,
+        cuts_tracks: bool,
+    ) -> VecDeque<Batch> {
+        let whole = Batch::Tracks(tracks);
+        let Self::Vulkan(opened) = self else {
+            return [whole].into();
+        };
+        let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
+        let result = set.track_count() * timeline.len() * size_of::<Quat>();
+        let is_dense = (set.key_count() * key_bytes) / 4 > result;
+        let budget = opened.engine().clip_bytes().unwrap_or(usize::MAX);
+        let limit = match is_dense {
+            true => budget.min(DENSE_BYTES),
+            false => budget,
+        };
+        let keys = limit / key_bytes;
+        let size = BatchSize {
+            keys,
+            tracks: usize::MAX,
+            cut: cuts_tracks.then_some((keys / PART).max(1) * PART),
+        };
+        let batches: VecDeque<Batch> = Batches::new(set, whole.clone(), size).collect();
+        match batches.is_empty() {
+            true => [whole].into(),
+            false => batches,
+        }
+    }
+
+    /// Prepares and evaluates one batch after another.
+    #[allow(clippy::too_many_arguments)]
+    fn evaluate_clips(
+        &self,
+        set: &TrackSet,
+        tracks: Range<usize>,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        layout: Layout,
+        mut clips: VecDeque<Batch>,
+        output: &mut [Quat],
+    ) -> Result<(), EvaluateError> {
+        let is_whole = clips.len() == 1;
+        // What one clip needed, the next one uses again: fresh memory costs more than what is
+        // done with it.
+        let mut used: Option<Uploaded> = None;
+        let mut columns: Vec<Quat> = Vec::new();
+        while let Some(batch) = clips.pop_front() {
+            let own = batch.tracks();
+            let timeline = timeline.of_tracks(own.clone());
+            let (spare, buffers) = used
+                .take()
+                .map_or_else(Default::default, Uploaded::into_spare);
+            let wanted = Wanted {
+                batch: batch.clone(),
+                few_groups: !is_whole,
+                only_for: Some(&timeline),
+                spare,
+                ..Wanted::all(set)
+            };
+            let clip = match Uploaded::new(self, set, interpolation, wanted, buffers) {
+                Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() && own.len() > 1 => {
+                    let middle = own.start + own.len() / 2;
+                    clips.push_front(Batch::Tracks(middle..own.end));
+                    clips.push_front(Batch::Tracks(own.start..middle));
+                    continue;
+                }
+                clip => clip?,
+            };
+            let folded = clip.data.folded(&timeline);
+            let window = Window {
+                samples: batch.samples(set, &timeline, PART),
+                ..Window::whole(own.len(), timeline.len(), layout)
+            };
+            let evaluate = |output: &mut [Quat]| {
+                clip.evaluate_window(self, &folded, &window, output)
+                    .map_err(|error| error.of_tracks_from(own.start))
+            };
+            let place = own.start - tracks.start..own.end - tracks.start;
+            if layout == Layout::TrackMajor || place.len() == tracks.len() {
+                let start = place.start * timeline.len() + window.samples.start;
+                evaluate(&mut output[start..start + window.len()])?;
+            } else {
+                columns.resize(window.len(), Quat::IDENTITY);
+                evaluate(&mut columns)?;
+                let frames = output.chunks_mut(tracks.len());
+                for (frame, own) in frames.zip(columns.chunks(place.len())) {
+                    frame[place.clone()].copy_from_slice(own);
+                }
+            }
+            used = Some(clip);
+        }
+        Ok(())
+    }
+}
+
+impl Opened {
+    /// Evaluates a job straight from keys, and on the CPU what the device left unresolved.
+    fn evaluate_from_keys(
+        &self,
+        job: &KeyJob<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), EvaluateError> {
+        self.attempt_smaller(|engine| engine.evaluate_keys(job, output))?;
+        let unresolved = |some: &[[f32; 4]]| some.contains(&UNRESOLVED);
+        let is_cubic = matches!(job.curve, KeyCurve::Cubics(_));
+        if !is_cubic || !output.par_chunks(LOOK).any(unresolved) {
+            return Ok(());
+        }
+        let engine = CpuEngine::on_shared_threads(VectorWidth::widest());
+        let rows = output.par_chunks_mut(job.timeline.len());
+        rows.zip(job.tracks.clone())
+            .try_for_each(|(output, index)| {
+                let row = Row {
+                    set: job.set,
+                    index,
+                    interpolation: job.interpolation,
+                    timeline: job.timeline,
+                    first: 0,
+                    key: 0,
+                };
+                engine.resolve(row, output)
+            })?;
+        Ok(())
+    }
+}
+
+impl EvaluateError {
+    /// What it says of the tracks of a batch, said of the set's.
+    fn of_tracks_from(mut self, first: usize) -> Self {
+        if let Self::Set(SetError::Frames(FramesError::GapTooLong { track, .. })) = &mut self {
+            *track += first;
+        }
+        self
+    }
+}

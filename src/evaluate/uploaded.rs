@@ -1,0 +1,156 @@
+//! Prepared tracks on their device.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::Quat;
+
+use crate::evaluate::backend::Backend;
+use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::method::interpolation::Interpolation;
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Storage};
+use crate::prepare::Prepared;
+use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::prepare::error::SetError;
+use crate::time::frames::Timeline;
+use crate::time::window::Window;
+use crate::tracks::set::TrackSet;
+
+/// Prepared tracks, and their segments on a Vulkan device.
+pub(crate) struct Uploaded {
+    pub(crate) data: ClipData,
+    /// Brought there again when the device was lost.
+    buffers: Mutex<Option<Arc<ClipBuffers>>>,
+}
+
+impl Uploaded {
+    /// Prepares what is wanted of a set; into buffers that are no longer needed, where they
+    /// serve.
+    pub(crate) fn new(
+        backend: &Backend,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        mut wanted: Wanted<'_>,
+        spare: Option<ClipBuffers>,
+    ) -> Result<Self, EvaluateError> {
+        wanted.group_bytes = backend.group_bytes();
+        let data = ClipData::new(set, interpolation, wanted).map_err(SetError::from)?;
+        Ok(Self::of_data(backend, data, spare)?)
+    }
+
+    /// What is prepared.
+    pub(crate) fn of_data(
+        backend: &Backend,
+        data: ClipData,
+        spare: Option<ClipBuffers>,
+    ) -> Result<Self, VulkanError> {
+        let buffers = match backend {
+            Backend::Cpu(_) => None,
+            Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, spare)?)),
+        };
+        Ok(Self {
+            data,
+            buffers: Mutex::new(buffers),
+        })
+    }
+
+    /// What the next one can use again: its segments, and their buffers on a device.
+    pub(crate) fn into_spare(self) -> (Vec<Prepared>, Option<ClipBuffers>) {
+        let buffers = self.buffers.into_inner();
+        let buffers = buffers.unwrap_or_else(PoisonError::into_inner);
+        (self.data.groups, buffers.and_then(Arc::into_inner))
+    }
+
+    /// Evaluates all of it, into memory of the device's where that saves a copy.
+    pub(crate) fn evaluate(
+        &self,
+        backend: &Backend,
+        timeline: &Timeline,
+        layout: Layout,
+    ) -> Result<Box<dyn Storage>, EvaluateError> {
+        let timeline = self.data.folded(timeline);
+        match backend {
+            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
+                let buffers = self.buffers_on(engine)?;
+                engine.evaluate(&self.data, &buffers, &timeline, layout)
+            }),
+            Backend::Cpu(_) => {
+                let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
+                let mut quats = OutputBuffer::new(whole.len());
+                self.evaluate_window(backend, &timeline, &whole, &mut quats)?;
+                Ok(Box::new(quats))
+            }
+        }
+    }
+
+    /// Evaluates a window of the result, which `output` fits; explicit times are folded
+    /// into the keys.
+    pub(crate) fn evaluate_window(
+        &self,
+        backend: &Backend,
+        timeline: &Timeline,
+        window: &Window,
+        output: &mut [Quat],
+    ) -> Result<(), EvaluateError> {
+        match backend {
+            Backend::Cpu(engine) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
+            Backend::Vulkan(_) => {
+                let bytes = bytemuck::cast_slice_mut(output);
+                self.evaluate_encoded(backend, timeline, window, Encoding::F32, bytes)
+            }
+        }
+    }
+
+    /// As [`Uploaded::evaluate_window`], encoded.
+    pub(crate) fn evaluate_encoded(
+        &self,
+        backend: &Backend,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        match backend {
+            Backend::Cpu(engine) => {
+                Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
+            }
+            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
+                let buffers = self.buffers_on(engine)?;
+                let job = Job {
+                    clip: &self.data,
+                    buffers: &buffers,
+                    timeline,
+                    encoding,
+                };
+                engine.evaluate_into(job, window, output)
+            }),
+        }
+    }
+
+    /// The segments on a device; brought there where it is not the one that had them.
+    pub(crate) fn buffers_on(
+        &self,
+        engine: &VulkanEngine,
+    ) -> Result<Arc<ClipBuffers>, VulkanError> {
+        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
+            return Ok(Arc::clone(there));
+        }
+        *buffers = None;
+        let there = Arc::new(engine.upload(&self.data, None)?);
+        *buffers = Some(Arc::clone(&there));
+        Ok(there)
+    }
+}
+
+impl Backend {
+    /// Bytes of segments that go into one buffer of a Vulkan device.
+    pub(crate) fn group_bytes(&self) -> Option<usize> {
+        match self {
+            Self::Cpu(_) => None,
+            Self::Vulkan(opened) => Some(opened.engine().group_bytes()),
+        }
+    }
+}

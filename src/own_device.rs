@@ -1,0 +1,92 @@
+//! Evaluation on an application's own Vulkan device, and into its own buffers: what the
+//! application promises of its handles the compiler cannot check.
+#![allow(unsafe_code)]
+
+use crate::clip::Clip;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::backend::Backend;
+use crate::gpu::engine::{Job, VulkanEngine};
+use crate::gpu::error::VulkanError;
+use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
+use crate::gpu::in_flight::External;
+use crate::gpu::options::EngineOptions;
+use crate::gpu::recovery::Opened;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::time::frames::Frames;
+
+impl Engine {
+    /// Evaluates on an application's own Vulkan device.
+    ///
+    /// # Errors
+    /// As [`Engine::with_options`].
+    ///
+    /// # Safety
+    /// The handles must be valid and belong together, must outlive the engine and
+    /// all of its clips and results, and nobody else may use the queue while the
+    /// engine does.
+    pub unsafe fn from_vulkan(
+        handles: VulkanHandles,
+        options: &EngineOptions,
+    ) -> Result<Self, Error> {
+        // SAFETY: promised by the caller.
+        let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
+        Ok(Self::with_opened(Opened::trusted(engine, options)?))
+    }
+}
+
+impl Clip {
+    /// Evaluates into a buffer of the application's own, on the device that the engine
+    /// was made from ([`Engine::from_vulkan`]): the rotations stay there, for a
+    /// renderer or another kernel. Returns when they are written; what is submitted
+    /// to the queue afterwards sees them.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the frames do not fit the clip, the stretch is not
+    /// aligned or too short, or the device fails.
+    ///
+    /// # Safety
+    /// The buffer must belong to the engine's device, have memory, be made for use as
+    /// `STORAGE_BUFFER` and `TRANSFER_DST`, have the stretch given, and not be used by
+    /// anyone else before this returns.
+    pub unsafe fn evaluate_to_buffer(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+        buffer: VulkanBuffer,
+    ) -> Result<(), Error> {
+        self.check_encoding(encoding)?;
+        let timeline = self.timeline(frames)?;
+        let timeline = self.uploaded.data.folded(&timeline);
+        let rotation = encoding.bytes() as u64;
+        let needed = (self.track_count() * timeline.len()) as u64 * rotation;
+        let Backend::Vulkan(opened) = &*self.engine().backend else {
+            return Err(VulkanError::NoDevice.into());
+        };
+        if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {
+            return Err(Error::Vulkan(VulkanError::OwnBuffer {
+                offset: buffer.offset,
+                size: buffer.size,
+                rotation,
+                needed,
+            }));
+        }
+        let external = External {
+            raw: buffer.buffer,
+            offset: buffer.offset,
+        };
+        let done = opened.attempt_smaller(|engine| {
+            let buffers = self.uploaded.buffers_on(engine)?;
+            let job = Job {
+                clip: &self.uploaded.data,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding,
+            };
+            engine.evaluate_to(job, layout, external)
+        });
+        Ok(done?)
+    }
+}

@@ -1,0 +1,211 @@
+//! Sets in batches: what is prepared together, all of some tracks or some intervals of a long
+//! one.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{Ticks, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// Key intervals of a long track that are prepared as one part.
+pub(crate) const PART: usize = 4096;
+
+/// What is prepared together.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Batch {
+    /// All of some tracks.
+    Tracks(Range<usize>),
+    /// Some intervals of one track.
+    Intervals {
+        track: usize,
+        intervals: Range<usize>,
+    },
+}
+
+impl Batch {
+    /// The tracks that it is of.
+    pub(crate) fn tracks(&self) -> Range<usize> {
+        match *self {
+            Self::Tracks(ref tracks) => tracks.clone(),
+            Self::Intervals { track, .. } => track..track + 1,
+        }
+    }
+
+    /// Its intervals, by their tracks.
+    pub(crate) fn intervals(&self, set: &TrackSet) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let own = match self {
+            Self::Tracks(_) => None,
+            Self::Intervals { intervals, .. } => Some(intervals.clone()),
+        };
+        self.tracks().map(move |track| {
+            let all = || 0..set.times_and_keys(track).1.len() - 1;
+            (track, own.clone().unwrap_or_else(all))
+        })
+    }
+
+    /// The times and keys of its intervals, by their tracks.
+    pub(crate) fn times_and_keys<'a>(
+        &self,
+        set: &'a TrackSet,
+    ) -> impl Iterator<Item = (&'a [f64], &'a [Quat])> {
+        self.intervals(set).map(|(track, own)| {
+            let (times, keys) = set.times_and_keys(track);
+            (&times[own.start..=own.end], &keys[own.start..=own.end])
+        })
+    }
+
+    /// Its samples: those from its first key up to its end, and what lies before a track's
+    /// first key and after its last. Where it is cut into parts of so many intervals, each
+    /// settles by its own end which sample is a key but for rounding.
+    pub(crate) fn samples(&self, set: &TrackSet, timeline: &Timeline, part: usize) -> Range<usize> {
+        let Self::Intervals { track, intervals } = self else {
+            return 0..timeline.len();
+        };
+        let (times, _) = set.times_and_keys(*track);
+        let from = match intervals.start {
+            0 => 0,
+            start => first_sample(times, timeline, start, part),
+        };
+        let to = match intervals.end + 1 == times.len() {
+            true => timeline.len(),
+            false => first_sample(times, timeline, intervals.end, part),
+        };
+        from..to.max(from)
+    }
+}
+
+/// The first sample of the part that starts with an interval.
+fn first_sample(times: &[f64], timeline: &Timeline, interval: usize, part: usize) -> usize {
+    let Ticks::Frames { rate, start } = timeline.ticks else {
+        return 0;
+    };
+    let end = interval.saturating_add(part).min(times.len() - 1);
+    let clock = FrameClock::new(rate, start, times[end]);
+    (clock.first_frame(times[interval]) as usize).min(timeline.len())
+}
+
+/// How a set is cut into batches.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BatchSize {
+    /// Keys and tracks at most; a track with more keys is a batch of its own.
+    pub(crate) keys: usize,
+    pub(crate) tracks: usize,
+    /// Such a track is cut after so many intervals, where that is allowed.
+    pub(crate) cut: Option<usize>,
+}
+
+/// The batches of a set's tracks, or of a batch, in order.
+pub(crate) struct Batches<'a> {
+    set: &'a TrackSet,
+    size: BatchSize,
+    tracks: Range<usize>,
+    /// What is left of a track that is cut.
+    long: Option<(usize, Range<usize>)>,
+}
+
+impl<'a> Batches<'a> {
+    pub(crate) fn new(set: &'a TrackSet, whole: Batch, size: BatchSize) -> Self {
+        let (tracks, long) = match whole {
+            Batch::Tracks(tracks) => (tracks, None),
+            Batch::Intervals { track, intervals } => (0..0, Some((track, intervals))),
+        };
+        Self {
+            set,
+            size,
+            tracks,
+            long,
+        }
+    }
+}
+
+impl Iterator for Batches<'_> {
+    type Item = Batch;
+
+    fn next(&mut self) -> Option<Batch> {
+        if let Some((track, left)) = &mut self.long {
+            let own = self.size.cut.unwrap_or(usize::MAX).min(left.len());
+            let batch = Batch::Intervals {
+                track: *track,
+                intervals: left.start..left.start + own,
+            };
+            left.start += own;
+            if left.start == left.end {
+                self.long = None;
+            }
+            return Some(batch);
+        }
+        let Range { start, end } = self.tracks;
+        if start == end {
+            return None;
+        }
+        let most = end.min(start.saturating_add(self.size.tracks.max(1)));
+        let next = self.set.tracks_within(start..most, self.size.keys);
+        if next > start {
+            self.tracks.start = next;
+            return Some(Batch::Tracks(start..next));
+        }
+        self.tracks.start = start + 1;
+        let intervals = 0..self.set.times_and_keys(start).1.len() - 1;
+        if self.size.cut.is_some_and(|cut| cut < intervals.len()) {
+            self.long = Some((start, intervals));
+            return self.next();
+        }
+        Some(Batch::Tracks(start..start + 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::frames::Frames;
+
+    fn with_keys(counts: &[usize]) -> TrackSet {
+        let mut set = TrackSet::new();
+        for &count in counts {
+            let times: Vec<f64> = (0..count).map(|i| i as f64).collect();
+            let keys = vec![Quat::IDENTITY; count];
+            set.push("", &times, &keys).expect("unit keys in order");
+        }
+        set
+    }
+
+    #[test]
+    fn batches_have_no_more_than_they_may_and_leave_nothing_out() {
+        let set = with_keys(&[3, 3, 3, 1, 30, 2, 9, 1]);
+        let size = BatchSize {
+            keys: 8,
+            tracks: 3,
+            cut: Some(12),
+        };
+        let intervals = |track, intervals| Batch::Intervals { track, intervals };
+        let found: Vec<Batch> = Batches::new(&set, Batch::Tracks(0..8), size).collect();
+        let expected = [
+            Batch::Tracks(0..2),
+            Batch::Tracks(2..4),
+            intervals(4, 0..12),
+            intervals(4, 12..24),
+            intervals(4, 24..29),
+            Batch::Tracks(5..6),
+            Batch::Tracks(6..7),
+            Batch::Tracks(7..8),
+        ];
+        assert_eq!(found, expected);
+        let timeline = Frames::fps(2).resolve(8, set.time_span()).unwrap();
+        let samples: Vec<_> = (found[2..5].iter())
+            .map(|batch| batch.samples(&set, &timeline, PART))
+            .collect();
+        assert_eq!(samples, [0..24, 24..48, 48..59]);
+        assert_eq!(found[0].samples(&set, &timeline, PART), 0..59);
+
+        let whole = BatchSize { cut: None, ..size };
+        let long = Batches::new(&set, Batch::Tracks(4..5), whole).collect::<Vec<_>>();
+        assert_eq!(long, [Batch::Tracks(4..5)]);
+        let of_batch = Batches::new(&set, intervals(4, 3..20), size);
+        assert_eq!(
+            of_batch.collect::<Vec<_>>(),
+            [intervals(4, 3..15), intervals(4, 15..20)]
+        );
+    }
+}

@@ -1,0 +1,13 @@
+//! Why a set cannot be evaluated as asked, on any device.
+
+use crate::method::interpolation::InterpolationError;
+use crate::time::frames::FramesError;
+
+/// Why a set cannot be evaluated as asked, on any device.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum SetError {
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    #[error(transparent)]
+    Interpolation(#[from] InterpolationError),
+}
