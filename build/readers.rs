@@ -165,8 +165,10 @@ fn fields(read: &Read, module: &Module) -> (Vec<Field>, u32) {
         .global_variables
         .iter()
         .find(|(_, variable)| variable.name.as_deref() == Some(read.buffer))
-        .map(|(_, variable)| variable.ty)
-        .unwrap_or_else(|| panic!("{}: no such buffer", read.buffer));
+        .map_or_else(
+            || panic!("{}: no such buffer", read.buffer),
+            |(_, variable)| variable.ty,
+        );
     let TypeInner::Array { base, stride, .. } = module.types[variable].inner else {
         panic!("{}: not an array", read.buffer);
     };

@@ -8,8 +8,8 @@ use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Quantity;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations};
+use crate::output::window::Window;
 use crate::time::frames::{Frames, FramesError, Timeline};
-use crate::time::window::Window;
 
 /// A set prepared for one method, on its engine's device; evaluate it as often as
 /// needed, at any frames.

@@ -96,7 +96,7 @@ pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
 pub use crate::stream::Chunk;
 pub use crate::time::frame_rate::FrameRate;
 pub use crate::time::frames::{Frames, FramesError, MAX_FRAMES, Timeline};
-pub use crate::time::wrap::Outside;
+pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 pub use crate::tracks::error::TrackError;
 pub use crate::tracks::key_data::Tcb;

@@ -13,9 +13,9 @@ use crate::error::Error;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::Layout;
+use crate::output::window::Window;
 use crate::prepare::clip_data::Wanted;
 use crate::time::frames::Frames;
-use crate::time::window::Window;
 use crate::tracks::set::TrackSet;
 
 /// Some of a result: chunks come in the order in which the whole lies in memory, and

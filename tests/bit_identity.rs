@@ -7,8 +7,8 @@ use crate::support::{
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Outside,
-    Path, Reads, Rotations, TrackSet, Transfer, VectorWidth, method,
+    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path,
+    Reads, Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -580,7 +580,7 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
     }
     let frames = Frames::fps(240).between(-1.0, 4.0);
     let ends = [Ends::Parabolic, Ends::Natural, Ends::Loop, Ends::Frozen];
-    let outside = [Outside::Hold, Outside::Extrapolate];
+    let outside = [WrapMode::Hold, WrapMode::Extrapolate];
     for (method, path) in [
         (method::CATMULL_ROM, Path::Shortest),
         (method::BESSEL_OVERHAUSER, Path::Shortest),
@@ -956,11 +956,11 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         engines.extend(vulkan_engines(change));
     }
     for (method, outside) in [
-        (method::SLERP, Outside::Hold),
-        (method::SLERP, Outside::Extrapolate),
-        (method::STEP, Outside::Hold),
-        (method::CATMULL_ROM, Outside::Hold),
-        (method::CATMULL_ROM, Outside::Extrapolate),
+        (method::SLERP, WrapMode::Hold),
+        (method::SLERP, WrapMode::Extrapolate),
+        (method::STEP, WrapMode::Hold),
+        (method::CATMULL_ROM, WrapMode::Hold),
+        (method::CATMULL_ROM, WrapMode::Extrapolate),
     ] {
         let interpolation = Interpolation {
             before: outside,

@@ -16,7 +16,7 @@ use glam::{DVec3, Quat, Vec3};
 use sha2::{Digest, Sha256};
 use tumble::{
     Axes, Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS,
-    Method, Outside, Path, Quantity, Skeleton, Speed, Tcb, TrackSet, VectorMethod, VectorWidth,
+    Method, Path, Quantity, Skeleton, Speed, Tcb, TrackSet, VectorMethod, VectorWidth, WrapMode,
     method,
 };
 
@@ -420,10 +420,10 @@ impl Cases {
             );
         }
         let sides = [
-            Outside::Hold,
-            Outside::Loop,
-            Outside::Mirror,
-            Outside::Extrapolate,
+            WrapMode::Hold,
+            WrapMode::Loop,
+            WrapMode::Mirror,
+            WrapMode::Extrapolate,
         ];
         for method in [
             method::STEP,
@@ -444,7 +444,7 @@ impl Cases {
             }
         }
         let looped = Interpolation {
-            after: Outside::Loop,
+            after: WrapMode::Loop,
             ..shortest(method::SLERP)
         };
         let tomorrow = Frames::fps(60).between(86_400.0, 86_403.0);

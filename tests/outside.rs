@@ -4,15 +4,15 @@ use crate::support::{Random, first_difference, give_key_data, vulkan_engines};
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Axes, Device, Engine, Frames, Interpolation, Layout, METHODS, Outside, Quantity, Track,
-    TrackSet, method,
+    Axes, Device, Engine, Frames, Interpolation, Layout, METHODS, Quantity, Track, TrackSet,
+    WrapMode, method,
 };
 
-const ALL: [Outside; 4] = [
-    Outside::Hold,
-    Outside::Loop,
-    Outside::Mirror,
-    Outside::Extrapolate,
+const ALL: [WrapMode; 4] = [
+    WrapMode::Hold,
+    WrapMode::Loop,
+    WrapMode::Mirror,
+    WrapMode::Extrapolate,
 ];
 
 fn set(seed: u64, keys: usize) -> TrackSet {
@@ -40,17 +40,18 @@ fn set(seed: u64, keys: usize) -> TrackSet {
 }
 
 /// What the words say, by the reference.
-fn expected(curve: &Curve, track: Track, sides: [Outside; 2], time: f64) -> DQuat {
+fn expected(curve: &Curve, track: Track, sides: [WrapMode; 2], time: f64) -> DQuat {
     let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
     let length = last - first;
     let side = if time < first { sides[0] } else { sides[1] };
-    if (first..=last).contains(&time) && !(time == last && side == Outside::Loop) || length == 0.0 {
+    if (first..=last).contains(&time) && !(time == last && side == WrapMode::Loop) || length == 0.0
+    {
         return curve.rotation(time);
     }
     match side {
-        Outside::Hold => curve.rotation(time),
-        Outside::Loop => curve.rotation(first + (time - first).rem_euclid(length)),
-        Outside::Mirror => {
+        WrapMode::Hold => curve.rotation(time),
+        WrapMode::Loop => curve.rotation(first + (time - first).rem_euclid(length)),
+        WrapMode::Mirror => {
             let place = (time - first).rem_euclid(2.0 * length);
             curve.rotation(
                 first
@@ -61,7 +62,7 @@ fn expected(curve: &Curve, track: Track, sides: [Outside; 2], time: f64) -> DQua
                     },
             )
         }
-        Outside::Extrapolate => {
+        WrapMode::Extrapolate => {
             let end = time.clamp(first, last);
             let velocity: DVec3 = curve.velocity(end);
             curve.rotation(end) * DQuat::from_scaled_axis(velocity * (time - end))
@@ -95,7 +96,7 @@ fn outside_is_what_the_words_say() {
                         let steps = method == method::STEP;
                         for s in 0..found.samples() {
                             let time = timeline.time(t, s);
-                            if (steps || before == Outside::Loop || after == Outside::Loop)
+                            if (steps || before == WrapMode::Loop || after == WrapMode::Loop)
                                 && near_a_seam(track, time)
                             {
                                 continue; // it jumps there
@@ -144,10 +145,10 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
     for frames in [Frames::fps(12).between(-130.0, 200.0), Frames::at(explicit)] {
         for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::B_SPLINE] {
             for [before, after] in [
-                [Outside::Loop, Outside::Mirror],
-                [Outside::Mirror, Outside::Loop],
-                [Outside::Extrapolate, Outside::Loop],
-                [Outside::Hold, Outside::Extrapolate],
+                [WrapMode::Loop, WrapMode::Mirror],
+                [WrapMode::Mirror, WrapMode::Loop],
+                [WrapMode::Extrapolate, WrapMode::Loop],
+                [WrapMode::Hold, WrapMode::Extrapolate],
             ] {
                 let interpolation = Interpolation {
                     before,
@@ -191,8 +192,8 @@ fn two_keys_go_on_turning() {
     let at = [-1.0, 5.0, 12.0];
     for quantity in [Quantity::Rotation, Quantity::Velocity(Axes::Body)] {
         let interpolation = Interpolation {
-            before: Outside::Extrapolate,
-            after: Outside::Extrapolate,
+            before: WrapMode::Extrapolate,
+            after: WrapMode::Extrapolate,
             quantity,
             ..method::C2.into()
         };
@@ -210,7 +211,7 @@ fn two_keys_go_on_turning() {
         }
     }
     let mirrored = Interpolation {
-        after: Outside::Mirror,
+        after: WrapMode::Mirror,
         quantity: Quantity::Velocity(Axes::Body),
         ..method::C2.into()
     };

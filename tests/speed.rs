@@ -4,8 +4,8 @@ use crate::support::{Random, first_difference, hostile_set, vulkan_devices};
 use glam::{DQuat, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Outside, Quantity, Speed, TrackSet,
-    method,
+    Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Quantity, Speed, TrackSet,
+    WrapMode, method,
 };
 
 fn set() -> TrackSet {
@@ -108,7 +108,7 @@ fn velocities_have_one_length_and_go_on() {
         for method in [method::BESSEL_OVERHAUSER, method::B_SPLINE, method::SLERP] {
             let interpolation = Interpolation {
                 quantity,
-                after: Outside::Extrapolate,
+                after: WrapMode::Extrapolate,
                 ends: Ends::Parabolic,
                 ..constant(method)
             };

@@ -5,8 +5,8 @@ use crate::support::{Random, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::VectorCurve;
 use tumble::{
-    Device, Ends, Engine, Frames, Interpolation, Layout, Outside, TrackError, TrackSet, Transforms,
-    VectorMethod, method,
+    Device, Ends, Engine, Frames, Interpolation, Layout, TrackError, TrackSet, Transforms,
+    VectorMethod, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -133,10 +133,10 @@ fn the_same_bits_on_every_device() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let Given { set, .. } = given(2);
     let sides = [
-        Outside::Hold,
-        Outside::Loop,
-        Outside::Mirror,
-        Outside::Extrapolate,
+        WrapMode::Hold,
+        WrapMode::Loop,
+        WrapMode::Mirror,
+        WrapMode::Extrapolate,
     ];
     let engines: Vec<Engine> = [None, Some(20_000)]
         .into_iter()
@@ -173,8 +173,8 @@ fn a_lift_goes_on_rising() {
     set.set_scales(0, &[0.5], &[Vec3::splat(3.0)], &[]).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
     let rising = Interpolation {
-        before: Outside::Extrapolate,
-        after: Outside::Extrapolate,
+        before: WrapMode::Extrapolate,
+        after: WrapMode::Extrapolate,
         ..method::SLERP.into()
     };
     let frames = Frames::fps(1).between(-2.0, 3.0);

@@ -7,8 +7,8 @@ use clap::Parser;
 use glam::Quat;
 use tumble::spirv::{FloatControls, float_controls, no_contraction, without_decorations};
 use tumble::{
-    Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS,
-    Outside, Path, Speed, TrackSet,
+    Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS, Path,
+    Speed, TrackSet, WrapMode,
 };
 use tumble_formats::Limits;
 use tumble_formats::csv::CsvWriter;
@@ -316,10 +316,10 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
         interpolation.speed = Speed::Constant;
     }
     let outside = [
-        Outside::Hold,
-        Outside::Loop,
-        Outside::Mirror,
-        Outside::Extrapolate,
+        WrapMode::Hold,
+        WrapMode::Loop,
+        WrapMode::Mirror,
+        WrapMode::Extrapolate,
     ];
     interpolation.before = outside[(choice >> 2) as usize % 4];
     interpolation.after = outside[(choice >> 4) as usize % 4];

@@ -15,7 +15,7 @@ use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::bring_near;
 use crate::time::frames::Timeline;
-use crate::time::wrap::Cycle;
+use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
 
 /// Rotations of a batch at most, where results are long.
@@ -65,8 +65,8 @@ impl CpuEngine {
                 let own = batch.samples(set, timeline, PART);
                 for part in memory.parts() {
                     stage.row(own.len(), |row, output| {
-                        let cycle = Cycle::own(own.start + row.start..own.start + row.end);
-                        self.part(part, timeline, &cycle, output)
+                        let copy = TrackCopy::own(own.start + row.start..own.start + row.end);
+                        self.part(part, timeline, &copy, output)
                     })?;
                 }
             }

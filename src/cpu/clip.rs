@@ -9,11 +9,11 @@ use crate::cpu::sparse_times::FewTimes;
 use crate::cpu::streaming::{Output, Stage};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::simd::dispatch::in_lanes_of;
 use crate::time::frames::{FramesError, Ticks, Timeline};
-use crate::time::window::Window;
-use crate::time::wrap::Cycle;
+use crate::time::wrap::TrackCopy;
 
 /// Tracks whose rows are made before they are written into frames: whole cache lines.
 const TILE: usize = 16;
@@ -99,7 +99,7 @@ impl CpuEngine {
         if let Ticks::Times { times, stride } = &timeline.ticks
             && samples <= FEW
             && in_rows
-            && !clip.interpolation.sides().repeats()
+            && !clip.interpolation.wrap().repeats()
         {
             let mut few = FewTimes {
                 clip,
@@ -174,17 +174,17 @@ impl CpuEngine {
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         let samples = first..first + output.samples().len();
-        if !clip.interpolation.sides().repeats() {
-            let cycle = Cycle::own(samples.clone());
+        if !clip.interpolation.wrap().repeats() {
+            let copy = TrackCopy::own(samples.clone());
             return clip
                 .parts_of(track, timeline, samples)
-                .try_for_each(|part| self.part(part, timeline, &cycle, output));
+                .try_for_each(|part| self.part(part, timeline, &copy, output));
         }
-        for cycle in clip.cycles(track, timeline, samples) {
-            let own = cycle.samples.start - first..cycle.samples.end - first;
+        for copy in clip.copies(track, timeline, samples) {
+            let own = copy.samples.start - first..copy.samples.end - first;
             let own = &mut Output::Here(&mut output.samples()[own]);
-            clip.parts_in(track, &cycle)
-                .try_for_each(|part| self.part(part, timeline, &cycle, own))?;
+            clip.parts_in(track, &copy)
+                .try_for_each(|part| self.part(part, timeline, &copy, own))?;
         }
         Ok(())
     }

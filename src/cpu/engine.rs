@@ -7,7 +7,7 @@ use crate::prepare::clip_data::PartRef;
 use crate::shader::Form;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::{FramesError, Timeline};
-use crate::time::wrap::Cycle;
+use crate::time::wrap::TrackCopy;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
 /// share a short result among all threads.
@@ -58,7 +58,7 @@ impl CpuEngine {
         &self,
         part: PartRef<'_>,
         timeline: &Timeline,
-        cycle: &Cycle,
+        copy: &TrackCopy,
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
         let segments = &part.prepared.segments;
@@ -67,16 +67,18 @@ impl CpuEngine {
                 part,
                 segments: &segments.arcs,
                 timeline,
-                cycle,
+                copy,
+                width: self.width,
             }
-            .evaluate(self.width, output),
+            .evaluate(output),
             Form::Polynomial => Row {
                 part,
                 segments: &segments.polynomials,
                 timeline,
-                cycle,
+                copy,
+                width: self.width,
             }
-            .evaluate(self.width, output),
+            .evaluate(output),
         }
     }
 }

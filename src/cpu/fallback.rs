@@ -13,7 +13,7 @@ use crate::prepare::batch::PART;
 use crate::prepare::error::SetError;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::wrap::Cycle;
+use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
 
 /// Intervals between two that are wanted, up to which they are one piece.
@@ -71,7 +71,7 @@ impl CpuEngine {
             memory.prepare(row.set, intervals)?;
             for (part, (piece, own)) in memory.parts().zip(batch) {
                 let own = &mut Output::Here(own);
-                self.part(part, row.timeline, &Cycle::own(piece.samples), own)?;
+                self.part(part, row.timeline, &TrackCopy::own(piece.samples), own)?;
             }
             self.memories.give_back(memory);
             Ok(())

@@ -4,8 +4,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::method::interpolation::Interpolation;
-use crate::prepare::Prepared;
 use crate::prepare::preparation::Preparation;
+use crate::prepare::prepared::Prepared;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 

@@ -3,13 +3,13 @@
 
 use crate::cpu::evaluate::{Affine, one};
 use crate::math::canonical::round_f32;
+use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PartRef};
 use crate::shader::Form;
 use crate::shader::{ArcSegment, PolynomialSegment};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
 use crate::time::runs::{Distance, RunSource};
-use crate::time::window::Window;
 use crate::twin::evaluate_arc::{on_arc, square};
 
 /// Samples worked out together.
@@ -113,7 +113,7 @@ impl<'a> PartRef<'a> {
     #[inline(always)]
     fn at_time(self, time: f64) -> Option<One<'a>> {
         let PartRef { prepared, part } = self;
-        let (index, middle, affine) = match prepared.source_at(part, time)? {
+        let (index, middle, affine) = match prepared.spans.source_at(part, time)? {
             RunSource::Constant(index) => {
                 return Some(One::Constant(prepared.constants[index as usize]));
             }

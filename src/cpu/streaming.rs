@@ -346,7 +346,7 @@ pub(crate) mod tests {
     use crate::output::rotations::Layout;
     use crate::simd::dispatch::VectorWidth;
     use crate::time::frames::Frames;
-    use crate::time::wrap::Outside;
+    use crate::time::wrap::WrapMode;
     use crate::tracks::set::swinging;
 
     thread_local! {
@@ -409,9 +409,9 @@ pub(crate) mod tests {
             };
             let engine = Engine::with_options(Device::Cpu, &options).unwrap();
             for (method, after) in [
-                (method::SLERP, Outside::Hold),
-                (method::BESSEL_OVERHAUSER, Outside::Hold),
-                (method::BESSEL_OVERHAUSER, Outside::Loop),
+                (method::SLERP, WrapMode::Hold),
+                (method::BESSEL_OVERHAUSER, WrapMode::Hold),
+                (method::BESSEL_OVERHAUSER, WrapMode::Loop),
             ] {
                 let interpolation = Interpolation {
                     after,

@@ -43,7 +43,7 @@ impl Backend {
     ) -> Route {
         let in_rows = layout.of(timeline.len()) == Layout::TrackMajor;
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
-        let are_held = interpolation.sides().are_held();
+        let are_held = interpolation.wrap().are_held();
         let cuts_tracks = in_rows && in_order && are_held && interpolation.speed == Speed::AsKeyed;
         if !in_rows || timeline.is_empty() {
             return Route::Clips { cuts_tracks };

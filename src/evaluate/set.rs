@@ -19,12 +19,12 @@ use crate::gpu::recovery::Opened;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Storage};
+use crate::output::window::Window;
 use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::{FramesError, Timeline};
-use crate::time::window::Window;
 use crate::tracks::set::TrackSet;
 
 /// Bytes of segments that a Vulkan device gets at once where keys are many.

@@ -11,11 +11,11 @@ use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
-use crate::prepare::Prepared;
+use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::error::SetError;
+use crate::prepare::prepared::Prepared;
 use crate::time::frames::Timeline;
-use crate::time::window::Window;
 use crate::tracks::set::TrackSet;
 
 /// Prepared tracks, and their segments on a Vulkan device.

@@ -39,7 +39,7 @@ impl KeyCurve {
         let are_fewer = timeline.len() * set.track_count() < set.key_count();
         // As authored an arc may be of more than half a turn, and is then two segments.
         let arcs_are_short = interpolation.path == Path::Shortest || set.arcs_are_short();
-        if !are_fewer || !arcs_are_short || !interpolation.sides().are_held() {
+        if !are_fewer || !arcs_are_short || !interpolation.wrap().are_held() {
             return None;
         }
         match interpolation.form() {

@@ -13,7 +13,8 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks};
-use crate::time::key_samples::{FramePlan, TimeLanes, key_before};
+use crate::time::key_samples::FramePlan;
+use crate::time::times::{TimeLanes, key_before};
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 

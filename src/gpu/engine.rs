@@ -17,10 +17,10 @@ use crate::gpu::submission::{Access, Submission};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Item, KERNELS, Kernel};
 use crate::time::frames::Timeline;
-use crate::time::window::Window;
 
 /// Rotations of one window, unless limits, the budget or the device's speed say less:
 /// 32 MiB.

@@ -16,11 +16,11 @@ use crate::gpu::sample_list::Singles;
 use crate::gpu::submission::{Spent, Submission};
 use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};
 use crate::output::encoding::Encoding;
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::List;
 use crate::shader::{Item, ListedSample};
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::window::Window;
 
 /// What one window needs; the submission comes first, so that it is waited for
 /// before its buffers go.

@@ -12,9 +12,9 @@ use crate::gpu::error::EvaluateError;
 use crate::gpu::in_flight::{Finish, Slot, Stopwatch, Target};
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;
+use crate::output::window::Window;
 use crate::shader::WORKGROUP;
 use crate::shader::{Dispatch, Kernel, List};
-use crate::time::window::Window;
 
 impl VulkanEngine {
     /// Evaluates a window of a result, in windows of its own.

@@ -8,8 +8,9 @@ use crate::cpu::evaluate::FEW;
 use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
 use crate::math::canonical::round_f32;
 use crate::output::rotations::Layout;
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::prepare::prepared::Prepared;
 use crate::shader::IS_CONSTANT;
 use crate::shader::List;
 use crate::shader::ListedSample;
@@ -17,11 +18,10 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
-use crate::time::interval_block::{SpanBlock, SpanBlocks};
-use crate::time::key_samples::TimeLanes;
-use crate::time::runs::{Distance, Run, RunSource, runs_after, runs_before};
-use crate::time::window::Window;
-use crate::time::wrap::Cycle;
+use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::spans::{NONE, Part, Source};
+use crate::time::times::TimeLanes;
+use crate::time::wrap::TrackCopy;
 
 /// A window whose samples are told one by one.
 pub(crate) struct Singles<'a> {
@@ -48,7 +48,7 @@ impl<'a> Singles<'a> {
     ) -> Option<Self> {
         let samples = window.samples.len();
         let are_rows = window.layout == Layout::TrackMajor || samples == 1;
-        if !are_rows || clip.interpolation.sides().repeats() {
+        if !are_rows || clip.interpolation.wrap().repeats() {
             return None;
         }
         let (mut spans, mut parts, mut groups) = (0, 0, Vec::new());
@@ -199,14 +199,12 @@ impl InLanes for Piece<'_> {
             return self.tell_few(times, *stride);
         }
         for part in self.parts {
-            let track = part.track as usize;
-            if let Ticks::Frames { rate, start } = timeline.ticks
-                && self.tell_spans(part, FrameClock::new(rate, start, part.end))
-            {
-                continue;
-            }
-            let cycle = Cycle::own(samples.clone());
-            let told = prepared.runs(part, timeline, &cycle, &mut |run| self.tell(track, run));
+            let copy = TrackCopy::own(samples.clone());
+            let mut list = PartSamples {
+                piece: self,
+                track: part.track as usize,
+            };
+            let told = prepared.spans.runs(part, timeline, &copy, &mut list);
             if told.is_err() {
                 self.result = told;
                 return;
@@ -227,54 +225,20 @@ const fn held(constant: u32) -> ListedSample {
     }
 }
 
-impl Piece<'_> {
-    /// Tells the samples of a part, where all are near enough to their segments' middles:
-    /// without runs, of which most would be one sample.
-    #[inline(always)]
-    fn tell_spans(&mut self, part: &Part, clock: FrameClock) -> bool {
-        let (prepared, window) = (self.prepared, self.all.window);
-        let (track, samples) = (part.track as usize, &window.samples);
-        runs_before(prepared, part, clock, samples, &mut |run| {
-            self.tell(track, run);
-        });
-        let row = window.place(track, samples.start);
-        let mut spans = SpanBlocks::new(prepared, part, clock, samples.clone());
-        let mut block = SpanBlock::new();
-        while let Some(own) = spans.fill(&mut block) {
-            if !block.are_near {
-                return false;
-            }
-            let sources = &prepared.spans.sources[own.clone()];
-            let keys = &prepared.spans.keys[own];
-            for j in block.occupied {
-                let (first, last) = (block.first[j], block.first[j + 1]);
-                let is_held = keys[j] != NONE && block.is_held[j] == 1;
-                let place = row + first - samples.start;
-                let (Source::Segment(index), true) = (sources[j], place == self.first + self.told)
-                else {
-                    return false;
-                };
-                let Some(singles) = self.singles[self.told..].get_mut(..last - first) else {
-                    return false;
-                };
-                let mut distance = block.distance[j];
-                for single in &mut *singles {
-                    *single = ListedSample {
-                        source: index,
-                        parameter: distance * block.scale[j] + block.offset[j],
-                    };
-                    distance += 1.0;
-                }
-                if is_held {
-                    singles[0] = held(keys[j]);
-                }
-                self.told += last - first;
-            }
-        }
-        runs_after(part, clock, samples, &mut |run| self.tell(track, run));
-        true
-    }
+/// The samples of one part.
+struct PartSamples<'p, 'a> {
+    piece: &'p mut Piece<'a>,
+    track: usize,
+}
 
+impl Emit for PartSamples<'_, '_> {
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        self.piece.tell(self.track, run);
+    }
+}
+
+impl Piece<'_> {
     /// Tells the samples of a run, as far as they are this piece's and not told yet.
     #[inline(always)]
     fn tell(&mut self, track: usize, run: Run) {
@@ -308,6 +272,7 @@ impl Piece<'_> {
             } => {
                 for (j, single) in own.iter_mut().enumerate() {
                     let distance = match distance {
+                        Distance::Near { first } => first + (skipped + j) as f32,
                         Distance::Frames { first } => {
                             first.wrapping_add((skipped + j) as i32) as f32
                         }
@@ -364,7 +329,7 @@ impl Piece<'_> {
     #[inline(always)]
     fn look_up(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
         let (prepared, time) = (self.prepared, times[sample]);
-        if let Some((span, end)) = prepared.span_at(part, time) {
+        if let Some((span, end)) = prepared.spans.span_at(part, time) {
             let (start, key) = (prepared.spans.starts[span], prepared.spans.keys[span]);
             match prepared.spans.sources[span] {
                 _ if time == start && key != NONE => return (key | IS_CONSTANT, 0.0, 1.0),
@@ -385,14 +350,13 @@ impl Piece<'_> {
     #[inline(never)]
     fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
         let (all, track) = (self.all, part.track as usize);
-        // Replaced: every time lies somewhere in a whole track, or outside.
-        let mut source = RunSource::Constant(0);
-        let mut found = |run: Run| source = run.source;
-        (self.prepared).time_runs(part, times, sample..sample + 1, &mut found);
-        match source {
-            RunSource::Constant(constant) => constant,
-            RunSource::Segment { .. } => unreachable!("outside a track no segment goes on"),
-            RunSource::Exact { index, parameter } => {
+        let mut found = Vec::new();
+        (self.prepared.spans).runs_of_times(part, times, sample..sample + 1, &mut found);
+        match found.first().map(|run| run.source) {
+            Some(RunSource::Constant(constant)) => constant,
+            // Every time lies somewhere in a whole track, or outside, where no segment goes on.
+            Some(RunSource::Segment { .. }) | None => 0,
+            Some(RunSource::Exact { index, parameter }) => {
                 let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);
                 self.patches.push((all.window.place(track, sample), exact));
                 0

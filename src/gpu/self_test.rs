@@ -20,12 +20,12 @@ use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::slerp::SLERP;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
+use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::shader::WORKGROUP;
 use crate::shader::{Dispatch, Probe, Reply};
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
-use crate::time::window::Window;
 use crate::tracks::set::TrackSet;
 use crate::twin::self_test::reply;
 

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use crate::math::canonical::round_f32;
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::prepare::{Part, Prepared};
+use crate::prepare::prepared::Prepared;
 use crate::shader::Item;
 use crate::shader::List;
 use crate::shader::{IS_CONSTANT, ITEM_SAMPLES};
@@ -12,7 +13,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frames::{FramesError, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
-use crate::time::window::Window;
+use crate::time::spans::Part;
 
 /// What the device and the host have to do in a window.
 pub(crate) struct Work {
@@ -151,8 +152,11 @@ impl InLanes for PartsList<'_> {
                 chunk: &mut self.chunk,
             };
             let samples = self.window.samples.clone();
-            for cycle in self.prepared.cycles(part, self.timeline, samples) {
-                let listed = self.prepared.runs(part, self.timeline, &cycle, &mut list);
+            for copy in self.prepared.copies(part, self.timeline, samples) {
+                let listed = self
+                    .prepared
+                    .spans
+                    .runs(part, self.timeline, &copy, &mut list);
                 if listed.is_err() {
                     self.listed = listed;
                     return;
@@ -196,6 +200,7 @@ impl Emit for RunItems<'_> {
         let mut first = 0;
         if let RunSource::Segment { distance, .. } = run.source {
             first = match distance {
+                Distance::Near { first } => first as i32,
                 Distance::Frames { first } => first,
                 Distance::Seconds { middle } => {
                     let own = chunk.distances.len() as i32;

@@ -31,15 +31,6 @@ pub(crate) fn whole_number(x: f64) -> i64 {
     (x + SHIFT).to_bits() as i64 - SHIFT.to_bits() as i64
 }
 
-/// As [`whole_number`], of any whole number; one that is farther away than any frame is 2^50
-/// or -2^50.
-#[inline(always)]
-pub(crate) fn frame_number(x: f64) -> i64 {
-    const FAR: f64 = (1u64 << 50) as f64;
-    let below = if x < FAR { x } else { FAR };
-    whole_number(if below > -FAR { below } else { -FAR })
-}
-
 /// Rounds to f32 and makes the result canonical.
 #[inline(always)]
 pub(crate) fn round_f32(value: f64) -> f32 {

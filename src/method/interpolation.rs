@@ -8,7 +8,7 @@ use crate::math::quaternion::{self, dot, length, log, unit};
 use crate::method::{Curves, Method};
 use crate::prepare::tangent_weights::WeightRule;
 use crate::shader::Form;
-use crate::time::wrap::{Outside, Sides};
+use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::key_data::Tcb;
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
@@ -30,9 +30,9 @@ pub struct Interpolation {
     /// How fast the curve is run through.
     pub speed: Speed,
     /// What lies before a track's first key, and after its last.
-    pub before: Outside,
+    pub before: WrapMode,
     /// See `before`.
-    pub after: Outside,
+    pub after: WrapMode,
 }
 
 impl Interpolation {
@@ -70,13 +70,13 @@ impl Interpolation {
 
     /// Whether arcs too are curves with a formula: for what follows from derivatives.
     pub(crate) fn is_by_formula(&self) -> bool {
-        let extrapolates = [self.before, self.after].contains(&Outside::Extrapolate);
+        let extrapolates = [self.before, self.after].contains(&WrapMode::Extrapolate);
         let constant = self.speed == Speed::Constant;
         self.quantity != Quantity::Rotation || extrapolates || constant
     }
 
-    pub(crate) fn sides(&self) -> Sides {
-        Sides {
+    pub(crate) fn wrap(&self) -> Wrap {
+        Wrap {
             before: self.before,
             after: self.after,
         }
@@ -129,8 +129,8 @@ impl From<Method> for Interpolation {
             tcb: Tcb::default(),
             quantity: Quantity::Rotation,
             speed: Speed::AsKeyed,
-            before: Outside::Hold,
-            after: Outside::Hold,
+            before: WrapMode::Hold,
+            after: WrapMode::Hold,
         }
     }
 }
@@ -251,7 +251,7 @@ pub enum InterpolationError {
         /// The first of the two keys.
         key: usize,
     },
-    /// Under [`Outside::Mirror`] velocities would change their signs from copy to copy.
+    /// Under [`WrapMode::Mirror`] velocities would change their signs from copy to copy.
     #[error("velocities are not mirrored; hold, loop or extrapolate them")]
     MirroredVelocity,
     /// Under [`Ends::Clamped`] a velocity is no number, or too large.

@@ -39,7 +39,7 @@ pub enum SkeletonError {
     },
     /// A track that hangs from itself, by way of others.
     #[error("track {track} hangs from itself")]
-    Cycle {
+    TrackCopy {
         /// One of those concerned.
         track: usize,
     },
@@ -94,7 +94,7 @@ impl Skeleton {
         }
         // What no root leads to hangs from itself.
         if let Some(track) = children.iter().position(|left| !left.is_empty()) {
-            return Err(SkeletonError::Cycle { track });
+            return Err(SkeletonError::TrackCopy { track });
         }
         Ok(Self {
             parents,
@@ -154,10 +154,13 @@ mod tests {
         let refused = |parents: &[Option<usize>]| {
             Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
         };
-        assert_eq!(refused(&[None, Some(1)]), SkeletonError::Cycle { track: 1 });
+        assert_eq!(
+            refused(&[None, Some(1)]),
+            SkeletonError::TrackCopy { track: 1 }
+        );
         assert_eq!(
             refused(&[Some(1), Some(0), None]),
-            SkeletonError::Cycle { track: 0 }
+            SkeletonError::TrackCopy { track: 0 }
         );
         assert!(matches!(
             refused(&[Some(7)]),

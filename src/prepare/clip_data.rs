@@ -12,10 +12,12 @@ use crate::method::interpolation::{Axes, Interpolation, InterpolationError, Quan
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
 use crate::prepare::preparation::Preparation;
-use crate::prepare::{Part, Prepared, vectors};
+use crate::prepare::prepared::Prepared;
+use crate::prepare::vectors;
 use crate::shader::Form;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::wrap::{Cycle, Outside};
+use crate::time::spans::Part;
+use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::Channel;
 
@@ -90,7 +92,7 @@ fn prepare(
         tracks: usize::MAX,
         cut: (interpolation.speed == Speed::AsKeyed).then_some(PART),
     };
-    let only_for = (wanted.only_for).filter(|_| interpolation.sides().are_held());
+    let only_for = (wanted.only_for).filter(|_| interpolation.wrap().are_held());
     let first_track = wanted.batch.tracks().start as u32;
     let spare = Mutex::new(wanted.spare);
     let group = |batch: Batch| {
@@ -123,7 +125,7 @@ impl ClipData {
         wanted: Wanted<'_>,
     ) -> Result<Self, InterpolationError> {
         if matches!(interpolation.quantity, Quantity::Velocity(_))
-            && [interpolation.before, interpolation.after].contains(&Outside::Mirror)
+            && [interpolation.before, interpolation.after].contains(&WrapMode::Mirror)
         {
             return Err(InterpolationError::MirroredVelocity);
         }
@@ -245,11 +247,11 @@ impl ClipData {
     pub(crate) fn parts_in(
         &self,
         track: usize,
-        cycle: &Cycle,
+        copy: &TrackCopy,
     ) -> impl Iterator<Item = PartRef<'_>> {
         let all = self.tracks[track]..self.tracks[track + 1];
         let count = all.len();
-        let backwards = cycle.sign < 0.0;
+        let backwards = copy.sign < 0.0;
         (0..count).map(move |i| {
             let place = if backwards { count - 1 - i } else { i };
             self.part(self.parts[all.start + place])
@@ -257,18 +259,18 @@ impl ClipData {
     }
 
     /// The copies of a track among some samples.
-    pub(crate) fn cycles(
+    pub(crate) fn copies(
         &self,
         track: usize,
         timeline: &Timeline,
         samples: Range<usize>,
-    ) -> impl Iterator<Item = Cycle> {
-        let sides = self.interpolation.sides();
-        let span = match sides.repeats() {
+    ) -> impl Iterator<Item = TrackCopy> {
+        let wrap = self.interpolation.wrap();
+        let span = match wrap.repeats() {
             true => self.track_span(track),
             false => None,
         };
-        sides.cycles(span, timeline, samples)
+        wrap.copies(span, timeline, samples)
     }
 
     /// The first and the last key time of a track, where copies of it are asked for.
@@ -280,13 +282,13 @@ impl ClipData {
 
     /// The timeline, with explicit times folded into the keys of their tracks.
     pub(crate) fn folded<'t>(&self, timeline: &'t Timeline) -> Cow<'t, Timeline> {
-        let sides = self.interpolation.sides();
-        if !sides.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
+        let wrap = self.interpolation.wrap();
+        if !wrap.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
             return Cow::Borrowed(timeline);
         }
         let folded = |track: usize, time: f64| {
             self.track_span(track)
-                .map_or(time, |span| sides.folded(span, time))
+                .map_or(time, |span| wrap.folded(span, time))
         };
         Cow::Owned(timeline.map_times(self.track_count(), folded))
     }

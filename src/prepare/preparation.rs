@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use crate::method::Curves;
 use crate::method::interpolation::{Interpolation, InterpolationError};
-use crate::prepare::Prepared;
 use crate::prepare::arcs::arcs::ArcPreparation;
 use crate::prepare::double::smooth::SmoothPreparation;
+use crate::prepare::prepared::Prepared;
 use crate::prepare::steps::StepPreparation;
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
@@ -76,10 +76,10 @@ mod tests {
 
     use super::*;
     use crate::method::METHODS;
-    use crate::prepare::Source;
     use crate::prepare::batch::{Batch, PART};
     use crate::prepare::clip_data::{ClipData, Wanted};
     use crate::simd::dispatch::tests::at_every_width;
+    use crate::time::spans::Source;
 
     /// The bytes of every span's segment; parts of curves may lie in another order.
     fn curves(prepared: &Prepared) -> Vec<&[u8]> {

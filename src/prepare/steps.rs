@@ -6,7 +6,8 @@ use glam::Quat;
 
 use crate::method::interpolation::{Interpolation, InterpolationError, Quantity};
 use crate::prepare::preparation::Prepare;
-use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::prepare::prepared::Prepared;
+use crate::time::spans::{NONE, Part, Source};
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks whose keys are held.
@@ -46,7 +47,7 @@ impl Prepare for StepPreparation {
         prepared.constants.extend(keys.map(value));
         let first_span = prepared.spans.len();
         let all = track.keys.len() - 1;
-        let beyond = prepared.copies(track);
+        let beyond = prepared.beyond_of_copies(track);
         prepared.parts.push(Part {
             track: index as u32,
             first_key: intervals.start as u32,

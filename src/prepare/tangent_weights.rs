@@ -108,7 +108,7 @@ impl<'a> TrackWeights<'a> {
     }
 }
 
-/// WeightRule of all keys but the first and the last of some.
+/// `WeightRule` of all keys but the first and the last of some.
 struct Between<'a> {
     rule: WeightRule,
     times: &'a [f64],

@@ -10,9 +10,10 @@ use crate::method::interpolation::{Ends, Interpolation, Quantity};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::double::curve::{Curve, Piece};
 use crate::prepare::double::shape::Shape;
-use crate::prepare::{Beyond, NONE, Part, Prepared, Source};
+use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
-use crate::time::wrap::Outside;
+use crate::time::spans::{Beyond, NONE, Part, Source};
+use crate::time::wrap::WrapMode;
 use crate::tracks::vectors::VectorTrack;
 
 /// Adds a track's vectors; those of a track without any are `rest`.
@@ -63,7 +64,7 @@ pub(crate) fn add(
             (i + 1 == last, interpolation.after, end, arriving),
         ];
         for (beyond, (at_end, outside, from, slope)) in beyond.iter_mut().zip(sides) {
-            if at_end && outside == Outside::Extrapolate {
+            if at_end && outside == WrapMode::Extrapolate {
                 *beyond = prepared.exact.len() as u32;
                 prepared.exact.push(line(from, slope * rate));
             }
@@ -79,7 +80,7 @@ pub(crate) fn add(
         end: track.times[last],
         before: held(beyond[0], first_key),
         after: held(beyond[1], first_key + last as u32),
-        beyond: (goes_on || prepared.sides.repeats()).then(|| {
+        beyond: (goes_on || prepared.wrap.repeats()).then(|| {
             Box::new(Beyond {
                 from_before: beyond[0],
                 from_after: beyond[1],

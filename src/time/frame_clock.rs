@@ -3,7 +3,7 @@
 
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
-use crate::time::wrap::Cycle;
+use crate::time::wrap::TrackCopy;
 
 /// How the parameter of a span's frames follows from their numbers.
 pub(crate) struct InFrames {
@@ -96,12 +96,18 @@ fn settled(exact: f64, rounding: f64) -> Boundary {
     Boundary { frame, first }
 }
 
-/// What tells where a track's spans lie among the frames.
+/// What tells where the intervals of a track lie among the frames.
 pub(crate) trait Clock: Copy {
+    /// Whether frames run against the track's own time: intervals are met from the last to the
+    /// first, and the parameter falls.
+    const IS_REVERSED: bool = false;
+
     /// Where a time lies.
     fn boundary(self, time: f64) -> Boundary;
+
     /// The track's own time at a frame, where the frames are the track's own.
     fn own_time(self, frame: usize) -> Option<f64>;
+
     /// Frames in a second.
     fn rate(self) -> f64;
 }
@@ -125,27 +131,26 @@ impl Clock for FrameClock {
 
 /// The frames of a copy of a track.
 #[derive(Clone, Copy)]
-pub(crate) struct CopyClock {
+pub(crate) struct CopyClock<const IS_REVERSED: bool> {
     own: FrameClock,
-    sign: f64,
     offset: f64,
 }
 
-impl CopyClock {
-    pub(crate) fn new(own: FrameClock, cycle: &Cycle) -> Self {
-        Self {
-            own,
-            sign: cycle.sign,
-            offset: cycle.offset,
-        }
+impl<const IS_REVERSED: bool> CopyClock<IS_REVERSED> {
+    pub(crate) fn new(own: FrameClock, copy: &TrackCopy) -> Self {
+        let offset = copy.offset;
+        Self { own, offset }
     }
 }
 
-impl Clock for CopyClock {
+impl<const IS_REVERSED: bool> Clock for CopyClock<IS_REVERSED> {
+    const IS_REVERSED: bool = IS_REVERSED;
+
     fn boundary(self, time: f64) -> Boundary {
         let own = self.own.rate.frames_in(time - self.own.start);
         let rounding = self.own.rounding + 4.0 * f64::EPSILON * self.offset.abs();
-        settled(own * self.sign + self.offset, rounding)
+        let along = if IS_REVERSED { -own } else { own };
+        settled(along + self.offset, rounding)
     }
 
     fn own_time(self, _: usize) -> Option<f64> {

@@ -1,18 +1,15 @@
-//! Which segment gives which samples: a track's spans met with the samples asked
-//! for. What comes out are runs, the unit of work of every device. Only here, and where its
-//! spans' blocks are filled, do seconds turn into frames, in f64; a run's numbers do not
-//! depend on where a window of work starts, so results are the same for every way of cutting
-//! it.
+//! Which segment gives which samples: the spans of a track, met with the samples asked for.
+//! What comes out are runs, the unit of work of every device. Only here and in the blocks of
+//! intervals do seconds turn into frames, in f64. A run's numbers do not depend on where a
+//! window of work starts, so results are the same however work is cut.
 
 use std::ops::Range;
 
-use crate::math::canonical::round_quat;
-use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::time::frame_clock::{Clock, CopyClock, FrameClock};
 use crate::time::frames::{FramesError, Ticks, Timeline};
-use crate::time::interval_block::{SpanBlock, SpanBlocks};
-use crate::time::wrap::Cycle;
-use crate::tracks::check::LATEST;
+use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
+use crate::time::spans::{NONE, Part, Source, Spans};
+use crate::time::wrap::TrackCopy;
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +32,7 @@ pub(crate) enum RunSource {
         scale: f32,
         offset: f32,
     },
-    /// Evaluate a cubic in f64 on the host.
+    /// Evaluate a curve in f64 on the host.
     Exact { index: u32, parameter: Parameter },
 }
 
@@ -43,7 +40,10 @@ pub(crate) enum RunSource {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Distance {
     /// Frames from the whole frame nearest to the middle, for the run's first
-    /// sample; one more for each sample after it.
+    /// sample; one more for each sample after it. All are whole numbers of f32, and so are
+    /// those that fill a vector behind them.
+    Near { first: f32 },
+    /// The same, farther from the middle.
     Frames { first: i32 },
     /// Seconds from the middle; the samples' times tell.
     Seconds { middle: f64 },
@@ -62,93 +62,85 @@ pub(crate) trait Emit {
     fn run(&mut self, run: Run);
 }
 
-impl<F: FnMut(Run)> Emit for F {
-    #[inline(always)]
+impl Emit for Vec<Run> {
     fn run(&mut self, run: Run) {
-        self(run);
+        self.push(run);
     }
 }
 
-impl Prepared {
-    /// The runs of one part within the samples of a cycle, in order.
+impl Spans {
+    /// The runs of one part within the samples of a copy of its track, in order.
+    #[inline(always)]
     pub(crate) fn runs(
         &self,
         part: &Part,
         timeline: &Timeline,
-        cycle: &Cycle,
+        copy: &TrackCopy,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        let samples = cycle.samples.clone();
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
                 let clock = FrameClock::new(*rate, *start, part.end);
-                if cycle.is_own() {
-                    self.frame_runs(part, clock, samples, emit)
+                if copy.is_own() {
+                    self.runs_of_frames(part, clock, &copy.samples, emit)
                 } else {
-                    self.copy_runs(part, CopyClock::new(clock, cycle), cycle, emit)
+                    self.runs_of_copy(part, clock, copy, emit)
                 }
             }
             Ticks::Times { times, stride } => {
                 let own = &times[part.track as usize * stride..];
-                self.time_runs(part, own, samples, emit);
+                self.runs_of_times(part, own, copy.samples.clone(), emit);
                 Ok(())
             }
         }
     }
 
-    /// The rotation of sample `sample` in a run of a cubic that the kernels do not
-    /// take.
-    pub(crate) fn exact(
-        &self,
-        index: u32,
-        parameter: Parameter,
-        timeline: &Timeline,
-        track: usize,
-        sample: usize,
-    ) -> [f32; 4] {
-        let t = match parameter {
-            Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
-            Parameter::Seconds { start, seconds } => {
-                // Further away than keys may be, a curve's powers overflow.
-                let time = timeline.time(track, sample).clamp(-LATEST, LATEST);
-                (time - start) / seconds
-            }
-        };
-        round_quat(self.exact[index as usize].value(t))
-    }
-
     /// Apart from the rest, which stays small.
     #[inline(never)]
-    fn copy_runs(
+    fn runs_of_copy(
         &self,
         part: &Part,
-        clock: CopyClock,
-        cycle: &Cycle,
+        clock: FrameClock,
+        copy: &TrackCopy,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        let samples = cycle.samples.clone();
-        if cycle.sign < 0.0 {
-            return self.backward_runs(part, clock, samples, emit);
+        if copy.sign < 0.0 {
+            let clock = CopyClock::<true>::new(clock, copy);
+            return self.runs_of_frames(part, clock, &copy.samples, emit);
         }
-        self.frame_runs(part, clock, samples, emit)
+        let clock = CopyClock::<false>::new(clock, copy);
+        self.runs_of_frames(part, clock, &copy.samples, emit)
     }
 
+    /// The runs of one part among frames, in order.
     #[inline(always)]
-    fn frame_runs(
+    pub(crate) fn runs_of_frames<C: Clock>(
         &self,
         part: &Part,
-        clock: impl Clock,
-        samples: Range<usize>,
+        clock: C,
+        samples: &Range<usize>,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        runs_before(self, part, clock, &samples, emit);
-        let mut spans = SpanBlocks::new(self, part, clock, samples.clone());
-        let mut block = SpanBlock::new();
-        while let Some(own) = spans.fill(&mut block) {
+        let starts = &self.starts[part.spans.clone()];
+        let begin = starts.first().copied().unwrap_or(part.end);
+        if C::IS_REVERSED {
+            // The last key comes first. Curves that go on outside the keys are no copies.
+            let end = clock.boundary(part.end);
+            emit_constant(0, end.first as usize, samples, part.after, emit);
+        } else {
+            runs_before(part, begin, clock, samples, emit);
+        }
+        let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
+        let mut block = IntervalBlock::new();
+        while let Some(own) = intervals.fill(&mut block) {
             for j in block.occupied {
-                let span = own.start + j;
+                let met = own.start + j;
+                let (span, key) = match (C::IS_REVERSED, met) {
+                    (false, _) => (part.spans.start + met, self.keys[part.spans.start + met]),
+                    (true, 0) => (part.spans.end - 1, part.after),
+                    (true, _) => (part.spans.end - 1 - met, self.keys[part.spans.end - met]),
+                };
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
-                let key = self.spans.keys[span];
                 if key != NONE && block.is_held[j] == 1 {
                     emit.run(Run {
                         sample: first,
@@ -156,67 +148,79 @@ impl Prepared {
                         source: RunSource::Constant(key),
                     });
                     first += 1;
-                }
-                if first >= last {
-                    continue;
-                }
-                let source = match self.spans.sources[span] {
-                    Source::Segment(index) => {
-                        let distance = |sample: usize| sample as f64 - block.whole[j];
-                        // Distances fit 32 bits if that of the last sample does.
-                        if distance(first).abs() >= COUNTABLE || distance(last).abs() >= COUNTABLE {
-                            return Err(self.gap_too_long(part, span, clock.rate()));
-                        }
-                        RunSource::Segment {
-                            index,
-                            distance: Distance::Frames {
-                                first: distance(first) as i32,
-                            },
-                            scale: block.scale[j],
-                            offset: block.offset[j],
-                        }
+                    if first == last {
+                        continue;
                     }
-                    Source::Constant(constant) => RunSource::Constant(constant),
-                    Source::Exact(index) => RunSource::Exact {
-                        index,
-                        parameter: block.parameter(j),
-                    },
-                };
-                emit.run(Run {
+                }
+                let run = |source| Run {
                     sample: first,
                     count: last - first,
                     source,
-                });
+                };
+                // A call for each source: none is told apart twice.
+                match self.sources[span] {
+                    Source::Segment(index) => {
+                        let distance = if block.are_near {
+                            let held = first - block.first[j];
+                            Distance::Near {
+                                first: block.distance[j] + held as f32,
+                            }
+                        } else if block.is_countable(j) {
+                            Distance::Frames {
+                                first: (first as f64 - block.whole[j]) as i32,
+                            }
+                        } else {
+                            return Err(self.gap_too_long(part, span, clock.rate()));
+                        };
+                        emit.run(run(RunSource::Segment {
+                            index,
+                            distance,
+                            scale: block.scale[j],
+                            offset: block.offset[j],
+                        }));
+                    }
+                    Source::Constant(constant) => emit.run(run(RunSource::Constant(constant))),
+                    Source::Exact(index) => {
+                        let parameter = block.parameter::<C>(j);
+                        emit.run(run(RunSource::Exact { index, parameter }));
+                    }
+                }
             }
         }
-        runs_after(part, clock, &samples, emit);
+        if C::IS_REVERSED {
+            let end = clock.boundary(begin);
+            emit_constant(end.first as usize, usize::MAX, samples, part.before, emit);
+        } else {
+            runs_after(part, clock, samples, emit);
+        }
         Ok(())
     }
 }
 
-/// The runs before the first key.
+/// The runs before the first key, which a part begins with.
+#[inline(always)]
 pub(crate) fn runs_before(
-    prepared: &Prepared,
     part: &Part,
+    begin: f64,
     clock: impl Clock,
     samples: &Range<usize>,
     emit: &mut impl Emit,
 ) {
-    let starts = &prepared.spans.starts[part.spans.clone()];
     if part.before != NONE {
-        let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
-        clip(0, begin.first as usize, samples, part.before, emit);
+        let begin = clock.boundary(begin);
+        emit_constant(0, begin.first as usize, samples, part.before, emit);
     }
     if let Some(from) = part.beyond.as_ref().map(|beyond| beyond.from_before)
         && from != NONE
     {
-        let begin = clock.boundary(starts.first().copied().unwrap_or(part.end));
+        let begin = clock.boundary(begin);
         let before = 0..begin.first as usize;
         extrapolate(before, samples, from, clock, begin.frame, emit);
     }
 }
 
 /// The runs from the last key on.
+#[inline(always)]
 pub(crate) fn runs_after(
     part: &Part,
     clock: impl Clock,
@@ -226,19 +230,17 @@ pub(crate) fn runs_after(
     let Some(beyond) = &part.beyond else {
         if part.after != NONE {
             let end = clock.boundary(part.end);
-            clip(end.first as usize, usize::MAX, samples, part.after, emit);
+            emit_constant(end.first as usize, usize::MAX, samples, part.after, emit);
         }
         return;
     };
     let end = clock.boundary(part.end);
     let mut first = end.first as usize;
     if beyond.at_end != NONE && first as f64 == end.frame {
-        clip(first, first + 1, samples, beyond.at_end, emit);
+        emit_constant(first, first + 1, samples, beyond.at_end, emit);
         first += 1;
     }
-    if part.after != NONE {
-        clip(first, usize::MAX, samples, part.after, emit);
-    }
+    emit_constant(first, usize::MAX, samples, part.after, emit);
     if beyond.from_after != NONE {
         let after = first..usize::MAX;
         extrapolate(after, samples, beyond.from_after, clock, end.frame, emit);
@@ -275,9 +277,9 @@ fn extrapolate(
     }
 }
 
-/// Emits the part of a constant's samples that lies within `samples`.
+/// Emits those of a constant's samples that are asked for; nothing where there is none.
 #[inline(always)]
-pub(crate) fn clip(
+fn emit_constant(
     from: usize,
     to: usize,
     samples: &Range<usize>,
@@ -285,7 +287,7 @@ pub(crate) fn clip(
     emit: &mut impl Emit,
 ) {
     let (sample, to) = (from.max(samples.start), to.min(samples.end));
-    if sample < to {
+    if sample < to && constant != NONE {
         emit.run(Run {
             sample,
             count: to - sample,

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use tumble::{Ends, METHODS, Method, Outside, Path, Speed};
+use tumble::{Ends, METHODS, Method, Path, Speed, WrapMode};
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -120,7 +120,7 @@ enum OutsideArgument {
     Extrapolate,
 }
 
-impl From<OutsideArgument> for Outside {
+impl From<OutsideArgument> for WrapMode {
     fn from(outside: OutsideArgument) -> Self {
         match outside {
             OutsideArgument::Hold => Self::Hold,

@@ -8,10 +8,11 @@ use crate::math::quaternion::{dot, unit};
 use crate::method::interpolation::{Ends, Interpolation, InterpolationError, Path};
 use crate::prepare::arcs::arc_lanes::LANES;
 use crate::prepare::preparation::Prepare;
-use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::prepare::prepared::Prepared;
 use crate::shader::ArcSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
+use crate::time::spans::{NONE, Part, Source};
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
@@ -110,7 +111,7 @@ impl Prepare for ArcPreparation {
         let count = spans.starts.len() - first_span;
         let sources = (segments..segments + count as u32).map(Source::Segment);
         spans.sources.extend(sources);
-        let beyond = prepared.copies(track);
+        let beyond = prepared.beyond_of_copies(track);
         prepared.parts.push(Part {
             track: index as u32,
             first_key: start as u32,

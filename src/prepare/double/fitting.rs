@@ -12,9 +12,10 @@ use crate::prepare::double::cut::{Cutter, Part as CurvePart};
 use crate::prepare::double::fit::{FitBlock, Tier, tier};
 use crate::prepare::double::intervals::{Intervals, LANES};
 use crate::prepare::double::shape::Shape;
-use crate::prepare::{NONE, Part, Prepared, Source, Spans};
+use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
+use crate::time::spans::{NONE, Part, Source, Spans};
 
 /// Fits curves; what it needs for that is kept. Each is that of the next span, whose source
 /// is not there yet.

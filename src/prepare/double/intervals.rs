@@ -10,10 +10,10 @@ use std::ops::Range;
 
 use crate::math::quaternion::{self, Arithmetic, Quaternion, Vector, square};
 use crate::method::interpolation::Quantity;
-use crate::prepare::NONE;
 use crate::prepare::double::curve::{Curve, Piece};
 use crate::prepare::double::shape::Shape;
 use crate::simd::lanes::{Doubles, Lanes};
+use crate::time::spans::NONE;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 

@@ -12,12 +12,13 @@ use crate::prepare::double::handles::{FramesHeld, Steps};
 use crate::prepare::double::intervals::{Intervals, LANES, Stretch};
 use crate::prepare::motion::constant_speed::{Place, Waiting};
 use crate::prepare::preparation::Prepare;
+use crate::prepare::prepared::Prepared;
 use crate::prepare::single::curves::Direct;
-use crate::prepare::{NONE, Part, Prepared, Source};
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frame_rate::FrameRate;
-use crate::time::wrap::Outside;
+use crate::time::spans::{NONE, Part, Source};
+use crate::time::wrap::WrapMode;
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 
@@ -104,7 +105,7 @@ impl Prepare for SmoothPreparation {
         } else if meets_keys {
             prepared.constant(STILL);
         }
-        let held = |at_end: bool, key: u32, outside: Outside| {
+        let held = |at_end: bool, key: u32, outside: WrapMode| {
             let goes_on = self.goes_on(outside) && all > 0;
             if meets_keys && at_end && !goes_on {
                 key
@@ -113,7 +114,7 @@ impl Prepare for SmoothPreparation {
             }
         };
         let part = prepared.parts.len();
-        let beyond = prepared.copies(track);
+        let beyond = prepared.beyond_of_copies(track);
         prepared.parts.push(Part {
             track: index as u32,
             first_key: intervals.start as u32,
@@ -351,8 +352,8 @@ impl SmoothPreparation {
     }
 
     /// What stands still at its ends does so outside them.
-    fn goes_on(&self, outside: Outside) -> bool {
-        outside == Outside::Extrapolate && !self.is_frozen()
+    fn goes_on(&self, outside: WrapMode) -> bool {
+        outside == WrapMode::Extrapolate && !self.is_frozen()
     }
 
     fn is_frozen(&self) -> bool {

@@ -8,7 +8,8 @@ use crate::math::quaternion::length;
 use crate::prepare::double::curve::Curve;
 use crate::prepare::double::fitting::Fitting;
 use crate::prepare::motion::arc_length::Pace;
-use crate::prepare::{NONE, Part, Prepared, Source};
+use crate::prepare::prepared::Prepared;
+use crate::time::spans::{NONE, Part, Source};
 
 /// Where an interval is.
 pub(crate) struct Place {

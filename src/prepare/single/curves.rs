@@ -8,6 +8,7 @@ use crate::method::{FromKeys, Smooth};
 use crate::prepare::double::fitting::Fitting;
 use crate::prepare::double::handles::Steps;
 use crate::prepare::double::intervals::{Intervals, LANES, ROOM, Stretch};
+use crate::prepare::prepared::Prepared;
 use crate::prepare::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
 use crate::prepare::single::handles::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
 use crate::prepare::single::hermite_fit::Halves;
@@ -16,8 +17,8 @@ use crate::prepare::single::key_weights::KeyWeights;
 use crate::prepare::single::long_tangents::FarKeys;
 use crate::prepare::single::small_angle::GentleLanes;
 use crate::prepare::single::waiting::{List, WaitingCurves, fit};
-use crate::prepare::{NONE, Prepared};
 use crate::simd::dispatch::in_lanes;
+use crate::time::spans::NONE;
 
 /// Where more than one interval of so many is left over, all of a block is worked out in
 /// f64: alone each would bring two neighbours.

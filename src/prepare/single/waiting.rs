@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use bytemuck::Zeroable as _;
 
-use crate::prepare::Prepared;
 use crate::prepare::double::fit::{MOST, Samples};
 use crate::prepare::double::intervals::{LANES, ROOM};
+use crate::prepare::prepared::Prepared;
 use crate::prepare::single::handles::CurveNumbers;
 use crate::prepare::single::hermite_fit::{BetweenKeys, KeyFit};
 use crate::shader::PolynomialSegment;

@@ -1,24 +1,24 @@
-//! Where the spans of a part lie among the samples, some of them at once, in vector lanes.
+//! Where intervals lie among the samples, some of them at once, in vector lanes: spans of
+//! prepared tracks, or the intervals between keys.
 
 use std::ops::Range;
 
 use crate::math::canonical::whole_number;
-use crate::prepare::{Part, Prepared};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::{Clock, in_frames};
-use crate::time::runs::Parameter;
+use crate::time::runs::{COUNTABLE, Parameter};
 
-/// The frame coordinates of consecutive spans, and what their samples' parameters
-/// follow from.
-pub(crate) struct SpanBlock {
-    /// Where each span starts, and at the end where the last one ends, in frames.
+/// The frame coordinates of intervals that follow one another, and what the parameters of
+/// their samples follow from.
+pub(crate) struct IntervalBlock {
+    /// Where each starts, and at the end where the last one ends, in frames.
     frame: [f64; Self::LEN + 1],
     /// The first of the samples asked for that is not before `frame`, or their end.
     pub(crate) first: [usize; Self::LEN + 1],
     /// Whether that is `frame` itself: 1 or 0.
     pub(crate) is_held: [u64; Self::LEN],
-    /// The whole frame nearest to each span's middle.
+    /// The whole frame nearest to the middle of each.
     pub(crate) whole: [f64; Self::LEN],
     /// From there to `first`.
     pub(crate) distance: [f32; Self::LEN],
@@ -26,11 +26,11 @@ pub(crate) struct SpanBlock {
     pub(crate) offset: [f32; Self::LEN],
     /// Whether all distances of samples are whole numbers of f32.
     pub(crate) are_near: bool,
-    /// The spans that hold samples, by their places in the block.
+    /// Those that hold samples, by their places in the block.
     pub(crate) occupied: Occupied,
 }
 
-impl SpanBlock {
+impl IntervalBlock {
     const LEN: usize = 32;
 
     #[inline(always)]
@@ -48,16 +48,31 @@ impl SpanBlock {
         }
     }
 
-    /// What a cubic of the `j`th span that is evaluated in f64 needs.
-    pub(crate) fn parameter(&self, j: usize) -> Parameter {
-        Parameter::Frames {
-            start: self.frame[j],
-            frames: self.frame[j + 1] - self.frame[j],
+    /// What a curve of the `j`th interval that is evaluated in f64 needs.
+    pub(crate) fn parameter<C: Clock>(&self, j: usize) -> Parameter {
+        let (mut start, mut end) = (self.frame[j], self.frame[j + 1]);
+        if C::IS_REVERSED {
+            (start, end) = (end, start);
         }
+        let frames = end - start;
+        Parameter::Frames { start, frames }
+    }
+
+    /// Frames of the `j`th interval.
+    pub(crate) fn frames(&self, j: usize) -> f64 {
+        self.frame[j + 1] - self.frame[j]
+    }
+
+    /// Whether the distances of the samples in the `j`th interval fit 32 bits.
+    #[inline(always)]
+    pub(crate) fn is_countable(&self, j: usize) -> bool {
+        let distance = |sample: usize| (sample as f64 - self.whole[j]).abs();
+        // They do if those of the first and of the one behind the last do.
+        distance(self.first[j]) < COUNTABLE && distance(self.first[j + 1]) < COUNTABLE
     }
 }
 
-/// A bit for each of some spans that holds samples, and their places in order. Where keys are
+/// A bit for each interval that holds samples, and their places in order. Where keys are
 /// denser than samples no processor guesses which these are.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Occupied(pub(crate) u64);
@@ -73,29 +88,21 @@ impl Iterator for Occupied {
     }
 }
 
-/// The spans of a part in blocks.
-pub(crate) struct SpanBlocks<'a, C> {
+/// Intervals that follow one another, in blocks.
+pub(crate) struct IntervalBlocks<'a, C> {
     clock: C,
     starts: &'a [f64],
-    /// Where the last span ends.
+    /// Where the last interval ends.
     end: f64,
     /// The samples asked for.
     samples: Range<usize>,
-    /// The first span's place among all.
-    first_span: usize,
-    /// How many spans are done.
+    /// How many intervals are done.
     done: usize,
 }
 
-impl<'a, C: Clock> SpanBlocks<'a, C> {
-    pub(crate) fn new(
-        prepared: &'a Prepared,
-        part: &Part,
-        clock: C,
-        samples: Range<usize>,
-    ) -> Self {
-        let starts = &prepared.spans.starts[part.spans.clone()];
-        // The span that holds the first sample; a time's own rounding may put it one
+impl<'a, C: Clock> IntervalBlocks<'a, C> {
+    pub(crate) fn new(starts: &'a [f64], end: f64, clock: C, samples: Range<usize>) -> Self {
+        // The interval that holds the first sample; a time's own rounding may put it one
         // further.
         let mut done = 0;
         if samples.start > 0
@@ -111,41 +118,52 @@ impl<'a, C: Clock> SpanBlocks<'a, C> {
         Self {
             clock,
             starts,
-            end: part.end,
+            end,
             samples,
-            first_span: part.spans.start,
             done,
         }
     }
 
-    /// Fills a block with the next spans, and tells which these are; nothing where no span
-    /// is left that holds samples.
-    pub(crate) fn fill(&mut self, block: &mut SpanBlock) -> Option<Range<usize>> {
-        let from = self.done;
-        if from == self.starts.len() {
+    /// Fills a block with the next intervals in the order in which frames meet them, and tells
+    /// which these are by that order; nothing where none is left that holds samples.
+    pub(crate) fn fill(&mut self, block: &mut IntervalBlock) -> Option<Range<usize>> {
+        let (from, count) = (self.done, self.starts.len());
+        if from == count {
             return None;
         }
-        let to = (from + SpanBlock::LEN).min(self.starts.len());
+        let to = (from + IntervalBlock::LEN).min(count);
         self.done = to;
+        let mut reversed = [0.0; IntervalBlock::LEN];
+        let (starts, next) = if C::IS_REVERSED {
+            let times = (self.starts[count - to..].iter().copied().chain([self.end])).rev();
+            let times = times.skip(from);
+            for (place, time) in reversed[..to - from].iter_mut().zip(times) {
+                *place = time;
+            }
+            (&reversed[..to - from], self.starts[count - to])
+        } else {
+            let next = self.starts.get(to).copied().unwrap_or(self.end);
+            (&self.starts[from..to], next)
+        };
         in_lanes(&mut Fill {
             clock: self.clock,
-            starts: &self.starts[from..to],
-            next: self.starts.get(to).copied().unwrap_or(self.end),
+            starts,
+            next,
             samples: [self.samples.start as f64, self.samples.end as f64],
             block,
         });
-        (block.first[0] < self.samples.end).then_some(self.first_span + from..self.first_span + to)
+        (block.first[0] < self.samples.end).then_some(from..to)
     }
 }
 
 struct Fill<'a, C> {
     clock: C,
-    /// At most [`SpanBlock::LEN`].
+    /// At most [`IntervalBlock::LEN`].
     starts: &'a [f64],
     /// Where the last of them ends.
     next: f64,
     samples: [f64; 2],
-    block: &'a mut SpanBlock,
+    block: &'a mut IntervalBlock,
 }
 
 impl<C: Clock> InLanes for Fill<'_, C> {
@@ -154,8 +172,8 @@ impl<C: Clock> InLanes for Fill<'_, C> {
         let (clock, samples, starts) = (self.clock, self.samples, self.starts);
         let count = starts.len();
         // Their own, and not borrowed: the compiler must see that nothing else is in them.
-        let mut frames = [0.0; SpanBlock::LEN + 1];
-        let mut firsts = [0.0; SpanBlock::LEN + 1];
+        let mut frames = [0.0; IntervalBlock::LEN + 1];
+        let mut firsts = [0.0; IntervalBlock::LEN + 1];
         let (frame, first) = (&mut frames[..count], &mut firsts[..count]);
         for j in 0..count {
             let boundary = clock.boundary(starts[j]);
@@ -173,9 +191,10 @@ impl<C: Clock> InLanes for Fill<'_, C> {
         let distance = &mut block.distance[..count];
         let scale = &mut block.scale[..count];
         let offset = &mut block.offset[..count];
+        let extent = if C::IS_REVERSED { -1.0 } else { 1.0 };
         let mut far = 0;
         for j in 0..count {
-            let span = in_frames(frame[j], next_frame[j], 1.0);
+            let span = in_frames(frame[j], next_frame[j], extent);
             let (before, after) = (first[j] - span.whole, next_first[j] - span.whole);
             let is_far = (before.abs() >= FAR) | (after.abs() >= FAR);
             far |= u64::from(is_far & (first[j] < next_first[j]));
@@ -186,9 +205,9 @@ impl<C: Clock> InLanes for Fill<'_, C> {
             offset[j] = span.offset;
         }
         block.are_near = far == 0;
-        // No span is behind the last one's end: there `first` is 0.
+        // No interval is behind the last one's end: there `first` is 0.
         let mut occupied = 0;
-        for j in 0..SpanBlock::LEN {
+        for j in 0..IntervalBlock::LEN {
             occupied |= u64::from(firsts[j] < firsts[j + 1]) << j;
         }
         block.occupied = Occupied(occupied);
@@ -203,4 +222,29 @@ const FAR: f64 = (1u64 << 23) as f64;
 fn within(sample: f64, [start, end]: [f64; 2]) -> f64 {
     let from = if sample > start { sample } else { start };
     if from < end { from } else { end }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::frame_clock::FrameClock;
+    use crate::time::frame_rate::FrameRate;
+
+    /// Steps of one frame add up without rounding only while every distance, and those that
+    /// fill the last vector behind them, are whole numbers of f32.
+    #[test]
+    fn distances_are_stepped_only_where_they_are_whole_numbers_of_f32() {
+        let rate = FrameRate::new(1, 1).unwrap();
+        for (frames, are_near) in [((1u64 << 24) - 2, true), ((1 << 24) + 2, false)] {
+            let (starts, end) = ([0.0], frames as f64);
+            let clock = FrameClock::new(rate, 0.0, end);
+            let mut intervals = IntervalBlocks::new(&starts, end, clock, 0..frames as usize);
+            let mut block = IntervalBlock::new();
+            assert_eq!(intervals.fill(&mut block), Some(0..1));
+            assert_eq!(block.are_near, are_near, "{frames} frames");
+            assert!(block.is_countable(0));
+            let last = f64::from(block.distance[0]) + (frames - 1) as f64;
+            assert!(!are_near || last + 16.0 <= (1 << 24) as f64);
+        }
+    }
 }

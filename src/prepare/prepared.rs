@@ -1,0 +1,144 @@
+//! What tracks become: segments and constants, and where in time they lie.
+
+use std::ops::Range;
+
+use crate::curve::segment::Segments;
+use crate::math::canonical::round_quat;
+use crate::method::interpolation::Interpolation;
+use crate::prepare::double::curve::Curve;
+use crate::time::frames::Timeline;
+use crate::time::runs::Parameter;
+use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
+use crate::time::wrap::{TrackCopy, Wrap};
+use crate::tracks::check::LATEST;
+use crate::tracks::set::Track;
+
+/// Segments of some tracks, with what is needed to find the segment of a sample.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    pub(crate) segments: Segments,
+    /// Rotations that are stored as they are: keys, end values.
+    pub(crate) constants: Vec<[f32; 4]>,
+    /// Curves too wild for the kernels.
+    pub(crate) exact: Vec<Curve>,
+    pub(crate) spans: Spans,
+    pub(crate) parts: Vec<Part>,
+    /// What lies outside the keys.
+    pub(crate) wrap: Wrap,
+}
+
+impl Prepared {
+    pub(crate) fn new(interpolation: &Interpolation) -> Self {
+        Self {
+            segments: Segments::new(interpolation.form()),
+            constants: Vec::new(),
+            exact: Vec::new(),
+            spans: Spans::default(),
+            parts: Vec::new(),
+            wrap: interpolation.wrap(),
+        }
+    }
+
+    /// Makes room for so many keys: to grow into it would copy it all over again.
+    pub(crate) fn reserve(&mut self, keys: usize) {
+        self.segments.reserve(keys);
+        self.constants.reserve(keys);
+        self.spans.reserve(keys);
+    }
+
+    /// Forgets everything and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.segments.clear();
+        self.constants.clear();
+        self.exact.clear();
+        self.spans.clear();
+        self.parts.clear();
+    }
+
+    /// Moves all of `other` behind its own.
+    pub(crate) fn append(&mut self, other: Self) {
+        let constants = self.constants.len() as u32;
+        let segments = self.segments.len() as u32;
+        let exact = self.exact.len() as u32;
+        let spans = self.spans.len();
+        let place = |own: u32, before: u32| match own {
+            NONE => NONE,
+            _ => own + before,
+        };
+        let shift = |constant: u32| place(constant, constants);
+        let own = &mut self.spans;
+        own.starts.extend(other.spans.starts);
+        own.sources
+            .extend(other.spans.sources.iter().map(|&source| match source {
+                Source::Segment(i) => Source::Segment(i + segments),
+                Source::Constant(i) => Source::Constant(shift(i)),
+                Source::Exact(i) => Source::Exact(i + exact),
+            }));
+        own.keys.extend(other.spans.keys.into_iter().map(shift));
+        self.parts.extend(other.parts.into_iter().map(|part| Part {
+            spans: part.spans.start + spans..part.spans.end + spans,
+            before: shift(part.before),
+            after: shift(part.after),
+            beyond: part.beyond.map(|beyond| {
+                Box::new(Beyond {
+                    at_end: shift(beyond.at_end),
+                    from_before: place(beyond.from_before, exact),
+                    from_after: place(beyond.from_after, exact),
+                    ..*beyond
+                })
+            }),
+            ..part
+        }));
+        self.segments.append(other.segments);
+        self.constants.extend(other.constants);
+        self.exact.extend(other.exact);
+    }
+
+    /// The rotation of a sample that is evaluated in f64.
+    pub(crate) fn exact(
+        &self,
+        index: u32,
+        parameter: Parameter,
+        timeline: &Timeline,
+        track: usize,
+        sample: usize,
+    ) -> [f32; 4] {
+        let t = match parameter {
+            Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
+            Parameter::Seconds { start, seconds } => {
+                // Further away than keys may be, a curve's powers overflow.
+                let time = timeline.time(track, sample).clamp(-LATEST, LATEST);
+                (time - start) / seconds
+            }
+        };
+        round_quat(self.exact[index as usize].value(t))
+    }
+
+    /// The copies of a part's track among some samples.
+    pub(crate) fn copies(
+        &self,
+        part: &Part,
+        timeline: &Timeline,
+        samples: Range<usize>,
+    ) -> impl Iterator<Item = TrackCopy> {
+        let span = part.beyond.as_ref().map(|beyond| beyond.span);
+        self.wrap.copies(span, timeline, samples)
+    }
+
+    /// What a part needs from the start, where copies of its track are asked for.
+    pub(crate) fn beyond_of_copies(&self, track: Track) -> Option<Box<Beyond>> {
+        let new = || Box::new(Beyond::new(track.times));
+        self.wrap.repeats().then(new)
+    }
+
+    pub(crate) fn constant(&mut self, value: [f32; 4]) -> u32 {
+        self.constants.push(value);
+        self.constants.len() as u32 - 1
+    }
+
+    pub(crate) fn push_span(&mut self, start: f64, source: Source, key: u32) {
+        self.spans.starts.push(start);
+        self.spans.sources.push(source);
+        self.spans.keys.push(key);
+    }
+}

@@ -1,0 +1,141 @@
+//! Where in time the segments of prepared tracks lie.
+
+use std::ops::Range;
+
+use crate::time::frames::FramesError;
+
+/// No constant.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Stretches of tracks' time, each from its start to the start of the next one.
+/// Side by side, because the schedule is worked out for many at a time.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spans {
+    /// Seconds.
+    pub(crate) starts: Vec<f64>,
+    pub(crate) sources: Vec<Source>,
+    /// The constant to store at exactly the start, or [`NONE`].
+    pub(crate) keys: Vec<u32>,
+}
+
+/// What gives the rotations of a span: places in the lists of [`Prepared`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Source {
+    Segment(u32),
+    Constant(u32),
+    Exact(u32),
+}
+
+/// Some consecutive key intervals of one track: all of them, unless the track is
+/// so long that its segments are spread over several buffers.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    /// The track's place in the set.
+    pub(crate) track: u32,
+    /// The first of its keys, in the track.
+    pub(crate) first_key: u32,
+    pub(crate) spans: Range<usize>,
+    /// Where the last span ends, seconds.
+    pub(crate) end: f64,
+    /// The constant held before the first key; [`NONE`] when another part has it.
+    pub(crate) before: u32,
+    /// The constant held from the last key on; [`NONE`] when another part has it.
+    pub(crate) after: u32,
+    /// What else is at its ends, where that is more than two constants. Apart: a crowd has
+    /// a million parts.
+    pub(crate) beyond: Option<Box<Beyond>>,
+}
+
+/// What lies at a track's ends and outside its keys.
+#[derive(Debug, Clone)]
+pub(crate) struct Beyond {
+    /// The constant at exactly the last key; [`NONE`] where it is what is held after it.
+    pub(crate) at_end: u32,
+    /// The exact curves that go on before the first key and behind the last, their
+    /// parameter seconds from there; [`NONE`] where constants are held.
+    pub(crate) from_before: u32,
+    pub(crate) from_after: u32,
+    /// When the whole track starts and ends, seconds.
+    pub(crate) span: (f64, f64),
+}
+
+impl Beyond {
+    pub(crate) fn new(times: &[f64]) -> Self {
+        Self {
+            at_end: NONE,
+            from_before: NONE,
+            from_after: NONE,
+            span: (times[0], times[times.len() - 1]),
+        }
+    }
+}
+
+impl Part {
+    /// What is at its ends, to be filled in.
+    pub(crate) fn beyond(&mut self, times: (f64, f64)) -> &mut Beyond {
+        let new = || Box::new(Beyond::new(&[times.0, times.1]));
+        self.beyond.get_or_insert_with(new)
+    }
+}
+
+impl Spans {
+    pub(crate) fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Begins spans at these times, the first at this constant and the others at those behind
+    /// it; their sources are to come.
+    #[inline]
+    pub(crate) fn begin(&mut self, starts: &[f64], key: u32) {
+        self.starts.extend_from_slice(starts);
+        match key {
+            NONE => self.keys.resize(self.keys.len() + starts.len(), NONE),
+            first => self.keys.extend(first..first + starts.len() as u32),
+        }
+    }
+
+    /// Adds some of other spans.
+    pub(crate) fn extend(&mut self, other: &Self, range: Range<usize>) {
+        self.starts.extend_from_slice(&other.starts[range.clone()]);
+        self.sources
+            .extend_from_slice(&other.sources[range.clone()]);
+        self.keys.extend_from_slice(&other.keys[range]);
+    }
+
+    pub(crate) fn reserve(&mut self, count: usize) {
+        self.starts.reserve(count);
+        self.sources.reserve(count);
+        self.keys.reserve(count);
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.starts.clear();
+        self.sources.clear();
+        self.keys.clear();
+    }
+    /// Frames of one of a part's spans cannot be counted: between which keys.
+    #[cold]
+    pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {
+        let Self {
+            starts,
+            sources,
+            keys,
+        } = self;
+        // What was cut starts at a key only with its first span; where curves do not meet
+        // their keys that cannot be told.
+        let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
+        let is_at_key = |&span: &usize| {
+            let stands = matches!(sources[span], Source::Constant(_));
+            keys[span] != NONE || stands || !meets_keys
+        };
+        let until = part.spans.start..=span;
+        let behind = until.clone().skip(1).filter(is_at_key).count();
+        let from = until.rev().find(is_at_key).unwrap_or(span);
+        let to = (span + 1..part.spans.end).find(is_at_key);
+        FramesError::GapTooLong {
+            track: part.track as usize,
+            key: part.first_key as usize + behind,
+            frames: (to.map_or(part.end, |to| starts[to]) - starts[from]) * rate,
+        }
+    }
+}

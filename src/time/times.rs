@@ -1,0 +1,293 @@
+//! Explicit times, which come in any order: what gives each, among the spans of prepared tracks
+//! or among keys.
+
+use std::ops::Range;
+
+use crate::math::canonical::round_f32;
+use crate::shader::{IS_KEY, KeySample};
+use crate::time::frame_clock::finite_scale;
+use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
+use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
+
+impl Spans {
+    /// The runs of one part among some samples, whose times are given.
+    #[inline(always)]
+    pub(crate) fn runs_of_times(
+        &self,
+        part: &Part,
+        times: &[f64],
+        samples: Range<usize>,
+        emit: &mut impl Emit,
+    ) {
+        let starts = &self.starts[part.spans.clone()];
+        let mut sample = samples.start;
+        let mut i = 0;
+        while sample < samples.end {
+            let time = times[sample];
+            i = interval_at(starts, time, i);
+            let begin = starts.first().copied().unwrap_or(part.end);
+            let (covered, source) = if begin <= time && time < part.end {
+                let end = starts.get(i + 1).copied().unwrap_or(part.end);
+                let start = starts[i];
+                let key = self.keys[part.spans.start + i];
+                if time == start && key != NONE {
+                    (start..time.next_up(), Some(RunSource::Constant(key)))
+                } else {
+                    let open = if key == NONE { start } else { start.next_up() };
+                    let source = self.time_source(part.spans.start + i, end);
+                    (open..end, Some(source))
+                }
+            } else if let Some(beyond) = &part.beyond {
+                let rest = &times[sample..samples.end];
+                sample += outside(part, (begin, beyond), rest, sample, emit);
+                continue;
+            } else if time >= part.end {
+                (part.end..f64::INFINITY, constant_source(part.after))
+            } else {
+                (f64::NEG_INFINITY..begin, constant_source(part.before))
+            };
+            let run = times[sample..samples.end].iter();
+            let count = run.take_while(|time| covered.contains(time)).count();
+            if let Some(source) = source {
+                emit.run(Run {
+                    sample,
+                    count,
+                    source,
+                });
+            }
+            sample += count;
+        }
+    }
+
+    /// What gives the rotation of one part at a time; nothing outside its keys.
+    #[inline(always)]
+    pub(crate) fn source_at(&self, part: &Part, time: f64) -> Option<RunSource> {
+        let (span, end) = self.span_at(part, time)?;
+        let key = self.keys[span];
+        if time == self.starts[span] && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(self.time_source(span, end))
+    }
+
+    /// The span of one part that holds a time, and where it ends; nothing outside its keys.
+    #[inline(always)]
+    pub(crate) fn span_at(&self, part: &Part, time: f64) -> Option<(usize, f64)> {
+        let starts = &self.starts[part.spans.clone()];
+        if starts.is_empty() {
+            return None;
+        }
+        let i = interval_at(starts, time, 0);
+        let end = starts.get(i + 1).copied().unwrap_or(part.end);
+        // Written out: closures are not always inlined.
+        (starts[i] <= time && time < end).then_some((part.spans.start + i, end))
+    }
+
+    #[inline(always)]
+    fn time_source(&self, span: usize, end: f64) -> RunSource {
+        let start = self.starts[span];
+        let seconds = end - start;
+        match self.sources[span] {
+            Source::Constant(constant) => RunSource::Constant(constant),
+            Source::Exact(index) => RunSource::Exact {
+                index,
+                parameter: Parameter::Seconds { start, seconds },
+            },
+            Source::Segment(index) => RunSource::Segment {
+                index,
+                distance: Distance::Seconds {
+                    middle: start + seconds * 0.5,
+                },
+                scale: finite_scale(1.0 / seconds),
+                offset: 0.0,
+            },
+        }
+    }
+}
+
+/// Emits the run that the first of some times, outside a part's keys, is in; how many of
+/// them that takes. Apart, so that what is usual stays small.
+#[inline(never)]
+fn outside(
+    part: &Part,
+    (begin, beyond): (f64, &Beyond),
+    times: &[f64],
+    sample: usize,
+    emit: &mut impl Emit,
+) -> usize {
+    let time = times[0];
+    let (covered, source) = if time < begin {
+        let source = source_beyond(part.before, beyond.from_before, begin);
+        (f64::NEG_INFINITY..begin, source)
+    } else if time == part.end && beyond.at_end != NONE {
+        (time..time.next_up(), constant_source(beyond.at_end))
+    } else {
+        let source = source_beyond(part.after, beyond.from_after, part.end);
+        (part.end..f64::INFINITY, source)
+    };
+    let count = times
+        .iter()
+        .take_while(|time| covered.contains(time))
+        .count();
+    if let Some(source) = source {
+        emit.run(Run {
+            sample,
+            count,
+            source,
+        });
+    }
+    count
+}
+
+/// What gives the samples outside the keys: a constant, or a curve from the end on, or
+/// another part.
+fn source_beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
+    match (constant_source(constant), curve) {
+        (None, NONE) => None,
+        (None, index) => Some(RunSource::Exact {
+            index,
+            parameter: Parameter::Seconds {
+                start: end,
+                seconds: 1.0,
+            },
+        }),
+        (held, _) => held,
+    }
+}
+
+fn constant_source(constant: u32) -> Option<RunSource> {
+    (constant != NONE).then_some(RunSource::Constant(constant))
+}
+
+/// Where times lie among keys. What an interval makes of them is kept for the next time in
+/// it: many tracks share their times, and a division takes longer than to look.
+pub(crate) struct TimePlan {
+    start: f64,
+    end: f64,
+    middle: f64,
+    scale: f32,
+}
+
+impl TimePlan {
+    pub(crate) fn new() -> Self {
+        Self {
+            start: f64::NAN,
+            end: f64::NAN,
+            middle: 0.0,
+            scale: 0.0,
+        }
+    }
+
+    /// Where a time lies among keys; `near` is the key to look at first.
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> KeySample {
+        let key = key_before(starts, time, near);
+        if key & IS_KEY != 0 {
+            return KeySample {
+                key,
+                parameter: 0.0,
+            };
+        }
+        let (start, end) = (starts[key as usize], starts[key as usize + 1]);
+        KeySample {
+            key,
+            parameter: self.parameter(start, end, time),
+        }
+    }
+
+    /// The parameter of a time between two keys.
+    #[inline(always)]
+    fn parameter(&mut self, start: f64, end: f64, time: f64) -> f32 {
+        if self.start != start || self.end != end {
+            let seconds = end - start;
+            *self = Self {
+                start,
+                end,
+                middle: start + seconds * 0.5,
+                scale: finite_scale(1.0 / seconds),
+            };
+        }
+        round_f32(time - self.middle) * self.scale + 0.0
+    }
+}
+
+/// The key before a time, which is the rotation itself where it carries `IS_KEY`; `near` is the
+/// one to look at first.
+#[inline(always)]
+pub(crate) fn key_before(times: &[f64], time: f64, near: usize) -> u32 {
+    let last = times.len() - 1;
+    if time >= times[last] {
+        return IS_KEY | last as u32;
+    } else if time < times[0] {
+        return IS_KEY;
+    }
+    let key = interval_at(times, time, near);
+    key as u32 | if time == times[key] { IS_KEY } else { 0 }
+}
+
+/// The interval that holds a time by the times at which intervals start, where it is not before
+/// the first; `near` is the one to look at first.
+#[inline(always)]
+pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
+    let holds = |i: usize| {
+        starts.get(i).is_some_and(|&start| start <= time)
+            && starts.get(i + 1).is_none_or(|&next| time < next)
+    };
+    // Times mostly increase: there and next before searching.
+    if holds(near) {
+        near
+    } else if holds(near + 1) {
+        near + 1
+    } else {
+        let behind = starts.partition_point(|&start| start <= time);
+        behind.saturating_sub(1)
+    }
+}
+
+/// Times that have been looked up, of which the parameters are worked out together.
+pub(crate) struct TimeLanes {
+    /// What gives each: of no concern here.
+    pub(crate) sources: [u32; Self::LEN],
+    times: [f64; Self::LEN],
+    starts: [f64; Self::LEN],
+    ends: [f64; Self::LEN],
+    pub(crate) count: usize,
+}
+
+impl TimeLanes {
+    pub(crate) const LEN: usize = 64;
+
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self {
+            sources: [0; Self::LEN],
+            times: [0.0; Self::LEN],
+            starts: [0.0; Self::LEN],
+            ends: [1.0; Self::LEN],
+            count: 0,
+        }
+    }
+
+    /// Adds a time between two others.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, source: u32, time: f64, start: f64, end: f64) {
+        let lane = self.count % Self::LEN;
+        self.sources[lane] = source;
+        self.times[lane] = time;
+        (self.starts[lane], self.ends[lane]) = (start, end);
+        self.count = lane + 1;
+    }
+
+    /// Where between its two others each lies, as `TimePlan::parameter`.
+    #[inline(always)]
+    pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
+        let mut parameters = [0.0; Self::LEN];
+        for lane in 0..Self::LEN {
+            let seconds = self.ends[lane] - self.starts[lane];
+            let middle = self.starts[lane] + seconds * 0.5;
+            let scale = finite_scale(1.0 / seconds);
+            parameters[lane] = round_f32(self.times[lane] - middle) * scale + 0.0;
+        }
+        parameters
+    }
+}
