@@ -6,7 +6,7 @@
 
 /// Where a sample lies among the keys of its row.
 struct KeySample {
-    /// The key before it; the rotation itself, where this carries IS_KEY.
+    /// The key before it; the rotation itself, where this carries `IS_KEY`.
     key: u32,
     /// From -1/2 at that key to 1/2 at the next.
     parameter: f32,

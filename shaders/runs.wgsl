@@ -4,11 +4,11 @@
 
 /// Consecutive samples of one track that lie in one segment, or hold one constant.
 struct Item {
-    /// The segment's index; the constant's, when `count` carries IS_CONSTANT.
+    /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
     source: u32,
     /// Where the first sample is stored.
     output: u32,
-    /// Number of samples, at most ITEM_SAMPLES; with IS_CONSTANT when it holds a constant.
+    /// Number of samples, at most `ITEM_SAMPLES`; with `IS_CONSTANT` when it holds a constant.
     count: u32,
     /// The first sample's distance from the segment's middle in frames; or the index of its
     /// distance in the list of distances.

@@ -4,7 +4,7 @@
 
 /// One sample.
 struct ListedSample {
-    /// The segment's index; the constant's, with IS_CONSTANT.
+    /// The segment's index; the constant's, with `IS_CONSTANT`.
     source: u32,
     /// As the form's `evaluate` takes it.
     parameter: f32,

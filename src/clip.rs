@@ -2,10 +2,10 @@
 
 use glam::Quat;
 
+use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
-use crate::method::interpolation::Quantity;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations};
 use crate::output::window::Window;

@@ -1,8 +1,8 @@
 //! Why an evaluation failed.
 
+use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::OfDevice;
-use crate::method::interpolation::InterpolationError;
 use crate::output::encoding::Encoding;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;

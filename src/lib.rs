@@ -52,6 +52,7 @@ mod device;
 mod engine;
 mod error;
 mod evaluate;
+mod fit;
 mod from_keys;
 mod gpu;
 mod math;
@@ -70,6 +71,7 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
+pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;
@@ -78,9 +80,7 @@ pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
 pub use crate::gpu::options::{EngineOptions, Reads, Timings, Transfer};
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
 pub use crate::gpu::self_test::CanaryReport;
-pub use crate::method::interpolation::{
-    Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed,
-};
+pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
 pub use crate::method::{Continuity, Cost, Keys, METHODS, Method};
 pub use crate::output::buffer::OutputBuffer;

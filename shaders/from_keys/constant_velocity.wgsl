@@ -1,6 +1,6 @@
 // An arc as a polynomial: what smooth methods make of a track of two keys. Taylor's series of
 // cosine and sine about the middle.
-// Twin: src/prepare/constant_velocity.rs.
+// Twin: src/fit/constant_velocity.rs.
 
 // 1/2!, 1/3!, 1/4! …, with the signs that they have in the series.
 const SERIES_2: f32 = -0.5;

@@ -16,7 +16,7 @@ struct TangentWeights {
     /// The part of the tangent that is the handle after the key; the handle before it gets what
     /// is left of a third.
     outgoing: f32,
-    /// KEY_INNER, KEY_AT_END or KEY_UNKNOWN.
+    /// `KEY_INNER`, `KEY_AT_END` or `KEY_UNKNOWN`.
     kind: f32,
 }
 

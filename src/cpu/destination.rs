@@ -2,9 +2,9 @@
 
 use std::slice;
 
-use crate::cpu::evaluate::{Evaluate, Parameters};
-use crate::cpu::streaming::Line;
 use crate::simd::lanes::Lanes;
+use crate::simd::line::Line;
+use crate::twin::evaluate::{Evaluate, Parameters};
 
 /// Samples of a turn at most.
 const MOST: usize = 16;
@@ -149,7 +149,7 @@ pub(crate) mod tests {
 
     use super::*;
     use crate::cpu::evaluate::{Affine, frames_past_caches};
-    use crate::cpu::streaming::EACH;
+    use crate::simd::line::EACH;
 
     /// Frames past the caches, behind so many rotations of their first line.
     pub(crate) fn in_lines<L: Lanes, S: Evaluate>(

@@ -1,6 +1,6 @@
 //! The samples of one part of a track: its runs, evaluated as they are found.
 
-use crate::cpu::evaluate::{Affine, Evaluate, FEW, distances, frames, one};
+use crate::cpu::evaluate::{Affine, FEW, distances, frames, one};
 use crate::cpu::streaming::{Output, Samples};
 use crate::math::canonical::round_f32;
 use crate::prepare::clip_data::PartRef;
@@ -12,6 +12,7 @@ use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::time::runs::{Distance, Emit, Run, RunSource, runs_after, runs_before};
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::TrackCopy;
+use crate::twin::evaluate::Evaluate;
 
 /// Samples whose distances are found out together.
 const CHUNK: usize = 64;

@@ -4,26 +4,18 @@
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::cpu::destination::Places;
-use crate::cpu::evaluate::{Affine, Evaluate, FEW, frames, frames_past_caches};
+use crate::cpu::evaluate::{Affine, FEW, frames, frames_past_caches};
 use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
 use crate::simd::lanes::Lanes;
+use crate::simd::line::{EACH, Line};
+use crate::twin::evaluate::Evaluate;
 
 /// Bytes of a result of which caches keep so little that its reader misses nothing.
 const LONG: usize = 32 << 20;
 
 /// Samples of a row with which what a stage costs is less than what it saves.
 const ROW: usize = 64;
-
-/// Four rotations, a cache line of most processors.
-#[derive(Clone, Copy, Zeroable, Pod)]
-#[repr(C, align(64))]
-pub(crate) struct Line([[f32; 4]; EACH]);
-
-/// Rotations of a line.
-pub(crate) const EACH: usize = 4;
 
 /// Lines of a stage.
 const LINES: usize = 512;

@@ -2,9 +2,6 @@
 
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
 
-/// Coefficients of a [`PolynomialSegment`]: those of 1, s, … s¹⁰.
-pub(crate) const POWERS: usize = 11;
-
 /// The segments of one clip, all of one form: the list of the other form stays empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {

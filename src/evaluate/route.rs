@@ -3,9 +3,10 @@
 
 use std::fmt;
 
+use crate::curve::options::Speed;
 use crate::evaluate::backend::Backend;
 use crate::from_keys::KeyCurve;
-use crate::method::interpolation::{Interpolation, Speed};
+use crate::method::interpolation::Interpolation;
 use crate::output::rotations::Layout;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;

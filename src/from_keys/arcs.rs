@@ -1,12 +1,12 @@
-//! Twin of `shaders/sampled_arcs.wgsl` and `shaders/sampled_pairs.wgsl`: samples by two
+//! Twin of `shaders/from_keys/arcs.wgsl` and `shaders/from_keys/two_keys.wgsl`: samples by two
 //! keys, in lanes.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+use crate::fit::arc_lanes;
+use crate::fit::arc_lanes::{LANES as ARC_LANES, whole};
+use crate::fit::constant_velocity::arc_component;
 use crate::math::canonical::canonical;
-use crate::prepare::arcs::arc_lanes;
-use crate::prepare::arcs::arc_lanes::{LANES as ARC_LANES, whole};
-use crate::prepare::constant_velocity::arc_component;
 use crate::shader::Form;
 use crate::shader::IS_KEY;
 use crate::shader::KeySample;

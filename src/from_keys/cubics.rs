@@ -1,11 +1,11 @@
-//! Twin of `shaders/sampled_cubics.wgsl`: cubics with fewer samples than keys, in lanes.
+//! Twin of `shaders/from_keys/cubics.wgsl`: cubics with fewer samples than keys, in lanes.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+use crate::fit::arc_lanes::whole;
+use crate::fit::tangent_weights::UNKNOWN;
 use crate::from_keys::arcs::LANES;
 use crate::math::canonical::canonical;
-use crate::prepare::arcs::arc_lanes::whole;
-use crate::prepare::tangent_weights::UNKNOWN;
 use crate::shader::TangentWeights;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
@@ -83,7 +83,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::prepare::tangent_weights::WeightRule;
+    use crate::fit::tangent_weights::WeightRule;
     use crate::simd::dispatch::in_lanes;
     use crate::simd::dispatch::tests::at_every_width;
 

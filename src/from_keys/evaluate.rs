@@ -4,13 +4,13 @@
 
 use std::ops::Range;
 
+use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::arcs::{ArcRun, LANES, TwoKeyBlock};
 use crate::from_keys::cubics::CubicBlock;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::batch::Batch;
 use crate::prepare::error::SetError;
-use crate::prepare::tangent_weights::TrackWeights;
 use crate::shader::{Form, IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;

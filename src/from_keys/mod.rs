@@ -7,8 +7,9 @@ pub(crate) mod evaluate;
 pub(crate) mod pieces;
 pub(crate) mod upload;
 
-use crate::method::interpolation::{Interpolation, Path};
-use crate::prepare::tangent_weights::WeightRule;
+use crate::curve::options::Path;
+use crate::fit::tangent_weights::WeightRule;
+use crate::method::interpolation::Interpolation;
 use crate::shader::{Form, LONGEST_STEP};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;

@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use glam::Quat;
 
+use crate::curve::options::{Ends, InterpolationError};
+use crate::fit::tangent_weights::WeightRule;
 use crate::from_keys::KeyCurve;
-use crate::method::interpolation::{Ends, Interpolation, InterpolationError};
-use crate::prepare::tangent_weights::WeightRule;
+use crate::method::interpolation::Interpolation;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::Quat;
 use rayon::prelude::*;
 
+use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::pieces::{KeyJob, KeyPiece, Part, What};
-use crate::prepare::tangent_weights::TrackWeights;
 use crate::shader::{IS_KEY, SIGN_TURNED};
 use crate::shader::{KeySample, RowShape, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};

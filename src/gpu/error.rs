@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use crate::method::interpolation::InterpolationError;
+use crate::curve::options::InterpolationError;
 use crate::prepare::error::SetError;
 use crate::time::frames::FramesError;
 

@@ -1,13 +1,14 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
 use crate::curve::formula::product::Product;
+use crate::curve::options::Ends;
+use crate::fit::double::handles::BetweenNeighbours;
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Vector, exp, product, ratio, scaled, sum};
 use crate::method::ends::End;
-use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
-use crate::prepare::double::handles::BetweenNeighbours;
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;

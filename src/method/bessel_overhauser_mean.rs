@@ -1,12 +1,12 @@
 //! Bessel-Overhauser by the mean of the slopes: the parabola through three keys, in
 //! logarithms.
 
+use crate::curve::options::Ends;
+use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::interpolation::Ends;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
-use crate::prepare::double::handles::{HandleRule, Handles, Interval};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 

@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::End;
-use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::tracks::set::Track;

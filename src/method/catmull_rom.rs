@@ -1,12 +1,12 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
+use crate::curve::options::Ends;
+use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::shape::Shape;
+use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::interpolation::Ends;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
-use crate::prepare::double::handles::{HandleRule, Handles, Interval};
-use crate::prepare::double::shape::Shape;
-use crate::prepare::tangent_weights::WeightRule;
 use crate::reference;
 use crate::shader::Form;
 

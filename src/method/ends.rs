@@ -3,12 +3,12 @@
 
 use std::marker::PhantomData;
 
-use crate::math::quaternion::{Quaternion, Vector, exp, log, product, scaled};
-use crate::method::interpolation::Ends;
-use crate::prepare::double::handles::{
+use crate::curve::options::Ends;
+use crate::fit::double::handles::{
     BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, KeyHandles,
 };
-use crate::prepare::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::math::quaternion::{Quaternion, Vector, exp, log, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
 /// Curves in cumulative form, for a method with that rule for handles.

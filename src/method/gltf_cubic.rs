@@ -1,10 +1,11 @@
 //! The cubic spline of glTF.
 
+use crate::curve::options::{Ends, Path};
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
-use crate::method::interpolation::{Ends, Interpolation, Path};
+use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::tracks::set::Track;

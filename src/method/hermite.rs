@@ -1,11 +1,12 @@
 //! Given angular velocities at the keys.
 
+use crate::curve::options::Ends;
+use crate::fit::double::handles::BetweenHandles;
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::scaled;
-use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
-use crate::prepare::double::handles::BetweenHandles;
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;

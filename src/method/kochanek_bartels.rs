@@ -1,12 +1,13 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
+use crate::curve::options::Ends;
+use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
-use crate::method::interpolation::{Ends, Interpolation};
+use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, ends};
-use crate::prepare::double::handles::{HandleRule, Handles, Interval};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 use crate::tracks::set::Track;

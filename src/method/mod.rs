@@ -23,6 +23,7 @@ pub(crate) mod squad;
 pub(crate) mod step;
 pub(crate) mod vector_method;
 
+pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
 pub use crate::method::b_spline::B_SPLINE;
 pub use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 pub use crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
@@ -30,9 +31,7 @@ pub use crate::method::c2::C2;
 pub use crate::method::catmull_rom::CATMULL_ROM;
 pub use crate::method::gltf_cubic::GLTF_CUBIC;
 pub use crate::method::hermite::HERMITE;
-pub use crate::method::interpolation::{
-    Axes, Ends, Interpolation, InterpolationError, Path, Quantity, Speed,
-};
+pub use crate::method::interpolation::Interpolation;
 pub use crate::method::kochanek_bartels::KOCHANEK_BARTELS;
 pub use crate::method::nlerp::NLERP;
 pub use crate::method::shoemake::SHOEMAKE;
@@ -47,12 +46,12 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
+use crate::fit::double::handles::HandleRule;
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
+use crate::fit::single::long_tangents::FarKeys;
+use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
-use crate::prepare::double::handles::HandleRule;
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
-use crate::prepare::single::long_tangents::FarKeys;
-use crate::prepare::tangent_weights::WeightRule;
 use crate::reference;
 use crate::shader::Form;
 use crate::tracks::set::Track;

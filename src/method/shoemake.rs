@@ -1,11 +1,11 @@
 //! Shoemake's first approach, as lectured, and the rule of all three.
 
+use crate::curve::options::Ends;
+use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::interpolation::Ends;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
-use crate::prepare::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 

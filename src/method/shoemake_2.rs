@@ -1,9 +1,9 @@
 //! Shoemake's second approach, as lectured.
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
+use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 

@@ -1,9 +1,9 @@
 //! Spherical linear interpolation.
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::shape::Shape;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth};
-use crate::prepare::double::intervals::{Intervals, Stretch};
-use crate::prepare::double::shape::Shape;
 use crate::reference;
 use crate::shader::Form;
 

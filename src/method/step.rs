@@ -1,6 +1,6 @@
 //! Keys that are held.
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
 use crate::method::{Continuity, Cost, Curves, Keys, Method};
 use crate::reference;
 use crate::shader::Form;

@@ -7,8 +7,9 @@ use std::sync::{Mutex, PoisonError};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
+use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
 use crate::curve::segment::segment_size;
-use crate::method::interpolation::{Axes, Interpolation, InterpolationError, Quantity, Speed};
+use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
 use crate::prepare::preparation::Preparation;

@@ -1,6 +1,6 @@
 //! Why a set cannot be evaluated as asked, on any device.
 
-use crate::method::interpolation::InterpolationError;
+use crate::curve::options::InterpolationError;
 use crate::time::frames::FramesError;
 
 /// Why a set cannot be evaluated as asked, on any device.

@@ -5,16 +5,14 @@
 
 pub(crate) mod arcs;
 pub(crate) mod batch;
-pub(crate) mod both_sides;
 pub(crate) mod clip_data;
-pub(crate) mod constant_velocity;
-pub(crate) mod double;
+pub(crate) mod constant_speed;
+pub(crate) mod direct;
 pub(crate) mod error;
-pub(crate) mod motion;
-pub(crate) mod nodes;
+pub(crate) mod fitting;
 pub(crate) mod preparation;
 pub(crate) mod prepared;
-pub(crate) mod single;
+pub(crate) mod smooth;
 pub(crate) mod steps;
-pub(crate) mod tangent_weights;
 pub(crate) mod vectors;
+pub(crate) mod waiting_curves;

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use crate::curve::options::InterpolationError;
 use crate::method::Curves;
-use crate::method::interpolation::{Interpolation, InterpolationError};
-use crate::prepare::arcs::arcs::ArcPreparation;
-use crate::prepare::double::smooth::SmoothPreparation;
+use crate::method::interpolation::Interpolation;
+use crate::prepare::arcs::ArcPreparation;
 use crate::prepare::prepared::Prepared;
+use crate::prepare::smooth::SmoothPreparation;
 use crate::prepare::steps::StepPreparation;
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};

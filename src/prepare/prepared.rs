@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use crate::curve::segment::Segments;
+use crate::fit::double::curve::Curve;
 use crate::math::canonical::round_quat;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::double::curve::Curve;
 use crate::time::frames::Timeline;
 use crate::time::runs::Parameter;
 use crate::time::spans::{Beyond, NONE, Part, Source, Spans};

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use crate::method::interpolation::{Interpolation, InterpolationError, Quantity};
+use crate::curve::options::{InterpolationError, Quantity};
+use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
 use crate::time::spans::{NONE, Part, Source};

@@ -4,12 +4,13 @@
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
+use crate::curve::options::{Ends, Quantity};
+use crate::fit::double::curve::{Curve, Piece};
+use crate::fit::double::shape::Shape;
 use crate::math::canonical::{canonical, round_f32};
 use crate::math::quaternion::ratio;
-use crate::method::interpolation::{Ends, Interpolation, Quantity};
+use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::prepare::double::curve::{Curve, Piece};
-use crate::prepare::double::shape::Shape;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::time::spans::{Beyond, NONE, Part, Source};

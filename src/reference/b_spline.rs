@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
 use crate::reference::quaternion::{exponential, invert, logarithm, multiply, vector};
 use crate::reference::segment::{Basis, Segment};
 use crate::reference::tangents::Track;

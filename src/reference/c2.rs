@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
 use crate::reference::quaternion::{exponential, from_parts, invert, logarithm, multiply, vector};
 use crate::reference::segment::Segment;
 use crate::reference::tangents::Track;

@@ -3,13 +3,14 @@
 
 use glam::{DQuat, DVec3, Quat};
 
-use crate::method::interpolation::{Ends, Interpolation, Path, Speed};
+use crate::curve::options::{Ends, Path};
 use crate::reference::b_spline::b_spline;
 use crate::reference::c2;
 use crate::reference::pace::Pace;
 use crate::reference::quaternion::{exponential, invert, logarithm, multiply};
 use crate::reference::segment::{Basis, Segment};
 use crate::reference::tangents::Track;
+use crate::tracks::key_data::Tcb;
 use crate::tracks::set as tracks;
 
 /// Which textbook curve.
@@ -64,27 +65,33 @@ impl Curve {
         Self::build(kind, ends, Track::new(path, times, keys))
     }
 
-    /// The curve of a track of a set.
-    #[must_use]
-    pub fn of(interpolation: &Interpolation, track: tracks::Track<'_>) -> Self {
-        let kind = interpolation.method.reference;
+    /// The curve of a track with all that it carries; `tcb` where it has none of its own.
+    pub(crate) fn of_track(
+        kind: Kind,
+        path: Path,
+        ends: Ends,
+        tcb: Tcb,
+        track: tracks::Track<'_>,
+    ) -> Self {
         let path = match kind {
             Kind::GltfCubic => Path::AsAuthored,
-            _ => interpolation.path,
+            _ => path,
         };
         let mut own = Track::new(path, track.times, track.keys);
         own.velocities = track.velocities.to_vec();
         own.tangents = track.tangents.to_vec();
         own.tcb = match track.tcb {
-            [] => vec![interpolation.tcb; track.keys.len()],
+            [] => vec![tcb; track.keys.len()],
             given => given.to_vec(),
         };
-        let mut curve = Self::build(kind, interpolation.ends, own);
-        if interpolation.speed == Speed::Constant && kind != Kind::Step {
-            let pace = Pace::new(&curve.segments);
-            curve.pace = (pace.total() > 0.0).then_some(pace);
-        }
-        curve
+        Self::build(kind, ends, own)
+    }
+
+    /// The same curve, run through at one angular speed; keys that are held stay as they are.
+    pub(crate) fn at_constant_speed(mut self) -> Self {
+        let pace = Pace::new(&self.segments);
+        self.pace = (pace.total() > 0.0).then_some(pace);
+        self
     }
 
     fn build(kind: Kind, ends: Ends, track: Track) -> Self {

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, Quat};
 
-use crate::method::interpolation::Path;
+use crate::curve::options::Path;
 use crate::reference::curve::Kind;
 use crate::reference::quaternion::{
     exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,

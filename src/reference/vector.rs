@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::method::interpolation::Ends;
+use crate::curve::options::Ends;
 
 /// Keys of a vector in f64, and which textbook curve joins them.
 #[derive(Debug, Clone)]

@@ -14,6 +14,9 @@ mod generated {
 
 pub(crate) use generated::*;
 
+/// Coefficients of a [`PolynomialSegment`]: those of 1, s, … s¹⁰.
+pub(crate) const POWERS: usize = 11;
+
 /// What a kernel evaluates. Many methods share one form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {

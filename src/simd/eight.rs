@@ -14,7 +14,7 @@ use std::cell::Cell;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::curve::segment::POWERS;
+use crate::shader::POWERS;
 use crate::shader::PolynomialSegment;
 use crate::shader::TINY_BITS;
 use crate::simd::doubles::doubles;

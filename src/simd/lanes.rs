@@ -16,7 +16,7 @@ pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The same for every sample.
     fn all(value: f32) -> Self;
 
-    /// Magnitudes below 2^-64 become +0.
+    /// Magnitudes below 2^-64 become +0: twin of `shaders/math/canonical.wgsl`.
     fn canonical(self) -> Self;
 }
 

@@ -8,6 +8,7 @@ pub(crate) mod doubles;
 #[cfg(wide_vectors)]
 pub(crate) mod eight;
 pub(crate) mod lanes;
+pub(crate) mod line;
 #[cfg(wide_vectors)]
 pub(crate) mod operators;
 #[cfg(wide_vectors)]

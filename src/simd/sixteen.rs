@@ -12,12 +12,12 @@ use std::arch::x86_64::{
     _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
 };
 
-use crate::cpu::streaming::Line;
 use crate::shader::PolynomialSegment;
 use crate::shader::TINY_BITS;
 use crate::simd::doubles::doubles;
 use crate::simd::eight::Eight;
 use crate::simd::lanes::{Lanes, Number};
+use crate::simd::line::Line;
 use crate::simd::operators::operators;
 
 /// What only processors with AVX-512 do.

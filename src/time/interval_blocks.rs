@@ -244,7 +244,7 @@ mod tests {
             assert_eq!(block.are_near, are_near, "{frames} frames");
             assert!(block.is_countable(0));
             let last = f64::from(block.distance[0]) + (frames - 1) as f64;
-            assert!(!are_near || last + 16.0 <= (1 << 24) as f64);
+            assert!(!are_near || last + 16.0 <= f64::from(1 << 24));
         }
     }
 }

@@ -281,13 +281,11 @@ impl TimeLanes {
     /// Where between its two others each lies, as `TimePlan::parameter`.
     #[inline(always)]
     pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
-        let mut parameters = [0.0; Self::LEN];
-        for lane in 0..Self::LEN {
+        std::array::from_fn(|lane| {
             let seconds = self.ends[lane] - self.starts[lane];
             let middle = self.starts[lane] + seconds * 0.5;
             let scale = finite_scale(1.0 / seconds);
-            parameters[lane] = round_f32(self.times[lane] - middle) * scale + 0.0;
-        }
-        parameters
+            round_f32(self.times[lane] - middle) * scale + 0.0
+        })
     }
 }

@@ -5,16 +5,14 @@
 //! everything behind it trusts it: every track has at least one key, times are
 //! finite and strictly increasing, keys are unit quaternions.
 
-use crate::Tcb;
-use crate::TrackError;
 use std::ops::Range;
 
-use crate::tracks::check::{check_times, unit_key};
-use crate::tracks::signs::{SignBits, Signs};
-
-use crate::tracks::key_data::KeyData;
 use glam::{DVec3, Quat};
 
+use crate::tracks::check::{check_times, unit_key};
+use crate::tracks::error::TrackError;
+use crate::tracks::key_data::{KeyData, Tcb};
+use crate::tracks::signs::{SignBits, Signs};
 use crate::tracks::vectors::VectorTracks;
 
 /// A set of keyframe tracks: the input of every evaluation.
@@ -373,116 +371,4 @@ pub(crate) fn swinging(tracks: usize, keys: usize, uneven: bool) -> TrackSet {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_refused_track_leaves_the_set_unchanged() {
-        let mut set = TrackSet::new();
-        set.push("a", &[0.0], &[Quat::IDENTITY]).unwrap();
-        let before = set.clone();
-        let keys = [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)];
-        let error = set.push("b", &[0.0, 1.0], &keys).unwrap_err();
-        assert_eq!(
-            error,
-            TrackError::NotUnit {
-                track: 1,
-                key: 1,
-                norm: 2.0
-            }
-        );
-        assert_eq!(set, before);
-        let bad_times = [
-            (
-                vec![],
-                TrackError::LengthMismatch {
-                    track: 1,
-                    keys: 1,
-                    times: 0,
-                },
-            ),
-            (
-                vec![f64::INFINITY],
-                TrackError::TimeNotFinite {
-                    track: 1,
-                    key: 0,
-                    time: f64::INFINITY,
-                },
-            ),
-        ];
-        for (times, expected) in bad_times {
-            assert_eq!(
-                set.push("", &times, &[Quat::IDENTITY]).unwrap_err(),
-                expected
-            );
-        }
-        assert_eq!(
-            set.push("", &[], &[]).unwrap_err(),
-            TrackError::Empty { track: 1 }
-        );
-        let decreasing = set.push("", &[1.0, 1.0], &[Quat::IDENTITY; 2]).unwrap_err();
-        assert!(matches!(
-            decreasing,
-            TrackError::TimeNotIncreasing { key: 1, .. }
-        ));
-    }
-
-    #[test]
-    fn equal_times_are_kept_once_and_names_stay_with_their_tracks() {
-        let times = [0.0, 1.0];
-        let keys = [Quat::IDENTITY; 2];
-        let mut set = TrackSet::new();
-        set.push("", &times, &keys).unwrap();
-        set.push("hip", &times, &keys).unwrap();
-        set.push("", &[0.0, 2.0], &keys).unwrap();
-        assert_eq!(set.times.len(), 4);
-        assert_eq!(set.track_name(0), "box1");
-        assert_eq!(set.track_name(1), "hip");
-        assert_eq!(set.track_name(2), "box3");
-        assert_eq!(set.select(1..3).track_name(0), "hip");
-        assert_eq!(set.time_span(), Some((0.0, 2.0)));
-    }
-
-    #[test]
-    fn a_nearly_unit_key_is_normalised_and_a_unit_key_is_kept() {
-        let unit = Quat::from_rotation_y(0.3);
-        let long = Quat::from_array(unit.to_array().map(|c| c * 1.01));
-        let mut set = TrackSet::new();
-        set.push("", &[0.0, 1.0], &[unit, long]).unwrap();
-        let keys = set.track(0).keys;
-        assert_eq!(keys[0].to_array(), unit.to_array());
-        assert!(keys[1].angle_between(unit) < 1e-6);
-        assert!((f64::from(keys[1].length()) - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_set_knows_which_keys_the_one_before_turns() {
-        let [near, far] = [1.0, 3.0].map(Quat::from_rotation_x);
-        let tracks = |second: Quat| [Quat::IDENTITY, near, near, second];
-        for (second, is_turned) in [(far, false), (-far, true), (-near, true)] {
-            let times = [0.0, 1.0];
-            let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
-            let mut pushed = TrackSet::new();
-            // Nothing is kept of a track that is refused.
-            let refused = [
-                Quat::IDENTITY,
-                -Quat::IDENTITY,
-                Quat::from_xyzw(0.0, 0.0, 0.0, 2.0),
-            ];
-            pushed.push("", &[0.0, 1.0, 2.0], &refused).unwrap_err();
-            for keys in tracks(second).chunks(2) {
-                pushed.push("", &times, keys).unwrap();
-            }
-            for set in [&shared, &pushed, &pushed.select(0..2)] {
-                assert_eq!(set.signs(1).is_turned(1), is_turned, "{second}");
-                assert_eq!(set.arcs_are_short(), !is_turned);
-                assert!(!set.signs(0).any());
-            }
-            assert_eq!(pushed.select(1..2).signs(0).is_turned(1), is_turned);
-        }
-        // From one track to the next nothing turns.
-        let apart = [Quat::IDENTITY, near, -near, -far];
-        let set = TrackSet::with_shared_times(&[0.0, 1.0], &apart).unwrap();
-        assert!(set.arcs_are_short());
-    }
-}
+mod tests;

@@ -1,4 +1,4 @@
-//! Twin of `shaders/arc_between.wgsl`: the same names, the same order.
+//! Twin of `shaders/from_keys/arc_between.wgsl`: the same names, the same order.
 
 use crate::shader::{
     ARC_SINE_1, ARC_SINE_2, ARC_SINE_3, ARC_SINE_4, ARC_SINE_5, ARC_SINE_6, ARC_SINE_7, ARC_SINE_8,

@@ -1,4 +1,4 @@
-//! Twin of `shaders/store_axis_angle.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/axis_angle.wgsl`: the same names, the same order.
 
 use crate::shader::DEGREES;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};

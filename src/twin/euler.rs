@@ -1,4 +1,4 @@
-//! Twin of `shaders/store_euler.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/euler.wgsl`: the same names, the same order.
 
 use crate::shader::{
     DEGREES, GIMBAL, HALF_PI, HALF_PI_LOW, INTRINSIC, NEGATIVE, PI, PI_LOW, SYMMETRIC,

@@ -1,10 +1,10 @@
-//! Twin of `shaders/evaluate_arc.wgsl`: the same names, the same order.
+//! Twin of `shaders/forms/evaluate_arc.wgsl`: the same names, the same order.
 
 use glam::Vec4;
 
-use crate::cpu::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number};
+use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter};
 
 impl Evaluate for ArcSegment {

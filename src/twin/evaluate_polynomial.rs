@@ -1,11 +1,11 @@
-//! Twin of `shaders/evaluate_polynomial.wgsl` and `shaders/polynomial.wgsl`: the same names,
+//! Twin of `shaders/forms/evaluate_polynomial.wgsl` and `shaders/math/polynomial.wgsl`: the same names,
 //! the same order.
 
 use glam::Vec4;
 
-use crate::cpu::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
+use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 
 impl Evaluate for PolynomialSegment {
     /// A quarter of the lanes: with all four components of a rotation side by side, the

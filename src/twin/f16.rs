@@ -1,4 +1,4 @@
-//! Twin of `shaders/store_f16.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/f16.wgsl`: the same names, the same order.
 
 use crate::shader::LEAST_NORMAL;
 

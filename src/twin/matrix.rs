@@ -1,4 +1,4 @@
-//! Twin of `shaders/matrix.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/matrix.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 

@@ -4,6 +4,7 @@ pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;
 pub(crate) mod axis_angle;
 pub(crate) mod euler;
+pub(crate) mod evaluate;
 pub(crate) mod evaluate_arc;
 pub(crate) mod evaluate_polynomial;
 pub(crate) mod f16;

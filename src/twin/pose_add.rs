@@ -1,4 +1,4 @@
-//! Twin of `shaders/pose_add.wgsl`: the same names, the same order.
+//! Twin of `shaders/poses/add.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 use crate::twin::quaternion::{normalised, product, slerp};

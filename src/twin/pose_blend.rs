@@ -1,4 +1,4 @@
-//! Twin of `shaders/pose_blend.wgsl`: the same names, the same order.
+//! Twin of `shaders/poses/blend.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 use crate::shader::LEAST_SQUARED_SUM;

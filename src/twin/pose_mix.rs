@@ -1,4 +1,4 @@
-//! Twin of `shaders/pose_mix.wgsl`: the same names, the same order.
+//! Twin of `shaders/poses/mix.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 use crate::twin::quaternion::slerp;

@@ -1,4 +1,4 @@
-//! Twin of `shaders/pose_world.wgsl`: the same names, the same order.
+//! Twin of `shaders/poses/world.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 use crate::shader::Link;

@@ -1,4 +1,4 @@
-//! Twin of `shaders/quaternion.wgsl`: the same names, the same order.
+//! Twin of `shaders/math/quaternion.wgsl`: the same names, the same order.
 
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 use crate::twin::sine_cosine::sine_cosine;

@@ -1,4 +1,4 @@
-//! Twin of `shaders/canary.wgsl`: the same names, the same order.
+//! Twin of `shaders/self_test.wgsl`: the same names, the same order.
 
 use crate::shader::{Probe, Reply};
 use crate::twin::arc_tangent::{arc_tangent, root};

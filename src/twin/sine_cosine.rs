@@ -1,4 +1,4 @@
-//! Twin of `shaders/sine_cosine.wgsl`: the same names, the same order.
+//! Twin of `shaders/math/sine_cosine.wgsl`: the same names, the same order.
 
 use crate::shader::{
     COSINE_2, COSINE_4, COSINE_6, COSINE_8, COSINE_10, QUARTER_COSINE_2, QUARTER_COSINE_4,

@@ -1,4 +1,4 @@
-//! Twin of `shaders/small_angle_cubic.wgsl`: the same names, the same order.
+//! Twin of `shaders/from_keys/small_angle.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{Arithmetic, scaled, sum};

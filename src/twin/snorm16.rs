@@ -1,4 +1,4 @@
-//! Twin of `shaders/store_snorm16.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/snorm16.wgsl`: the same names, the same order.
 
 use crate::shader::SNORM_SHIFT;
 

@@ -3,10 +3,11 @@
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
 
+use crate::curve::options::{Axes, Quantity, Speed};
 use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::method::interpolation::{Axes, Interpolation, Quantity, Speed};
+use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;

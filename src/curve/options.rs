@@ -1,0 +1,187 @@
+//! What can be asked of a curve, whatever its method: the path between the keys, what happens at
+//! its ends, which quantity is evaluated and how fast the curve is run through.
+
+use std::ops::Range;
+
+use glam::Quat;
+
+use crate::math::quaternion::{self, dot, length, log, unit};
+use crate::tracks::set::TrackSet;
+use crate::tracks::signs::Signs;
+
+/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations
+/// are vectors, `x y z` and 0 in the place of `w`; by the derivative of the formula. On
+/// a key they are those of the segment behind it, on the last key those of the last
+/// segment; before the first key and behind the last nothing moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Quantity {
+    /// The rotation, a unit quaternion.
+    #[default]
+    Rotation,
+    /// The angular velocity, radians per second.
+    Velocity(Axes),
+    /// The angular acceleration, radians per second squared.
+    Acceleration(Axes),
+}
+
+/// How fast a track runs through its curve; no effect on [`STEP`](crate::method::step::STEP).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Speed {
+    /// As the key times say.
+    #[default]
+    AsKeyed,
+    /// At one angular speed from the first key to the last (by arc length): the way is the
+    /// same, but inner keys are met when they are reached. Preparing takes milliseconds a
+    /// key. Where a curve had been slow its velocity turns aside fast: velocities are then
+    /// within 1e-5, accelerations within 1e-3 of the largest.
+    Constant,
+}
+
+/// Whose axes a vector is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Axes {
+    /// Those of what turns.
+    Body,
+    /// Those of what it turns in: of the parent, in a chain.
+    World,
+}
+
+/// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Path {
+    /// Each key is taken with the sign nearer to its predecessor, so no rotation
+    /// goes the long way round. Keys 180° apart keep the sign they were given.
+    #[default]
+    Shortest,
+    /// Signs as given: a dot product below zero turns the long way.
+    AsAuthored,
+}
+
+impl Path {
+    /// The signs that the keys of a track count with.
+    pub(crate) fn signs(self, set: &TrackSet, index: usize) -> Signs<'_> {
+        match self {
+            Self::Shortest => set.signs(index),
+            Self::AsAuthored => Signs::AS_GIVEN,
+        }
+    }
+
+    /// Refuses some intervals of the `index`th track of a set where there is no path between
+    /// their keys.
+    pub(crate) fn check(
+        self,
+        keys: &[Quat],
+        intervals: Range<usize>,
+        index: usize,
+    ) -> Result<(), InterpolationError> {
+        if self == Self::Shortest {
+            return Ok(());
+        }
+        for key in intervals {
+            let [from, to] = [key, key + 1].map(|key| unit(keys[key].to_array()));
+            if dot(from, to) < -1.0 + f64::from(f32::EPSILON) {
+                return Err(InterpolationError::Antipodal { track: index, key });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What happens in the first and in the last segment, where a neighbour is missing.
+/// Two keys are joined by slerp whatever the ends.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Ends {
+    /// The parabola through the last three keys: constant velocity stays constant
+    /// to the very ends.
+    #[default]
+    Parabolic,
+    /// No angular acceleration at the ends.
+    Natural,
+    /// Given angular velocities (radians per second, body frame) at the ends.
+    Clamped {
+        /// At the first key.
+        start: glam::DVec3,
+        /// At the last key.
+        end: glam::DVec3,
+    },
+    /// The angular velocity of slerp between the last two keys: constant velocity stays
+    /// constant too. [`C2`](crate::method::c2::C2)'s own ends.
+    Secant,
+    /// The last key repeats the first; neighbours are taken across the seam.
+    Loop,
+    /// The first and the last segment stand still, as in the original program.
+    Frozen,
+}
+
+/// How far the last key of a loop may be from the first (half-angle, radians).
+const LOOP_TOLERANCE: f64 = 1e-3;
+
+/// Radians per second at an end; more is refused.
+const FASTEST: f64 = 1e12;
+
+impl Ends {
+    /// Refuses a track, the `index`th of its set, that does not end as it must.
+    pub(crate) fn check(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
+        if let Self::Clamped { start, end } = self {
+            for velocity in [start, end] {
+                let speed = length(velocity.to_array());
+                if !speed.is_finite() || speed > FASTEST {
+                    return Err(InterpolationError::EndVelocity { velocity });
+                }
+            }
+        }
+        let (Self::Loop, [first, .., last]) = (self, keys) else {
+            return Ok(());
+        };
+        let seam = quaternion::step(unit(first.to_array()), unit(last.to_array()));
+        let half_angle = length(log([seam[0], seam[1], seam[2], seam[3].abs()]));
+        if half_angle > LOOP_TOLERANCE {
+            let degrees = (2.0 * half_angle).to_degrees();
+            return Err(InterpolationError::OpenLoop {
+                track: index,
+                degrees,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Why a track cannot be interpolated as asked. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InterpolationError {
+    /// Under [`Path::AsAuthored`] neighbouring keys are each other's negative: no
+    /// great circle is defined.
+    #[error(
+        "track {track}: keys {key} and {} are opposite quaternions, between which as-authored has no path; flip one sign or use the shortest path",
+        key + 1
+    )]
+    Antipodal {
+        /// The track's place in the set.
+        track: usize,
+        /// The first of the two keys.
+        key: usize,
+    },
+    /// Under [`WrapMode::Mirror`] velocities would change their signs from copy to copy.
+    #[error("velocities are not mirrored; hold, loop or extrapolate them")]
+    MirroredVelocity,
+    /// Under [`Ends::Clamped`] a velocity is no number, or too large.
+    #[error(
+        "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",
+        velocity.x, velocity.y, velocity.z
+    )]
+    EndVelocity {
+        /// What was given.
+        velocity: glam::DVec3,
+    },
+    /// Under [`Ends::Loop`] the last key must repeat the first.
+    #[error(
+        "track {track}: the last key is {degrees:.3}° from the first; a loop needs the last key to repeat the first"
+    )]
+    OpenLoop {
+        /// The track's place in the set.
+        track: usize,
+        /// Angle between first and last key, degrees.
+        degrees: f64,
+    },
+}

@@ -1,0 +1,115 @@
+//! A curve in f64, and the part of it that is fitted.
+
+use std::sync::Arc;
+
+use crate::curve::formula::Numbers;
+use crate::curve::options::{Axes, Quantity};
+use crate::fit::double::shape::Shape;
+use crate::fit::motion::arc_length::Pace;
+use crate::fit::motion::derivatives as motion;
+use crate::math::dual::Jet;
+use crate::math::quaternion::{Quaternion, dot};
+
+/// What lies between two keys, or a part of it.
+#[derive(Clone)]
+pub(crate) struct Curve {
+    pub(crate) shape: &'static Shape,
+    pub(crate) numbers: Numbers,
+    pub(crate) piece: Piece,
+    pub(crate) quantity: Quantity,
+    /// Of the parameter, per second.
+    pub(crate) rate: f64,
+    /// Where it is run through at constant speed.
+    pub(crate) pace: Option<Arc<Pace>>,
+}
+
+/// The part of an interval that is fitted: where it starts, and its length, in
+/// sixteenths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) from: u8,
+    length: u8,
+}
+
+impl Piece {
+    pub(crate) const WHOLE: Self = Self {
+        from: 0,
+        length: 16,
+    };
+
+    /// Whether it is cut no further: what turns by dozens of radians within one
+    /// interval is computed on the host in f64, for every device.
+    pub(crate) fn is_finest(self) -> bool {
+        self.length == 1
+    }
+
+    pub(crate) fn halves(self) -> [Self; 2] {
+        let length = self.length / 2;
+        [self.from, self.from + length].map(|from| Self { from, length })
+    }
+
+    /// Where it starts, and its width, as parts of the whole.
+    pub(crate) fn extent(self) -> (f64, f64) {
+        let part = |of: u8| f64::from(of) / f64::from(Self::WHOLE.length);
+        (part(self.from), part(self.length))
+    }
+}
+
+impl Curve {
+    /// What is asked for at `t`, 0 to 1 over its piece, in f64.
+    pub(crate) fn value(&self, t: f64) -> Quaternion {
+        let (start, width) = self.piece.extent();
+        self.value_at(start + width * t)
+    }
+
+    /// What is asked for at `t`, 0 to 1 over its interval.
+    pub(crate) fn value_at(&self, t: f64) -> Quaternion {
+        if self.quantity != Quantity::Rotation || self.pace.is_some() {
+            let parameter = match &self.pace {
+                Some(pace) => pace.parameter(self, t),
+                None => Jet::parameter(t),
+            };
+            let rotation = self.moving(parameter);
+            return motion::value(self.quantity, rotation, self.rate);
+        }
+        let rotation = (self.shape.rotation)(&self.numbers, t);
+        if dot(rotation, rotation) > 0.5 || !self.shape.is_unit {
+            return rotation;
+        }
+        // Straight through the middle, where there is no rotation: that just behind it.
+        (self.shape.rotation)(&self.numbers, t + 1e-9)
+    }
+
+    /// What goes on from `t` at the velocity there; its parameter is seconds.
+    pub(crate) fn beyond(&self, t: f64) -> Self {
+        let rotation = self.moving(Jet::parameter(t));
+        let [x, y, z, _] = motion::value(Quantity::Velocity(Axes::Body), rotation, self.rate);
+        let half = [0.5 * x, 0.5 * y, 0.5 * z];
+        let shape = Shape::ROTATION_VECTOR;
+        let mut numbers = shape.shared;
+        numbers[..4].copy_from_slice(&rotation.map(|jet| jet.value));
+        numbers[4..7].copy_from_slice(&half);
+        Self {
+            shape,
+            numbers,
+            piece: Piece::WHOLE,
+            quantity: self.quantity,
+            rate: 1.0,
+            pace: None,
+        }
+    }
+
+    /// The rotation and its derivatives.
+    pub(crate) fn moving(&self, parameter: Jet) -> [Jet; 4] {
+        (self.shape.moving)(&self.numbers, parameter)
+    }
+}
+
+impl std::fmt::Debug for Curve {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Curve")
+            .field("numbers", &&self.numbers[..self.shape.own])
+            .field("piece", &self.piece)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,345 @@
+//! Samples of cubics, in vector lanes: the first half of a fit.
+
+use crate::curve::formula::Numbers;
+use crate::curve::formula::product::Product;
+use crate::fit::both_sides::Sides;
+use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
+use crate::fit::double::intervals::{LANES, load, load3, load4, rounded};
+use crate::fit::double::shape::Sampling;
+use crate::fit::nodes::Nodes;
+use crate::math::quaternion::{self, Real as _, product, scaled, square};
+use crate::math::ranges::{LONG_SQUARE, SHORT_SQUARE, long_waves, short_waves};
+use crate::shader::PolynomialSegment;
+use crate::simd::lanes::{Doubles, Lanes, Number};
+use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
+use crate::twin::small_angle::{FromIdentity, cross3, dot3, inverse_rotated};
+
+/// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
+pub(crate) struct Expansion<const OWN_BASIS: bool>;
+
+impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
+    #[inline(always)]
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
+        match block.tier() {
+            Tier::Gentle | Tier::Full => {
+                fit::<L, PAIRS, OWN_BASIS, true>(block, nodes, segments);
+            }
+            Tier::Piece => fit::<L, PAIRS, OWN_BASIS, false>(block, nodes, segments),
+        }
+    }
+}
+
+#[inline(always)]
+fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
+    block: &mut FitBlock,
+    nodes: &Nodes<PAIRS>,
+    segments: &mut [PolynomialSegment],
+) {
+    // A copy: what is written below could be what a reference shows.
+    let shared = block.shape.shared;
+    for lane in (0..block.whole()).step_by(L::COUNT) {
+        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
+        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 1);
+        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
+        let reach = third.reach.larger(second.reach.larger(first.reach));
+        reach.store(&mut block.reaches[lane..]);
+        let base = load4::<L, LANES>(from(&block.numbers, 0), lane);
+        let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
+        block.interpolate(lane, nodes, &samples, segments);
+    }
+}
+
+/// One of the three rotations of a cubic about the middle of its piece,
+/// `q = q_0 exp(v_1 B_1) exp(v_2 B_2) exp(v_3 B_3)`, a lane to each cubic.
+struct Factor<L: Lanes> {
+    /// The rotation at the middle.
+    turn: [L::Doubles; 4],
+    vector: [L; 3],
+    /// The square of the vector's length.
+    square: L,
+    /// Coefficients of s, s² and s³ in what the basis function has more than at the middle.
+    powers: [L; 3],
+    /// The square of the farthest angle from the middle.
+    reach: L::Doubles,
+}
+
+impl<L: Lanes> Factor<L> {
+    /// The `j`th of the cubics from `lane` on.
+    #[inline(always)]
+    fn new<const OWN_BASIS: bool, const WHOLE: bool>(
+        block: &FitBlock,
+        shared: &Numbers,
+        lane: usize,
+        j: usize,
+    ) -> Self {
+        let place = Product::BASIS + 4 * j;
+        let [c0, c1, c2, c3] = if OWN_BASIS {
+            load4::<L, LANES>(from(&block.numbers, place), lane)
+        } else {
+            [
+                all::<L>(shared[place]),
+                all::<L>(shared[place + 1]),
+                all::<L>(shared[place + 2]),
+                all::<L>(shared[place + 3]),
+            ]
+        };
+        let (middle, width) = if WHOLE {
+            (all::<L>(0.5), all::<L>(1.0))
+        } else {
+            (
+                load::<L>(&block.middles, lane),
+                load::<L>(&block.widths, lane),
+            )
+        };
+        let vector = load3::<L, LANES>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let squared = square(vector);
+        let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
+        // B_j(middle + s width) - B_j(middle), in powers of s.
+        let two = all::<L>(2.0);
+        let three = all::<L>(3.0);
+        let linear = ((three * c3 * middle + two * c2) * middle + c1) * width;
+        let quadratic = (three * c3 * middle + c2) * width * width;
+        let cubic = c3 * width * width * width;
+        // At s = 1/2 and at -1/2, the farther.
+        let odd = (linear + all::<L>(0.25) * cubic) * all::<L>(0.5);
+        let even = quadratic * all::<L>(0.25);
+        let (before, after) = (odd - even, odd + even);
+        let far = (before * before).larger(after * after);
+        Self {
+            turn: exp::<L::Doubles, WHOLE>(scaled(vector, weight)),
+            vector: [
+                L::rounded(vector[0]),
+                L::rounded(vector[1]),
+                L::rounded(vector[2]),
+            ],
+            square: L::rounded(squared),
+            powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
+            reach: squared * far,
+        }
+    }
+}
+
+/// The exponentials of half-rotation vectors; fastest where all are short.
+#[inline(always)]
+fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
+    let squared = square(vector);
+    let (limit, (sinc, cosine)) = if SHORT {
+        (SHORT_SQUARE, short_waves(squared))
+    } else {
+        (LONG_SQUARE, long_waves(squared))
+    };
+    let [x, y, z] = scaled(vector, sinc);
+    let turn = [x, y, z, cosine];
+    if squared.are_at_most(limit) {
+        return turn;
+    }
+    let mut lanes = Turns {
+        vectors: lanes(vector),
+        turns: lanes(turn),
+    };
+    lanes.beyond(limit);
+    let [x, y, z, w] = &lanes.turns;
+    [D::load(x), D::load(y), D::load(z), D::load(w)]
+}
+
+/// Half-rotation vectors and their exponentials.
+struct Turns {
+    vectors: [[f64; MOST]; 3],
+    turns: [[f64; MOST]; 4],
+}
+
+impl Turns {
+    /// Those of squares that are not within `limit`, by what holds anywhere.
+    #[inline(never)]
+    fn beyond(&mut self, limit: f64) {
+        for lane in 0..MOST {
+            let vector = self.vectors.map(|lanes| lanes[lane]);
+            let squared = square(vector);
+            if squared > limit || squared.is_nan() {
+                let turn = quaternion::exp(vector);
+                for (lanes, component) in self.turns.iter_mut().zip(turn) {
+                    lanes[lane] = component;
+                }
+            }
+        }
+    }
+}
+
+/// Each vector's lanes.
+#[inline(always)]
+fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
+    let mut lanes = [[0.0; MOST]; N];
+    for (lanes, vector) in lanes.iter_mut().zip(vectors) {
+        vector.store(lanes);
+    }
+    lanes
+}
+
+/// `a v`, `v` a vector.
+#[inline(always)]
+pub(crate) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
+    [
+        a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
+        a[3] * v[1] - a[0] * v[2] + a[2] * v[0],
+        a[3] * v[2] + a[0] * v[1] - a[1] * v[0],
+        -a[0] * v[0] - a[1] * v[1] - a[2] * v[2],
+    ]
+}
+
+/// The sine of an angle divided by the length of its vector, and its cosine less 1.
+pub(crate) type SineCosm1<L> = (L, L);
+
+/// Cubics about the middle of their pieces, `m exp(v₁ b₁) exp(v₂ b₂) exp(v₃ b₃)`, a lane to
+/// each: half-rotation vectors are brought behind what follows them there.
+pub(crate) struct AboutMiddle<L> {
+    middle: [L; 4],
+    /// `m v₁`.
+    first: [L; 4],
+    second: [L; 3],
+    third: [L; 3],
+    /// `v₂ v₃`.
+    both: [L; 4],
+}
+
+impl<L: Lanes> AboutMiddle<L> {
+    /// Of the rotation of the middle, and such vectors.
+    #[inline(always)]
+    pub(crate) fn new(middle: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
+        let [x, y, z] = cross3(v2, v3);
+        Self {
+            middle,
+            first: about(middle, v1),
+            second: v2,
+            third: v3,
+            both: [x, y, z, -dot3(v2, v3)],
+        }
+    }
+
+    /// What the rotations before and after the middle are more than it.
+    #[inline(always)]
+    pub(crate) fn differences(
+        &self,
+        [(s1, f1), (s2, f2), (s3, f3)]: [SineCosm1<Sides<L>>; 3],
+    ) -> [Sides<L>; 4] {
+        let [m, first, both] = [
+            on_both_sides(self.middle),
+            on_both_sides(self.first),
+            on_both_sides(self.both),
+        ];
+        let [second, third] = [self.second, self.third];
+        let same = Sides::same;
+        // With cosines as 1 + fall, nothing is lost where the angles are small.
+        let cs = s3 + f2 * s3;
+        let sc = s2 + s2 * f3;
+        let ss = s2 * s3;
+        let behind = [
+            same(second[0]) * sc + same(third[0]) * cs + both[0] * ss,
+            same(second[1]) * sc + same(third[1]) * cs + both[1] * ss,
+            same(second[2]) * sc + same(third[2]) * cs + both[2] * ss,
+            f2 + f3 + f2 * f3 + both[3] * ss,
+        ];
+        let own = [
+            first[0] * s1 + m[0] * f1,
+            first[1] * s1 + m[1] * f1,
+            first[2] * s1 + m[2] * f1,
+            first[3] * s1 + m[3] * f1,
+        ];
+        let start = [m[0] + own[0], m[1] + own[1], m[2] + own[2], m[3] + own[3]];
+        let [x, y, z, w] = product(start, behind);
+        [x + own[0], y + own[1], z + own[2], w + own[3]]
+    }
+}
+
+#[inline(always)]
+fn on_both_sides<L: Lanes>([x, y, z, w]: [L; 4]) -> [Sides<L>; 4] {
+    [
+        Sides::same(x),
+        Sides::same(y),
+        Sides::same(z),
+        Sides::same(w),
+    ]
+}
+
+/// The same with what the angles are made of.
+struct Expanded<L> {
+    curve: AboutMiddle<L>,
+    squares: [L; 3],
+    powers: [[L; 3]; 3],
+}
+
+impl<L: Lanes> Expanded<L> {
+    #[inline(always)]
+    fn new(base: [L::Doubles; 4], [first, second, third]: [Factor<L>; 3]) -> Self {
+        let middle = product(product(product(base, first.turn), second.turn), third.turn);
+        let (r2, r3) = (turn(second.turn), turn(third.turn));
+        let v1 = inverse_rotated(inverse_rotated(first.vector, r2), r3);
+        let v2 = inverse_rotated(second.vector, r3);
+        Self {
+            curve: AboutMiddle::new(rounded::<L>(middle), [v1, v2, third.vector]),
+            squares: [first.square, second.square, third.square],
+            powers: [first.powers, second.powers, third.powers],
+        }
+    }
+
+    /// Samples them at every node.
+    #[inline(always)]
+    fn sample<const PAIRS: usize, const SHORT: bool>(
+        &self,
+        nodes: &Nodes<PAIRS>,
+    ) -> Samples<L, PAIRS> {
+        let mut samples = Samples::all(L::all(0.0));
+        samples.middle = self.curve.middle;
+        for k in 0..PAIRS {
+            let s = L::all(nodes.at[k]);
+            let turns = [
+                self.turns::<SHORT>(0, s),
+                self.turns::<SHORT>(1, s),
+                self.turns::<SHORT>(2, s),
+            ];
+            samples.set_differences(k, self.curve.differences(turns));
+        }
+        samples
+    }
+
+    /// Of the j-th angle, at `-s` and at `s`.
+    #[inline(always)]
+    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> SineCosm1<Sides<L>> {
+        let [linear, quadratic, cubic] = self.powers[j];
+        let rise = cubic * s;
+        let angle = Sides {
+            // The same as with -s, to the bit.
+            before: -((linear - (quadratic - rise) * s) * s),
+            after: ((rise + quadratic) * s + linear) * s,
+        };
+        let square = Sides::same(self.squares[j]) * (angle * angle);
+        if SHORT {
+            sine_cosm1_quarter(angle, square)
+        } else {
+            sine_cosm1(angle, square)
+        }
+    }
+}
+
+/// In f32, by what its cosine is less than 1.
+#[inline(always)]
+fn turn<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> FromIdentity<L> {
+    FromIdentity {
+        vector: [L::rounded(x), L::rounded(y), L::rounded(z)],
+        cosm1: L::rounded(w - all::<L>(1.0)),
+    }
+}
+
+#[inline(always)]
+fn all<L: Lanes>(value: f64) -> L::Doubles {
+    L::Doubles::all(value)
+}
+
+/// So many numbers from a place on.
+#[inline(always)]
+fn from<const N: usize>(numbers: &[Lane64], place: usize) -> &[Lane64; N] {
+    numbers[place..].first_chunk().expect("a product's numbers")
+}

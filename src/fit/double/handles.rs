@@ -1,0 +1,351 @@
+//! Passes over the lanes of a block, in vectors.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use crate::curve::formula::product::Product;
+use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::{
+    Intervals, LANES, Lane, ROOM, Stretch, at, energy, load, load3, load4, put, store,
+};
+use crate::math::quaternion::{self, Quaternion, Real, Vector, normalised, product, scaled, sum};
+use crate::math::ranges::{Algebra, Anywhere, Near};
+use crate::simd::dispatch::InLanes;
+use crate::simd::lanes::{Doubles, Lanes};
+use crate::time::frame_clock::FrameClock;
+
+/// Steps between keys, and their logarithms.
+pub(crate) struct Steps<'a>(pub(crate) &'a mut Intervals);
+
+impl InLanes for Steps<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let own = &mut *self.0;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let (from, to) = (units::<L>(&own.from, lane), units::<L>(&own.to, lane));
+            let step = quaternion::step(from, to);
+            let mut near = Near::new();
+            let log = near.log(step);
+            store(&mut own.steps, lane, step);
+            store(&mut own.logs, lane, log);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane, own.count) {
+                    put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
+                }
+            }
+        }
+    }
+}
+
+impl<D: Doubles> Near<D> {
+    #[inline(always)]
+    fn is_in_doubt(&self) -> bool {
+        !self.doubt.are_at_most(0.0)
+    }
+
+    /// The lanes where it does not hold, of those from `lane` on and before `end`.
+    #[inline(never)]
+    fn lanes(&self, lane: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
+        let mut doubts = [0.0; MOST];
+        self.doubt.store(&mut doubts);
+        let lanes = (lane..end).zip(doubts);
+        lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane))
+    }
+}
+
+/// Keys in f64, normalised.
+#[inline(always)]
+fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
+    let [x, y, z, w] = L::load_rotations(&keys[lane..]);
+    normalised([x.widened(), y.widened(), z.widened(), w.widened()])
+}
+
+/// Whether intervals hold a frame.
+pub(crate) struct FramesHeld<'a> {
+    pub(crate) clock: FrameClock,
+    pub(crate) intervals: &'a Intervals,
+    pub(crate) lanes: Range<usize>,
+    pub(crate) held: [bool; LANES],
+}
+
+impl InLanes for FramesHeld<'_> {
+    // A loop that the compiler makes vectors of.
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Intervals { starts, ends, .. } = self.intervals;
+        let (starts, ends) = (&starts[self.lanes.clone()], &ends[self.lanes.clone()]);
+        let held = &mut self.held[self.lanes.clone()];
+        for j in 0..starts.len().min(ends.len()).min(held.len()) {
+            held[j] = self.clock.first_frame(starts[j]) < self.clock.first_frame(ends[j]);
+        }
+    }
+}
+
+/// A key interval as the rules for handles see it; or those of some lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Interval<R> {
+    /// Seconds.
+    pub(crate) duration: R,
+    /// `q_i⁻¹ q_{i+1}`.
+    pub(crate) step: [R; 4],
+    /// Its logarithm, within 1e-12.
+    pub(crate) log: [R; 3],
+    /// Numbers that the method has for its first key.
+    pub(crate) key: [R; 4],
+}
+
+/// The handles of a key: half-rotation vectors from the key to its control
+/// rotations, `b_i = q_i exp(-incoming)` and `a_i = q_i exp(outgoing)`.
+#[derive(Clone, Copy)]
+pub(crate) struct Handles<R> {
+    pub(crate) incoming: [R; 3],
+    pub(crate) outgoing: [R; 3],
+}
+
+/// A rule that gives the handles of a key from the intervals on both sides of it.
+pub(crate) trait HandleRule {
+    /// `#[inline(always)]`, and without branches.
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        before: Interval<A::Number>,
+        after: Interval<A::Number>,
+    ) -> Handles<A::Number>;
+
+    /// The handle of the first or of the last key of a track.
+    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
+        match handle {
+            EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
+            // The tangents of a parabola change evenly.
+            EndHandle::Parabolic => sum(scaled(log, 2.0 / 3.0), scaled(other, -1.0)),
+            // No acceleration: the control rotation lies half way to the other one.
+            EndHandle::Natural(rest) => scaled(rest, 0.5),
+        }
+    }
+}
+
+/// The interval at an end of a track.
+#[derive(Clone, Copy)]
+pub(crate) struct EndInterval {
+    /// The logarithm of its step.
+    pub(crate) log: Vector,
+    /// The handle of its inner key.
+    pub(crate) other: Vector,
+}
+
+/// What the handle of an end's key shall do.
+#[derive(Clone, Copy)]
+pub(crate) enum EndHandle {
+    /// Give the velocity that makes this half-rotation vector within the interval.
+    Turn(Vector),
+    /// Continue the parabola through the last three keys.
+    Parabolic,
+    /// Give no acceleration; the logarithm of the step without the inner key's handle.
+    Natural(Vector),
+}
+
+/// The handles of every key that an interval starts with, or ends with.
+pub(crate) struct KeyHandles<'a, R> {
+    pub(crate) intervals: &'a mut Intervals,
+    pub(crate) stretches: &'a [Stretch],
+    pub(crate) rule: PhantomData<R>,
+}
+
+impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let own = &mut *self.intervals;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let mut near = Near::new();
+            let (before, after) = (own.intervals::<L>(lane), own.intervals::<L>(lane + 1));
+            let handles = R::handles(&mut near, before, after);
+            store(&mut own.incoming, lane + 1, handles.incoming);
+            store(&mut own.outgoing, lane + 1, handles.outgoing);
+            if near.is_in_doubt() {
+                // Between the context of one stretch and that of the next is no key.
+                let is_key = |j: &usize| {
+                    let mut stretches = self.stretches.iter().map(Stretch::lanes);
+                    stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
+                };
+                for j in near.lanes(lane + 1, own.count).filter(is_key) {
+                    own.handles_anywhere::<R>(j);
+                }
+            }
+        }
+    }
+}
+
+impl Intervals {
+    #[inline(always)]
+    fn intervals<L: Lanes>(&self, lane: usize) -> Interval<L::Doubles> {
+        Interval {
+            duration: load::<L>(&self.durations, lane),
+            step: load4::<L, ROOM>(&self.steps, lane),
+            log: load3::<L, ROOM>(&self.logs, lane),
+            key: load4::<L, ROOM>(&self.outward, lane),
+        }
+    }
+
+    /// The handles of the key that an interval starts with, by what holds anywhere.
+    #[inline(never)]
+    fn handles_anywhere<R: HandleRule>(&mut self, lane: usize) {
+        let interval = |lane: usize| Interval {
+            duration: self.durations[lane],
+            step: self.step(lane),
+            log: self.log(lane),
+            key: self.outward(lane),
+        };
+        let handles = R::handles(&mut Anywhere, interval(lane - 1), interval(lane));
+        self.set_incoming(lane, handles.incoming);
+        self.set_outgoing(lane, handles.outgoing);
+    }
+}
+
+/// Curves from keys and handles: `w₁ = out`, `w₃ = in` of the next key, and
+/// `w₂ = log(a⁻¹ b)` with `a = q_i exp(w₁)`, `b = q_{i+1} exp(-w₃)`.
+pub(crate) struct BetweenHandles<'a>(pub(crate) &'a mut Intervals);
+
+impl InLanes for BetweenHandles<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let own = &mut *self.0;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let first = load3::<L, ROOM>(&own.outgoing, lane);
+            let step = load4::<L, ROOM>(&own.steps, lane);
+            let last = load3::<L, ROOM>(&own.incoming, lane + 1);
+            let mut near = Near::new();
+            let middle = between(&mut near, first, step, last);
+            let (bases, vectors) = product_numbers(&mut own.numbers);
+            store(bases, lane, units::<L>(&own.from, lane));
+            store_vectors(vectors, lane, [first, middle, last]);
+            energy([first, middle, last]).store(&mut own.energies[lane..]);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane, own.count) {
+                    own.between_anywhere(j);
+                }
+            }
+        }
+    }
+}
+
+impl Intervals {
+    /// The curve of a lane between its handles, by what holds anywhere.
+    #[inline(never)]
+    fn between_anywhere(&mut self, lane: usize) {
+        let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
+        let middle = between(&mut Anywhere, first, self.step(lane), last);
+        let vectors = [first, middle, last];
+        self.set_numbers(lane, Product::VECTORS, vectors.as_flattened());
+        self.set_energy(lane, vectors);
+    }
+}
+
+/// Bases and vectors of [`Product`].
+#[inline(always)]
+fn product_numbers(numbers: &mut [Lane]) -> (&mut [Lane; 4], &mut [Lane; 9]) {
+    let (bases, others) = numbers.split_at_mut(Product::VECTORS);
+    let vectors = &mut others[..Product::BASIS - Product::VECTORS];
+    (
+        bases.try_into().expect("a quaternion"),
+        vectors.try_into().expect("three vectors"),
+    )
+}
+
+#[inline(always)]
+fn store_vectors<D: Doubles>(lanes: &mut [Lane; 9], lane: usize, [a, b, c]: [[D; 3]; 3]) {
+    let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
+    store(lanes, lane, all);
+}
+
+/// `log(a⁻¹ b)`.
+#[inline(always)]
+fn between<A: Algebra>(
+    algebra: &mut A,
+    outgoing: [A::Number; 3],
+    step: [A::Number; 4],
+    incoming: [A::Number; 3],
+) -> [A::Number; 3] {
+    let back = A::Number::all(-1.0);
+    let from_a = product(algebra.exp(scaled(outgoing, back)), step);
+    let middle = product(from_a, algebra.exp(scaled(incoming, back)));
+    algebra.log(middle)
+}
+
+/// Control rotations from keys and handles: `q0`, `a = q0 exp(out)`, `b = q1 exp(-in)`,
+/// `q1`.
+pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
+
+impl InLanes for ControlRotations<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let whole = self.0.whole();
+        let Intervals {
+            from,
+            steps,
+            logs,
+            incoming,
+            outgoing,
+            numbers,
+            energies,
+            ..
+        } = &mut *self.0;
+        let key = |j: usize| quaternion::unit(from[j]);
+        let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
+        let log = |j: usize| at(logs, j);
+        let controls = (&mut numbers[..16]).try_into().expect("four rotations");
+        control_lanes(whole, key, handles, log, controls, energies);
+    }
+}
+
+#[inline(always)]
+fn control_lanes(
+    count: usize,
+    key: impl Fn(usize) -> Quaternion,
+    handles: impl Fn(usize) -> (Vector, Quaternion, Vector),
+    log: impl Fn(usize) -> Vector,
+    controls: &mut [Lane; 16],
+    energies: &mut Lane,
+) {
+    for j in 0..count {
+        let (first, step, last) = handles(j);
+        let start = key(j);
+        let end = product(start, step);
+        let a = product(start, quaternion::exp(first));
+        let b = product(end, quaternion::exp(scaled(last, -1.0)));
+        for (place, control) in [start, a, b, end].into_iter().enumerate() {
+            for c in 0..4 {
+                controls[4 * place + c][j] = control[c];
+            }
+        }
+        energies[j] = energy([first, log(j), last]);
+    }
+}
+
+/// Curves near keys: each interval's own logarithm between its neighbours', from the
+/// key before it.
+pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
+
+impl InLanes for BetweenNeighbours<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let own = &mut *self.0;
+        for lane in (0..own.whole()).step_by(L::COUNT) {
+            let before = load3::<L, ROOM>(&own.logs, lane);
+            let log = load3::<L, ROOM>(&own.logs, lane + 1);
+            let after = load3::<L, ROOM>(&own.logs, lane + 2);
+            let mut near = Near::new();
+            let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
+            let base = product(units::<L>(&own.from, lane + 1), back);
+            let (bases, vectors) = product_numbers(&mut own.numbers);
+            store(bases, lane + 1, base);
+            store_vectors(vectors, lane + 1, [before, log, after]);
+            energy([before, log, after]).store(&mut own.energies[lane + 1..]);
+            if near.is_in_doubt() {
+                for j in near.lanes(lane + 1, own.count) {
+                    let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
+                    let base = product(own.key(j), back);
+                    own.set_numbers(j, 0, &base);
+                }
+            }
+        }
+    }
+}

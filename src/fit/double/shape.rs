@@ -1,0 +1,208 @@
+//! Formulas as values: what the preparation does with a curve, whatever its formula.
+
+use std::marker::PhantomData;
+
+use crate::curve::formula::de_casteljau::DeCasteljau;
+use crate::curve::formula::hermite::{Hermite, Linear};
+use crate::curve::formula::line::Line;
+use crate::curve::formula::product::Product;
+use crate::curve::formula::rotation_vector::RotationVector;
+use crate::curve::formula::squad::Squad;
+use crate::curve::formula::{Formula, NUMBERS, Numbers};
+use crate::fit::double::expansion::Expansion;
+use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
+use crate::fit::double::intervals::{load, rounded};
+use crate::fit::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
+use crate::math::dual::{Jet, Near};
+use crate::math::quaternion::{Quaternion, Real};
+use crate::shader::PolynomialSegment;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::{Doubles as _, Lanes};
+
+/// A formula, and how its curves are sampled.
+pub(crate) struct Shape {
+    /// How many of the numbers are each curve's own.
+    pub(crate) own: usize,
+    /// The others, the same for all.
+    pub(crate) shared: Numbers,
+    /// Whether it is made of exponentials alone, whose Chebyshev coefficients fall ever
+    /// faster: a gentle curve's fit then needs no check.
+    pub(crate) entire: bool,
+    /// Whether it gives rotations.
+    pub(crate) is_unit: bool,
+    pub(crate) rotation: fn(&Numbers, f64) -> Quaternion,
+    pub(crate) moving: fn(&Numbers, Jet) -> [Jet; 4],
+    /// See [`Sampling::fit`].
+    pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
+}
+
+impl Shape {
+    const fn of<F: Formula>(own: usize) -> Self {
+        Self {
+            own,
+            shared: [0.0; NUMBERS],
+            entire: false,
+            is_unit: true,
+            rotation: F::rotation::<f64>,
+            moving: F::rotation::<Jet>,
+            fit: fit::<Directly<F>>,
+        }
+    }
+
+    /// A curve's numbers: its own, and what it shares with all.
+    pub(crate) fn with(&self, own: impl Fn(usize) -> f64) -> Numbers {
+        let mut numbers = self.shared;
+        for (i, number) in numbers[..self.own].iter_mut().enumerate() {
+            *number = own(i);
+        }
+        numbers
+    }
+}
+
+impl Shape {
+    /// [`Product`] with Bernstein's basis.
+    pub(crate) const BERNSTEIN: &'static Self = &Self {
+        own: Product::BASIS,
+        shared: Product::BERNSTEIN,
+        entire: true,
+        fit: fit::<Expansion<false>>,
+        ..Self::of::<Product>(NUMBERS)
+    };
+    /// [`Product`] with a basis of each curve's own.
+    pub(crate) const PRODUCT: &'static Self = &Self {
+        entire: true,
+        fit: fit::<Expansion<true>>,
+        ..Self::of::<Product>(NUMBERS)
+    };
+    /// [`DeCasteljau`].
+    pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
+    /// [`Squad`].
+    pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16);
+    /// [`Linear`].
+    pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16);
+    /// [`Hermite`].
+    pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16);
+    /// [`Line`].
+    pub(crate) const LINE: &'static Self = &Self {
+        is_unit: false,
+        ..Self::of::<Line>(8)
+    };
+    /// [`RotationVector`].
+    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
+}
+
+/// A way to sample the curves of a block.
+pub(crate) trait Sampling: 'static {
+    /// Samples and interpolates them, to segments.
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    );
+}
+
+/// Fits the curves of a block.
+fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+    in_lanes(&mut Fit::<S>(block, segments, PhantomData));
+}
+
+struct Fit<'a, S>(
+    &'a mut FitBlock,
+    &'a mut [PolynomialSegment],
+    PhantomData<S>,
+);
+
+impl<S: Sampling> InLanes for Fit<'_, S> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Self(block, segments, _) = self;
+        match block.tier() {
+            Tier::Gentle => S::fit::<L, _>(block, &GENTLE_NODES, segments),
+            Tier::Full | Tier::Piece => S::fit::<L, _>(block, &FULL_NODES, segments),
+        }
+    }
+}
+
+/// By the formula itself, in f64.
+struct Directly<F>(PhantomData<F>);
+
+impl<F: Formula> Sampling for Directly<F> {
+    #[inline(always)]
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
+        for lane in (0..block.whole()).step_by(L::COUNT) {
+            let mut numbers = [L::Doubles::all(0.0); NUMBERS];
+            for (own, lanes) in numbers.iter_mut().zip(&block.numbers) {
+                *own = load::<L>(lanes, lane);
+            }
+            let at = load::<L>(&block.middles, lane);
+            let width = load::<L>(&block.widths, lane);
+            let middle = rotation::<F, _>(&numbers, at);
+            let mut doubt = doubt(middle);
+            let mut samples = Samples::all(L::all(0.0));
+            samples.middle = rounded::<L>(middle);
+            for k in 0..PAIRS {
+                let reach = L::Doubles::all(f64::from(nodes.at[k])) * width;
+                let before = rotation::<F, _>(&numbers, at - reach);
+                let after = rotation::<F, _>(&numbers, at + reach);
+                for c in 0..4 {
+                    let sum = (after[c] - middle[c]) + (before[c] - middle[c]);
+                    samples.even[k][c] = L::rounded(sum);
+                    samples.odd[k][c] = L::rounded(after[c] - before[c]);
+                }
+                doubt = doubt + self::doubt(before) + self::doubt(after);
+            }
+            if !doubt.are_at_most(0.0) {
+                let mut doubts = [0.0; MOST];
+                doubt.store(&mut doubts);
+                let mut lanes = samples.lanes();
+                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
+                    sample_anywhere::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
+                }
+                samples = lanes.at(0);
+            }
+            block.interpolate(lane, nodes, &samples, segments);
+        }
+    }
+}
+
+#[inline(always)]
+fn rotation<F: Formula, R: Real>(numbers: &[R; NUMBERS], t: R) -> [R; 4] {
+    let [x, y, z, w] = F::rotation(numbers, Near(t));
+    [x.0, y.0, z.0, w.0]
+}
+
+/// NaN where any of a rotation's components is none, or not finite; else 0.
+#[inline(always)]
+fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
+    (x + y + z + w) * R::all(0.0)
+}
+
+/// Samples the curve in a lane, whose angles are too long for [`Near`], to the `j`th of some.
+#[inline(never)]
+fn sample_anywhere<F: Formula, const PAIRS: usize>(
+    block: &FitBlock,
+    lane: usize,
+    nodes: &Nodes<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<[f32; MOST], PAIRS>,
+    j: usize,
+) {
+    let numbers = block.numbers_of(lane);
+    let between: Quaternion = F::rotation(&numbers, block.middles[lane]);
+    for c in 0..4 {
+        middle[c][j] = between[c] as f32;
+    }
+    for (k, &node) in nodes.at.iter().enumerate() {
+        let reach = f64::from(node) * block.widths[lane];
+        let before: Quaternion = F::rotation(&numbers, block.middles[lane] - reach);
+        let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
+        for c in 0..4 {
+            let sum = (after[c] - between[c]) + (before[c] - between[c]);
+            even[k][c][j] = sum as f32;
+            odd[k][c][j] = (after[c] - before[c]) as f32;
+        }
+    }
+}

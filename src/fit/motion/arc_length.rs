@@ -1,0 +1,152 @@
+//! Arc length of curves, by which they are traversed at constant speed.
+
+use crate::fit::double::curve::Curve;
+use crate::math::dual::Jet;
+use crate::math::quaternion::{length, step};
+
+/// A curve's parameter is divided into this many equal parts; the arc length up to each is kept.
+const PARTS: usize = 8;
+
+/// A curve that is slower than this fraction of its mean speed counts as at rest.
+const SLOW: f64 = 1e-4;
+
+/// The distance in the parameter from a point of rest at which the direction is taken: a curve that
+/// starts from rest has turned by a billionth of its length there, and its direction is known to
+/// seven digits.
+const NEXT_TO_REST: f64 = 1e-5;
+
+/// Points and weights of Gauss-Legendre quadrature on [-1, 1], exact for polynomials of degree 9.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// How far a curve has turned at each eighth of its parameter, radians.
+#[derive(Debug)]
+pub(crate) struct Pace {
+    lengths: [f64; PARTS + 1],
+}
+
+impl Pace {
+    pub(crate) fn new(curve: &Curve) -> Self {
+        let mut lengths = [0.0; PARTS + 1];
+        for part in 0..PARTS {
+            let [from, to] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
+            lengths[part + 1] = lengths[part] + turned(curve, from, to);
+        }
+        Self { lengths }
+    }
+
+    /// How far the whole curve turns, radians.
+    pub(crate) fn total(&self) -> f64 {
+        self.lengths[PARTS]
+    }
+
+    /// The curve's own parameter where it has turned by the fraction `part` of its length, with the
+    /// first two derivatives by `part`.
+    pub(crate) fn parameter(&self, curve: &Curve, part: f64) -> Jet {
+        let mut u = self.place(curve, part * self.total());
+        let (mut velocity, mut acceleration) = rates(curve, u);
+        if length(velocity) < SLOW * self.total() {
+            // A curve at rest has no direction; it has one a little way into the interval.
+            u = u.clamp(NEXT_TO_REST, 1.0 - NEXT_TO_REST);
+            (velocity, acceleration) = rates(curve, u);
+        }
+        let speed = length(velocity).max(1e-12);
+        let first = self.total() / speed;
+        let along: f64 = velocity.iter().zip(acceleration).map(|(v, a)| v * a).sum();
+        Jet {
+            value: u,
+            first,
+            // |ω| u' is constant, so its derivative is 0.
+            second: -along * (first / speed) * (first / speed),
+        }
+    }
+
+    /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection
+    /// where that leaves the part which contains it.
+    fn place(&self, curve: &Curve, target: f64) -> f64 {
+        let part = self.lengths.partition_point(|&length| length <= target);
+        let part = part.saturating_sub(1).min(PARTS - 1);
+        let [mut low, mut high] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
+        let (from, rest) = (low, target - self.lengths[part]);
+        let whole = self.lengths[part + 1] - self.lengths[part];
+        if whole <= 0.0 {
+            return from;
+        }
+        let mut u = from + (high - low) * (rest / whole).clamp(0.0, 1.0);
+        let mut excess = turned(curve, from, u) - rest;
+        for _ in 0..40 {
+            if excess > 0.0 {
+                high = u;
+            } else {
+                low = u;
+            }
+            let (velocity, _) = rates(curve, u);
+            let newton = u - excess / length(velocity).max(1e-12);
+            let next = if (low..=high).contains(&newton) {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
+            let step = next - u;
+            if step.abs() <= 1e-14 {
+                return next;
+            }
+            // One quadrature is exact enough for a short step.
+            excess += if step.abs() < 1e-3 {
+                gauss(curve, u, next)
+            } else {
+                turned(curve, u, next)
+            };
+            u = next;
+        }
+        u
+    }
+}
+
+/// The arc length between two parameters, radians. The interval is halved until both halves
+/// together agree with the whole.
+fn turned(curve: &Curve, from: f64, to: f64) -> f64 {
+    refined(curve, from, to, gauss(curve, from, to), FINEST)
+}
+
+/// The most halvings. They are needed where a curve almost stops: its speed has a corner there.
+const FINEST: u32 = 8;
+
+fn refined(curve: &Curve, from: f64, to: f64, whole: f64, halvings: u32) -> f64 {
+    let middle = 0.5 * (from + to);
+    let halves = [gauss(curve, from, middle), gauss(curve, middle, to)];
+    let sum = halves[0] + halves[1];
+    if halvings == 0 || (sum - whole).abs() <= 1e-13 * (1.0 + sum) {
+        return sum;
+    }
+    refined(curve, from, middle, halves[0], halvings - 1)
+        + refined(curve, middle, to, halves[1], halvings - 1)
+}
+
+fn gauss(curve: &Curve, from: f64, to: f64) -> f64 {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let speed = |&(at, weight): &(f64, f64)| {
+        let (velocity, _) = rates(curve, middle + half * at);
+        weight * length(velocity)
+    };
+    half * GAUSS.iter().map(speed).sum::<f64>()
+}
+
+/// Angular velocity and acceleration at `u`, per unit of the parameter.
+fn rates(curve: &Curve, u: f64) -> ([f64; 3], [f64; 3]) {
+    let rotation = curve.moving(Jet::parameter(u));
+    let at = rotation.map(|jet| jet.value);
+    let twice = |derivative: [f64; 4]| {
+        let [x, y, z, _] = step(at, derivative);
+        [2.0 * x, 2.0 * y, 2.0 * z]
+    };
+    (
+        twice(rotation.map(|jet| jet.first)),
+        twice(rotation.map(|jet| jet.second)),
+    )
+}

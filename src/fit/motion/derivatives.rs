@@ -1,0 +1,114 @@
+//! Angular velocities and accelerations of curves. Their formulas are evaluated in dual numbers of
+//! second order, and the results are fitted like the rotations themselves.
+
+use crate::curve::options::{Axes, Quantity};
+use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
+use crate::fit::double::intervals::LANES;
+use crate::fit::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
+use crate::math::dual::Jet;
+use crate::math::quaternion::{Quaternion, Vector, product, step};
+use crate::shader::PolynomialSegment;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+
+/// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
+/// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
+pub(crate) fn value(quantity: Quantity, rotation: [Jet; 4], rate: f64) -> Quaternion {
+    let at = rotation.map(|jet| jet.value);
+    let (derivative, scale, axes) = match quantity {
+        Quantity::Rotation => return at,
+        Quantity::Velocity(axes) => (rotation.map(|jet| jet.first), rate, axes),
+        Quantity::Acceleration(axes) => (rotation.map(|jet| jet.second), rate * rate, axes),
+    };
+    // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
+    let [x, y, z, _] = step(at, derivative);
+    let body = [x, y, z].map(|c| finite(2.0 * scale * c));
+    let [x, y, z] = match axes {
+        Axes::Body => body,
+        // This holds for accelerations too: ω × ω = 0.
+        Axes::World => rotated(at, body),
+    };
+    [x, y, z, 0.0]
+}
+
+/// Limits a value to a quarter of f32's range: between keys at almost the same time velocities
+/// would overflow.
+fn finite(value: f64) -> f64 {
+    let largest = 0.25 * f64::from(f32::MAX);
+    value.clamp(-largest, largest)
+}
+
+/// `q v q⁻¹`.
+fn rotated(q: Quaternion, [x, y, z]: Vector) -> Vector {
+    let [a, b, c, _] = product(product(q, [x, y, z, 0.0]), [-q[0], -q[1], -q[2], q[3]]);
+    [a, b, c]
+}
+
+/// Fits a block's velocities or accelerations.
+pub(crate) fn fit(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+    in_lanes(&mut Fit(block, segments));
+}
+
+struct Fit<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
+
+impl InLanes for Fit<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        match self.0.tier() {
+            Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
+            Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
+        }
+    }
+}
+
+impl Fit<'_> {
+    #[inline(always)]
+    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+        let count = self.0.whole();
+        let mut samples = Samples::all([0.0; LANES]);
+        let mut scales = [1.0; LANES];
+        for (lane, scale) in scales[..count].iter_mut().enumerate() {
+            *scale = sample(self.0, lane, nodes, &mut samples);
+        }
+        for lane in (0..count).step_by(L::COUNT) {
+            self.0
+                .interpolate(lane, nodes, &samples.at::<L>(lane), self.1);
+        }
+        self.0.scale(&scales, self.1);
+    }
+}
+
+/// Samples the curve in a lane in a unit near its largest value, and returns that unit. It is a
+/// power of two, so that multiplying by it rounds nothing.
+fn sample<const PAIRS: usize>(
+    block: &FitBlock,
+    lane: usize,
+    nodes: &Nodes<PAIRS>,
+    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
+) -> f32 {
+    let curve = block.curve(lane);
+    let (at, width) = (block.middles[lane], block.widths[lane]);
+    let between = curve.value_at(at);
+    let pairs = nodes.at.map(|node| {
+        let reach = f64::from(node) * width;
+        [curve.value_at(at - reach), curve.value_at(at + reach)]
+    });
+    let largest = (pairs.as_flattened().as_flattened().iter())
+        .chain(&between)
+        .fold(0.0f64, |largest, component| largest.max(component.abs()));
+    let unit = if largest > 1e-30 {
+        f64::from_bits(largest.to_bits() & (0x7ff << 52))
+    } else {
+        1.0
+    };
+    for c in 0..4 {
+        middle[c][lane] = (between[c] / unit) as f32;
+        for (k, [before, after]) in pairs.iter().enumerate() {
+            let rise = (after[c] - between[c]) / unit;
+            let fall = (before[c] - between[c]) / unit;
+            even[k][c][lane] = (rise + fall) as f32;
+            odd[k][c][lane] = (rise - fall) as f32;
+        }
+    }
+    unit as f32
+}

@@ -1,0 +1,134 @@
+//! Exponentials and logarithms of f32, and rows of such numbers.
+
+use crate::fit::double::intervals::ROOM;
+use crate::math::quaternion::{Real as _, scaled, square, sum};
+use crate::math::ranges::medium_waves;
+use crate::simd::lanes::{Lanes, Number};
+use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
+use crate::twin::small_angle::FromIdentity;
+
+/// Numbers of the lanes, in f32.
+pub(crate) type Row = [f32; ROOM];
+
+/// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to 1/2 and up
+/// to 1; from Chebyshev nodes, within 3.5e-8.
+pub(crate) const LOG: [f32; 6] = [
+    0.333_333_28,
+    0.133_339_27,
+    0.057_006_53,
+    0.026_519_666,
+    0.007_495_316,
+    0.011_555_838,
+];
+pub(crate) const LONG_LOG: [f32; 10] = [
+    0.333_333_34,
+    0.133_334_32,
+    0.057_110_59,
+    0.025_800_379,
+    0.009_014_793,
+    0.014_275_147,
+    -0.016_298_994,
+    0.024_591_85,
+    -0.015_747_076,
+    0.005_381_98,
+];
+
+/// The exponential of a half-rotation vector up to pi/4.
+#[inline(always)]
+pub(crate) fn short_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
+    let (sinc, cosm1) = sine_cosm1_quarter(N::all(1.0), square(v));
+    FromIdentity {
+        vector: scaled(v, sinc),
+        cosm1,
+    }
+}
+
+/// The same up to pi/2.
+#[inline(always)]
+pub(crate) fn long_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
+    let (sinc, cosm1) = sine_cosm1(N::all(1.0), square(v));
+    FromIdentity {
+        vector: scaled(v, sinc),
+        cosm1,
+    }
+}
+
+/// The exponential of so many times a vector, in f64; of squares up to
+/// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE) within 7e-9.
+#[inline(always)]
+pub(crate) fn exact_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
+    let times = L::Doubles::all(f64::from(times));
+    let vector = [
+        x.widened() * times,
+        y.widened() * times,
+        z.widened() * times,
+    ];
+    let (sinc, cosine) = medium_waves(square(vector));
+    let [x, y, z] = scaled(vector, sinc);
+    [x, y, z, cosine]
+}
+
+#[inline(always)]
+pub(crate) fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
+    [x.widened(), y.widened(), z.widened(), w.widened()]
+}
+
+/// The logarithm, by coefficients that hold so far.
+#[inline(always)]
+pub(crate) fn log<N: Number, const COUNT: usize>(
+    turn: FromIdentity<N>,
+    coefficients: &[f32; COUNT],
+) -> [N; 3] {
+    let u = -turn.cosm1;
+    let square = u * u;
+    let mut tail = N::all(0.0);
+    for i in (0..COUNT / 2).rev() {
+        let pair = N::all(coefficients[2 * i + 1]) * u + N::all(coefficients[2 * i]);
+        tail = tail * square + pair;
+    }
+    sum(scaled(turn.vector, tail * u), turn.vector)
+}
+
+#[inline(always)]
+pub(crate) fn load3<L: Lanes>([x, y, z]: &[Row; 3], lane: usize) -> [L; 3] {
+    [
+        L::load(&x[lane..]),
+        L::load(&y[lane..]),
+        L::load(&z[lane..]),
+    ]
+}
+
+#[inline(always)]
+pub(crate) fn store<L: Lanes>([x, y, z]: &mut [Row; 3], lane: usize, own: [L; 3]) {
+    own[0].store(&mut x[lane..lane + L::COUNT]);
+    own[1].store(&mut y[lane..lane + L::COUNT]);
+    own[2].store(&mut z[lane..lane + L::COUNT]);
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// `x / sin(x)` by 1 - cos(x).
+    pub(crate) fn longer(u: f64) -> f64 {
+        let angle = 2.0 * libm::asin(libm::sqrt(u / 2.0));
+        angle / libm::sin(angle)
+    }
+
+    /// That `1 + x (c₀ + c₁ x + …)` is `exact` up to an end.
+    pub(crate) fn assert_near(coefficients: &[f64], end: f64, exact: fn(f64) -> f64, bound: f64) {
+        for i in 1..=10_000 {
+            let x = f64::from(i) * end / 10_000.0;
+            let tail = coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
+            let error = (tail * x + 1.0 - exact(x)).abs();
+            assert!(error <= bound, "{coefficients:?} at {x}: {error}");
+        }
+    }
+
+    /// Catches a wrong digit in a coefficient.
+    #[test]
+    fn logarithms_are_those_of_libm() {
+        assert_near(&LOG.map(f64::from), 0.5, longer, 3.5e-8);
+        assert_near(&LONG_LOG.map(f64::from), 1.0, longer, 3.5e-8);
+    }
+}

@@ -1,0 +1,130 @@
+//! Parts of curves that are fitted by one polynomial each, and what their basis functions do
+//! there.
+
+use crate::fit::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
+
+/// Sums of the three half-rotation vectors' squares up to which curves are fitted within 7e-8
+/// of a component by [`FEW_POWERS`], and by [`WHOLE`]. Two halves leave out less of any longer
+/// one that comes straight from keys.
+pub(crate) const LONGEST_OF_FEW: f64 = 0.01;
+pub(crate) const LONGEST_WHOLE: f64 = 0.16;
+
+/// A part of curves' parameter, from their start on or back from their end, and the nodes at
+/// which they are sampled there. What they do at its ends is known, and at its middle.
+pub(crate) struct Part<const SAMPLED: usize, const PAIRS: usize> {
+    pub(crate) nodes: &'static Nodes<PAIRS>,
+    pub(crate) middle: Place,
+    /// Half of the basis functions' second derivatives there.
+    pub(crate) bends: [f32; 3],
+    /// What they gain from there on, up to `-s` and to `s` at each node `s` that is sampled.
+    pub(crate) gains: [[[Gain; 2]; 3]; SAMPLED],
+    /// From vectors at keys to derivatives there.
+    pub(crate) slope: f32,
+}
+
+/// Degree 8.
+pub(crate) const FEW_POWERS: Part<1, 4> = Part::new(&FEW_END_NODES, 0.5, 1.0);
+pub(crate) const WHOLE: Part<2, 5> = Part::new(&END_NODES, 0.5, 1.0);
+pub(crate) const HALF: Part<2, 5> = Part::new(&HALF_END_NODES, 0.25, 0.5);
+/// From the end on: there the last of the vectors is the first that turns.
+pub(crate) const LAST_HALF: Part<2, 5> = HALF.backward();
+/// Where both meet.
+pub(crate) const SEAM: Place = Place::new(0.5, 0.5);
+
+/// The basis functions at some place, and their derivatives by a part's parameter.
+pub(crate) struct Place {
+    pub(crate) weights: [f32; 3],
+    pub(crate) rates: [f32; 3],
+}
+
+impl Place {
+    /// For a part of that width.
+    const fn new(m: f64, width: f64) -> Self {
+        let n = 1.0 - m;
+        Self {
+            weights: [
+                (1.0 - n * n * n) as f32,
+                ((3.0 - 2.0 * m) * m * m) as f32,
+                (m * m * m) as f32,
+            ],
+            rates: [
+                (3.0 * n * n * width) as f32,
+                (6.0 * m * n * width) as f32,
+                (3.0 * m * m * width) as f32,
+            ],
+        }
+    }
+}
+
+impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
+    const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
+        let (m, square) = (middle, width * width);
+        let mut part = Self {
+            nodes,
+            middle: Place::new(middle, width),
+            bends: [
+                (-3.0 * (1.0 - m) * square) as f32,
+                ((3.0 - 6.0 * m) * square) as f32,
+                (3.0 * m * square) as f32,
+            ],
+            gains: [[[Gain::new(0.0); 2]; 3]; SAMPLED],
+            slope: (3.0 * width) as f32,
+        };
+        let mut k = 0;
+        while k < SAMPLED {
+            // The first is the middle.
+            let s = nodes.at[k + 1] as f64 * width;
+            let (before, after) = (gains(m, -s), gains(m, s));
+            let mut j = 0;
+            while j < 3 {
+                part.gains[k][j] = [before[j], after[j]];
+                j += 1;
+            }
+            k += 1;
+        }
+        part
+    }
+}
+
+impl Part<2, 5> {
+    /// The basis functions, each 1 less itself, of the parameter that goes the other way.
+    const fn backward(mut self) -> Self {
+        self.middle.weights = backward(self.middle.weights);
+        self.middle.rates = backward(self.middle.rates);
+        self.bends = backward(self.bends);
+        let [first, second] = self.gains;
+        self.gains = [backward(first), backward(second)];
+        self
+    }
+}
+
+const fn backward<N: Copy>([first, second, third]: [N; 3]) -> [N; 3] {
+    [third, second, first]
+}
+
+/// What the basis functions have at `m + d` more than at `m`.
+const fn gains(m: f64, d: f64) -> [Gain; 3] {
+    let n = 1.0 - m;
+    [
+        Gain::new(((d - 3.0 * n) * d + 3.0 * n * n) * d),
+        Gain::new(((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d),
+        Gain::new(((d + 3.0 * m) * d + 3.0 * m * m) * d),
+    ]
+}
+
+/// What a basis function gains.
+#[derive(Clone, Copy)]
+pub(crate) struct Gain {
+    pub(crate) gain: f32,
+    pub(crate) squared: f32,
+}
+
+impl Gain {
+    const fn new(gain: f64) -> Self {
+        let gain = gain as f32;
+        Self {
+            gain,
+            squared: gain * gain,
+        }
+    }
+}

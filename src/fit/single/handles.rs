@@ -1,0 +1,234 @@
+//! Curves that are fitted whole or in parts, in vector lanes of f32 straight from their four
+//! keys.
+//!
+//! Steps come from the differences of neighbouring keys, which f32 knows as exactly as the
+//! keys, and rotations are what they are more than none: so that what f32 rounds is small
+//! where the curve turns little. One number is found in f64: the vector between the handles,
+//! in which all of the others' roundings would come together.
+
+use crate::fit::double::intervals::{Intervals, ROOM, energy};
+use crate::fit::single::exp_log::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
+use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
+use crate::fit::single::key_weights::KeyWeights;
+use crate::fit::single::long_tangents::{AT_ONCE, FarKeys};
+use crate::math::quaternion::{self, Real as _, dot, product, scaled, square, sum};
+use crate::math::ranges::MEDIUM_SQUARE;
+use crate::shader::KEY_INNER;
+use crate::simd::dispatch::InLanes;
+use crate::simd::lanes::Lanes;
+use crate::twin::small_angle::{composed, minus};
+
+/// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
+/// [`LONGEST_FALL`]; from Chebyshev nodes, within 5e-10.
+const MEDIUM_LOG: [f64; 8] = [
+    0.333_333_332_749_309,
+    0.133_333_465_469_371,
+    0.057_137_994_819_463,
+    0.025_464_296_345_686,
+    0.011_090_593_728_92,
+    0.006_946_432_245_739,
+    -0.000_581_458_801_535,
+    0.003_890_906_082_331,
+];
+
+/// More than 1 - cos(x) of any vector of such a curve.
+const LONGEST_FALL: f32 = 0.5645;
+
+/// The squares of half-rotation vectors that a tangent is made of, and of their sum: no
+/// other branch of its logarithm is nearer.
+const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
+
+/// The first key of each curve, its three half-rotation vectors, and its last key.
+pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
+
+/// Such curves of a block's intervals.
+pub(crate) struct WholeLanes {
+    /// The lanes whose curves are asked for.
+    pub(crate) wanted: [bool; ROOM],
+    /// Handles at the key that the interval starts with, towards the interval before it
+    /// and towards this one.
+    pub(crate) incoming: [Row; 3],
+    pub(crate) outgoing: [Row; 3],
+    /// How far what they are made of goes; up to 1 where that holds.
+    pub(crate) far: Row,
+    pub(crate) numbers: CurveNumbers,
+    /// The sum of the vectors' squares; far more where they do not hold, and of the lane
+    /// behind which none is.
+    pub(crate) energies: Row,
+}
+
+impl WholeLanes {
+    pub(crate) fn new() -> Self {
+        Self {
+            wanted: [false; ROOM],
+            incoming: [[0.0; ROOM]; 3],
+            outgoing: [[0.0; ROOM]; 3],
+            far: [0.0; ROOM],
+            numbers: [[[0.0; 4]; ROOM]; 5],
+            energies: [f32::INFINITY; ROOM],
+        }
+    }
+}
+
+/// Finds the handles of the keys between intervals.
+pub(crate) struct FindHandles<'a> {
+    pub(crate) lanes: &'a mut WholeLanes,
+    pub(crate) steps: &'a KeySteps,
+    pub(crate) weights: &'a KeyWeights,
+    pub(crate) intervals: &'a Intervals,
+    /// Finds those that f32 does not.
+    pub(crate) find_far: fn(&mut FarKeys),
+}
+
+impl InLanes for FindHandles<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (steps, weights, intervals) = (self.steps, self.weights, self.intervals);
+        let own = &mut *self.lanes;
+        let (mut far_keys, mut far_count) = ([0; ROOM], 0);
+        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+            let key = lane + 1;
+            if !own.wanted[lane..key + L::COUNT].contains(&true) {
+                continue;
+            }
+            let before = L::load(&weights.before[key..]);
+            let after = L::load(&weights.after[key..]);
+            let to_end = L::load(&weights.outgoing[key..]);
+            let left = scaled(load3::<L>(&steps.logs, lane), before);
+            let right = scaled(load3::<L>(&steps.logs, key), after);
+            let turn = composed(long_exp(left), long_exp(right));
+            let tangent = log(turn, &LONG_LOG);
+            let to_start = L::all(THIRD) - to_end;
+            store(&mut own.incoming, key, scaled(tangent, to_start));
+            store(&mut own.outgoing, key, scaled(tangent, to_end));
+            // What is not known becomes 4/3: too far.
+            let kind = L::load(&weights.kinds[key..]) * L::all(2.0 / 3.0);
+            let parts = square(left).larger(square(right).larger(square(sum(left, right))));
+            let far = parts * L::all(1.0 / LONGEST_TANGENT_PART);
+            let far = far.larger(kind).larger(-turn.cosm1);
+            far.store(&mut own.far[key..key + L::COUNT]);
+            if (-far).any_at_most(-1.0) {
+                for key in key..key + L::COUNT {
+                    let is_far = own.far[key] >= 1.0 && weights.kinds[key] == KEY_INNER;
+                    far_keys[far_count] = key;
+                    far_count += usize::from(is_far);
+                }
+            }
+        }
+        for keys in far_keys[..far_count].chunks(AT_ONCE) {
+            own.set_far(keys, intervals, self.find_far);
+        }
+    }
+}
+
+/// The numbers of curves whose vectors' squares come to more than this do not hold.
+pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
+
+/// Added to the squares of a curve whose numbers are in doubt.
+const IN_DOUBT: f64 = 2.0;
+const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
+
+const THIRD: f32 = 1.0 / 3.0;
+const TWO_THIRDS: f32 = 2.0 / 3.0;
+
+/// Finds the curves between handles.
+pub(crate) struct FindCurves<'a> {
+    pub(crate) lanes: &'a mut WholeLanes,
+    pub(crate) steps: &'a KeySteps,
+    pub(crate) weights: &'a KeyWeights,
+    pub(crate) intervals: &'a Intervals,
+}
+
+impl InLanes for FindCurves<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (steps, kinds, intervals) = (self.steps, &self.weights.kinds, self.intervals);
+        let whole = &mut *self.lanes;
+        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+            let (own, next) = (lane + 1, lane + 2);
+            if !whole.wanted[own..own + L::COUNT].contains(&true) {
+                continue;
+            }
+            let log = load3::<L>(&steps.logs, own);
+            let outgoing = load3::<L>(&whole.outgoing, own);
+            let incoming = load3::<L>(&whole.incoming, next);
+            // The handles of ends are 0 so far.
+            let parabola = scaled(log, L::all(TWO_THIRDS));
+            let at_first = at_end(L::load(&kinds[own..]));
+            let at_last = at_end(L::load(&kinds[next..]));
+            let w1 = sum(outgoing, scaled(minus(parabola, incoming), at_first));
+            let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
+            let start = L::load_rotations(&intervals.from[own..]);
+            let end = L::load_rotations(&intervals.to[own..]);
+            let (w2, fall) = between::<L>(w1, [start, end], w3);
+            let chord = L::load(&steps.chords[own..]);
+            let before = L::load(&steps.chords[lane..]);
+            let after = L::load(&steps.chords[next..]);
+            let chords = before.larger(chord.larger(after)) * L::all(1.0 / LONGEST_CHORD);
+            let far = L::load(&whole.far[own..]).larger(L::load(&whole.far[next..]));
+            let far = far
+                .larger(chords)
+                .larger(fall * L::all(-1.0 / LONGEST_FALL));
+            // Nothing where all holds, else `IN_DOUBT`. A sign of NaN is 1.
+            let half = L::all(0.5 * IN_DOUBT as f32);
+            let doubt = (far - L::all(1.0)).sign() * half + half;
+            let energy = energy([w1, w2, w3]) + doubt;
+            let none = L::all(0.0);
+            let numbers = [
+                start,
+                [w1[0], w1[1], w1[2], none],
+                [w2[0], w2[1], w2[2], none],
+                [w3[0], w3[1], w3[2], none],
+                end,
+            ];
+            energy.store(&mut whole.energies[own..own + L::COUNT]);
+            for (i, all) in whole.numbers.iter_mut().enumerate() {
+                L::store_rotations(numbers[i], &mut all[own..own + L::COUNT]);
+            }
+        }
+    }
+}
+
+/// `log(exp(-w₁) q₀⁻¹ q₁ exp(-w₃))`, and its cosine less 1.
+#[inline(always)]
+fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 3], L) {
+    let all = L::Doubles::all;
+    let (start, end) = (widened(start), widened(end));
+    let [x, y, z, w] = quaternion::step(start, end);
+    // Keys are unit to f32: one step of Newton's.
+    let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
+    let step = [x * scale, y * scale, z * scale, w * scale];
+    let [x, y, z, w] = product(product(exact_exp(w1, -1.0), step), exact_exp(w3, -1.0));
+    let u = all(1.0) - w;
+    let [c0, c1, c2, c3, c4, c5, c6, c7] = MEDIUM_LOG;
+    let uu = u * u;
+    let (first, second) = (all(c1) * u + all(c0), all(c3) * u + all(c2));
+    let (third, fourth) = (all(c5) * u + all(c4), all(c7) * u + all(c6));
+    let tail = (fourth * uu + third) * (uu * uu) + (second * uu + first);
+    let scale = tail * u + all(1.0);
+    let vector = [
+        L::rounded(x * scale),
+        L::rounded(y * scale),
+        L::rounded(z * scale),
+    ];
+    (vector, L::rounded(-u))
+}
+
+/// 1 at the end of a track, 0 at an inner key and at what is not known.
+#[inline(always)]
+fn at_end<L: Lanes>(kind: L) -> L {
+    kind * (L::all(2.0) - kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::single::exp_log::tests::{assert_near, longer};
+
+    /// Catches a wrong digit in a coefficient, and a range that is too short.
+    #[test]
+    fn logarithms_hold_for_every_curve_that_is_fitted() {
+        assert_near(&MEDIUM_LOG, f64::from(LONGEST_FALL), longer, 5e-10);
+        assert!(1.0 - LONGEST_DIRECT.sqrt().cos() < f64::from(LONGEST_FALL));
+    }
+}

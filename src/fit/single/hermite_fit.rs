@@ -1,0 +1,408 @@
+//! Fits of curves between two keys, in vector lanes of f32: they pass through the keys with
+//! the handles' slopes, and what they do at their middle is known, so that few nodes between
+//! are sampled.
+
+use crate::fit::both_sides::Sides;
+use crate::fit::double::expansion::{AboutMiddle, SineCosm1, about};
+use crate::fit::double::fit::{MOST, Samples, interpolate};
+use crate::fit::double::intervals::rounded;
+use crate::fit::single::exp_log::{exact_exp, long_exp, short_exp, widened};
+use crate::fit::single::fit_part::{Gain, HALF, LAST_HALF, Part, Place, SEAM};
+use crate::math::quaternion::{normalised, product, scaled, square, sum};
+use crate::shader::PolynomialSegment;
+use crate::simd::lanes::{Lanes, Number};
+use crate::twin::small_angle::{FromIdentity, composed, cross3, inverse_rotated};
+
+/// Curves `q₀ exp(w₁ b₁) exp(w₂ b₂) exp(w₃ b₃)`, a lane to each.
+#[derive(Clone, Copy)]
+pub(crate) struct BetweenKeys<L> {
+    pub(crate) start: [L; 4],
+    pub(crate) vectors: [[L; 3]; 3],
+    pub(crate) end: [L; 4],
+}
+
+/// How such curves are fitted, by so many pairs of nodes.
+pub(crate) trait KeyFit<const PAIRS: usize> {
+    /// Fits them: to segments at these places, and behind each where they are cut. Whatever
+    /// the samples were.
+    fn fit<L: Lanes>(
+        &self,
+        samples: &mut Samples<L, PAIRS>,
+        curves: &BetweenKeys<L>,
+        places: &[usize; MOST],
+        segments: &mut [PolynomialSegment],
+    );
+}
+
+/// The whole.
+impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, PAIRS> {
+    #[inline(always)]
+    fn fit<L: Lanes>(
+        &self,
+        samples: &mut Samples<L, PAIRS>,
+        curves: &BetweenKeys<L>,
+        places: &[usize; MOST],
+        segments: &mut [PolynomialSegment],
+    ) {
+        let BetweenKeys {
+            start,
+            vectors,
+            end,
+        } = *curves;
+        let [w1, _, w3] = vectors;
+        let ends = [
+            End::new(start, w1, self.slope),
+            End::new(end, w3, self.slope),
+        ];
+        let middle = Moment::new::<false>(start, vectors, &self.middle);
+        sample::<L, SAMPLED, PAIRS, true>(samples, self, middle, ends);
+        interpolate(true, self.nodes, samples, places, segments);
+    }
+}
+
+/// In two.
+pub(crate) struct Halves;
+
+impl KeyFit<5> for Halves {
+    #[inline(always)]
+    fn fit<L: Lanes>(
+        &self,
+        samples: &mut Samples<L, 5>,
+        curves: &BetweenKeys<L>,
+        places: &[usize; MOST],
+        segments: &mut [PolynomialSegment],
+    ) {
+        let BetweenKeys {
+            start,
+            vectors,
+            end,
+        } = *curves;
+        let [w1, ..] = vectors;
+        let seam = Moment::new::<true>(start, vectors, &SEAM);
+        let [u1, u2, u3] = seam.rates(&SEAM);
+        let seam = End::new(seam.rotation, sum(sum(u1, u3), u2), 1.0);
+        let middle = Moment::new::<false>(start, vectors, &HALF.middle);
+        let ends = [End::new(start, w1, HALF.slope), seam];
+        sample::<L, _, _, false>(samples, &HALF, middle, ends);
+        interpolate(true, HALF.nodes, samples, places, segments);
+        let backward = backward(vectors);
+        let middle = Moment::new::<false>(end, backward, &LAST_HALF.middle);
+        let ends = [End::new(end, backward[2], HALF.slope), seam.negated()];
+        sample::<L, _, _, false>(samples, &LAST_HALF, middle, ends);
+        samples.turn_round();
+        let behind = places.map(|place| place + 1);
+        interpolate(true, LAST_HALF.nodes, samples, &behind, segments);
+    }
+}
+
+/// Where a part ends: the rotation, and its derivative by the part's parameter.
+#[derive(Clone, Copy)]
+struct End<L> {
+    rotation: [L; 4],
+    slope: [L; 4],
+}
+
+impl<L: Lanes> End<L> {
+    /// Turning by so many times a half-rotation vector.
+    #[inline(always)]
+    fn new(rotation: [L; 4], vector: [L; 3], times: f32) -> Self {
+        Self {
+            rotation,
+            slope: about(rotation, scaled(vector, L::all(times))),
+        }
+    }
+
+    /// The same of a parameter that goes the other way.
+    #[inline(always)]
+    fn negated(self) -> Self {
+        let [x, y, z, w] = self.slope;
+        Self {
+            slope: [-x, -y, -z, -w],
+            ..self
+        }
+    }
+}
+
+/// Curves at some place of their parameter: the rotation, and the half-rotation vectors brought
+/// behind what follows them there.
+struct Moment<L> {
+    rotation: [L; 4],
+    vectors: [[L; 3]; 3],
+}
+
+impl<L: Lanes> Moment<L> {
+    #[inline(always)]
+    fn new<const EXACT: bool>(start: [L; 4], vectors: [[L; 3]; 3], place: &Place) -> Self {
+        let ([w1, w2, w3], [b1, b2, b3]) = (vectors, place.weights);
+        let third_turn = exp(w3, b3);
+        let second_turn = composed(exp(w2, b2), third_turn);
+        let rotation = if EXACT {
+            // Where the turns are longer, f32 would round more than that.
+            let turn = product(exact_exp(w1, b1), exact_exp(w2, b2));
+            let turn = product(turn, exact_exp(w3, b3));
+            rounded::<L>(product(normalised(widened(start)), turn))
+        } else {
+            let turn = composed(exp(w1, b1), second_turn);
+            let [x, y, z] = turn.vector;
+            let [x, y, z, w] = product(start, [x, y, z, turn.cosm1]);
+            [x + start[0], y + start[1], z + start[2], w + start[3]]
+        };
+        let v1 = inverse_rotated(w1, second_turn);
+        let v2 = inverse_rotated(w2, third_turn);
+        Self {
+            rotation,
+            vectors: [v1, v2, w3],
+        }
+    }
+
+    /// What each vector turns by there, per unit of a part's parameter.
+    #[inline(always)]
+    fn rates(&self, place: &Place) -> [[L; 3]; 3] {
+        let ([v1, v2, v3], [r1, r2, r3]) = (self.vectors, place.rates);
+        [
+            scaled(v1, L::all(r1)),
+            scaled(v2, L::all(r2)),
+            scaled(v3, L::all(r3)),
+        ]
+    }
+}
+
+/// The exponential of so many times a vector.
+#[inline(always)]
+fn exp<L: Lanes>(vector: [L; 3], times: f32) -> FromIdentity<L> {
+    short_exp(scaled(vector, L::all(times)))
+}
+
+/// The vectors of the same curves from their ends: with `Bᵢ' = 1 - Bᵢ` they are
+/// `q₁ exp(w₁' B₁') exp(w₂' B₂') exp(w₃' B₃')`, where `wᵢ'` is `-wᵢ` brought behind what
+/// follows it in q₁.
+#[inline(always)]
+fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
+    let third_turn = long_exp(w3);
+    let second_turn = composed(long_exp(w2), third_turn);
+    let [v1, v2] = [
+        inverse_rotated(w1, second_turn),
+        inverse_rotated(w2, third_turn),
+    ];
+    // Written out: closures are not always inlined.
+    [
+        [-v1[0], -v1[1], -v1[2]],
+        [-v2[0], -v2[1], -v2[2]],
+        [-w3[0], -w3[1], -w3[2]],
+    ]
+}
+
+/// Samples a part of curves about its middle.
+#[inline(always)]
+fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bool>(
+    samples: &mut Samples<L, PAIRS>,
+    part: &Part<SAMPLED, PAIRS>,
+    middle: Moment<L>,
+    ends: [End<L>; 2],
+) {
+    samples.middle = middle.rotation;
+    set_middle(samples, part, &middle);
+    let curve = AboutMiddle::new(middle.rotation, middle.vectors);
+    let [v1, v2, v3] = middle.vectors;
+    let squares = [square(v1), square(v2), square(v3)];
+    for (k, gains) in (1..).zip(&part.gains) {
+        let second = if IS_WHOLE {
+            // It gains as much after the middle as before.
+            let [_, after] = gains[1];
+            let (sine, fall) = turned(L::all(after.gain), L::all(after.squared), squares[1]);
+            let sine = Sides {
+                before: -sine,
+                after: sine,
+            };
+            (sine, Sides::same(fall))
+        } else {
+            on_both_sides(gains[1], squares[1])
+        };
+        let first = on_both_sides(gains[0], squares[0]);
+        let third = on_both_sides(gains[2], squares[2]);
+        samples.set_differences(k, curve.differences([first, second, third]));
+    }
+    let [before, after] = ends;
+    // Written out: closures are not always inlined.
+    let mut differences = [Sides::same(squares[0]); 4];
+    let mut slopes = differences;
+    for c in 0..4 {
+        differences[c].before = before.rotation[c] - samples.middle[c];
+        differences[c].after = after.rotation[c] - samples.middle[c];
+        slopes[c].before = before.slope[c];
+        slopes[c].after = after.slope[c];
+    }
+    samples.set_differences(PAIRS - 2, differences);
+    samples.set_slopes(slopes);
+}
+
+/// Sets the derivative at the middle, `m a` with `a = Σ vᵢ bᵢ'`, and half of the second,
+/// `m (a² + Σ vᵢ bᵢ''/2 + Σ vᵢ bᵢ' × vⱼ bⱼ')` over i < j, from derivatives of the product.
+#[inline(always)]
+fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
+    samples: &mut Samples<L, PAIRS>,
+    part: &Part<SAMPLED, PAIRS>,
+    middle: &Moment<L>,
+) {
+    let m = middle.rotation;
+    let [u1, u2, u3] = middle.rates(&part.middle);
+    let rate = sum(sum(u1, u3), u2);
+    let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, part.bends);
+    let ends = sum(scaled(v1, L::all(b1)), scaled(v3, L::all(b3)));
+    let bend = sum(ends, scaled(v2, L::all(b2)));
+    // A vector has no part across itself.
+    let turning = sum(cross3(u1, rate), cross3(u2, u3));
+    let [x, y, z, w] = about(m, sum(bend, turning));
+    let half = square(rate) * L::all(0.5);
+    let half_second = [
+        x - m[0] * half,
+        y - m[1] * half,
+        z - m[2] * half,
+        w - m[3] * half,
+    ];
+    samples.set_middle(about(m, rate), half_second);
+}
+
+#[inline(always)]
+fn on_both_sides<L: Lanes>([before, after]: [Gain; 2], square: L) -> SineCosm1<Sides<L>> {
+    let gain = Sides {
+        before: L::all(before.gain),
+        after: L::all(after.gain),
+    };
+    let squared = Sides {
+        before: L::all(before.squared),
+        after: L::all(after.squared),
+    };
+    turned(gain, squared, Sides::same(square))
+}
+
+/// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
+/// up to 0.201; from Chebyshev nodes, within 3e-9.
+const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
+const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
+
+/// Of a vector with that square, times a gain with the square `squared`.
+#[inline(always)]
+fn turned<N: Number>(gain: N, squared: N, square: N) -> SineCosm1<N> {
+    let z = square * squared;
+    let sinc = ((N::all(SINC[2]) * z + N::all(SINC[1])) * z + N::all(SINC[0])) * z;
+    let fall = ((N::all(FALL[2]) * z + N::all(FALL[1])) * z + N::all(FALL[0])) * z;
+    (gain * sinc + gain, fall)
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable as _;
+    use fastrand::Rng;
+    use glam::{DQuat, DVec3, DVec4, Quat, Vec3, Vec4};
+
+    use super::*;
+    use crate::fit::single::exp_log::tests::assert_near;
+    use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
+    use crate::fit::single::handles::LONGEST_DIRECT;
+
+    /// Catches a wrong digit in a coefficient, and a range that is too short.
+    #[test]
+    fn waves_hold_for_every_curve_that_is_fitted() {
+        let sinc = |z: f64| libm::sin(libm::sqrt(z)) / libm::sqrt(z);
+        assert_near(&SINC.map(f64::from), LARGEST, sinc, 3e-9);
+        let cosine = |z: f64| libm::cos(libm::sqrt(z));
+        assert_near(&FALL.map(f64::from), LARGEST, cosine, 3e-9);
+        for (gains, longest) in [
+            (&FEW_POWERS.gains[..], LONGEST_OF_FEW),
+            (&WHOLE.gains, LONGEST_WHOLE),
+            (&HALF.gains, LONGEST_DIRECT),
+        ] {
+            let gains = gains.as_flattened().as_flattened();
+            let most = gains
+                .iter()
+                .fold(0.0f32, |most, gain| most.max(gain.squared));
+            assert!(f64::from(most) * longest < LARGEST);
+        }
+    }
+
+    const LARGEST: f64 = 0.201;
+
+    /// A curve's value at `t`.
+    fn value(start: Quat, vectors: [Vec3; 3], t: f64) -> DQuat {
+        let u = 1.0 - t;
+        let basis = [1.0 - u * u * u, (3.0 - 2.0 * t) * t * t, t * t * t];
+        let turns = vectors.into_iter().zip(basis);
+        turns.fold(start.as_dquat().normalize(), |q, (vector, weight)| {
+            q * DQuat::from_scaled_axis(vector.as_dvec3() * 2.0 * weight)
+        })
+    }
+
+    /// A curve whose vectors' squares come to so much.
+    fn curve(random: &mut Rng, square: f64, goes_back: bool) -> (Quat, [Vec3; 3]) {
+        let mut number = || random.f64() - 0.5;
+        let start = DQuat::from_xyzw(number(), number(), number(), number());
+        let mut three = || DVec3::new(number(), number(), number());
+        let mut vectors = [three(), three(), three()];
+        if goes_back {
+            // The highest powers.
+            vectors[1] = vectors[0] * -1.5;
+            vectors[2] = vectors[0] * 0.9;
+        }
+        let own: f64 = vectors.iter().map(|v| v.length_squared()).sum();
+        let vectors = vectors.map(|v| (v * (square / own).sqrt()).as_vec3());
+        (start.normalize().as_quat(), vectors)
+    }
+
+    /// The segments of a curve.
+    fn fitted<const PAIRS: usize>(
+        how: &impl KeyFit<PAIRS>,
+        start: Quat,
+        vectors: [Vec3; 3],
+    ) -> [PolynomialSegment; 2] {
+        let end = value(start, vectors, 1.0).as_quat();
+        let curves = BetweenKeys {
+            start: start.to_array().map(Vec4::splat),
+            vectors: vectors.map(|v| v.to_array().map(Vec4::splat)),
+            end: end.to_array().map(Vec4::splat),
+        };
+        let mut segments = [PolynomialSegment::zeroed(); 2];
+        let mut samples = Samples::all(Vec4::ZERO);
+        how.fit(&mut samples, &curves, &[0; MOST], &mut segments);
+        segments
+    }
+
+    /// The largest error of a component, of curves in so many parts.
+    fn largest_error<const PAIRS: usize>(
+        how: &impl KeyFit<PAIRS>,
+        parts: usize,
+        longest: f64,
+    ) -> f64 {
+        let random = &mut Rng::with_seed(1);
+        let mut largest = 0.0f64;
+        for i in 0..4000 {
+            let (start, vectors) = curve(random, longest, i % 4 == 0);
+            let segments = fitted(how, start, vectors);
+            for (part, segment) in segments[..parts].iter().enumerate() {
+                for j in 0..=40 {
+                    let s = f64::from(j) / 40.0 - 0.5;
+                    let powers = segment.coefficients.map(|c| Vec4::from(c).as_dvec4());
+                    let found = powers.into_iter().rev().reduce(|sum, c| sum * s + c);
+                    let t = (part as f64 + 0.5 + s) / parts as f64;
+                    let exact = DVec4::from(value(start, vectors, t));
+                    let error = exact - found.expect("eleven powers");
+                    largest = largest.max(error.abs().max_element());
+                }
+            }
+        }
+        largest
+    }
+
+    /// Catches a wrong derivative, last halves that go another way, and limits that are too
+    /// high.
+    #[test]
+    fn the_longest_curves_are_fitted_closely() {
+        for (found, most) in [
+            (largest_error(&FEW_POWERS, 1, LONGEST_OF_FEW), 1.2e-7),
+            (largest_error(&WHOLE, 1, LONGEST_WHOLE), 1.2e-7),
+            (largest_error(&Halves, 2, LONGEST_DIRECT), 1.7e-7),
+        ] {
+            assert!(found < most, "{found:e}");
+        }
+    }
+}

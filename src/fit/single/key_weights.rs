@@ -1,0 +1,101 @@
+//! What the tangents at the keys of a block are made of, side by side.
+
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
+use crate::fit::tangent_weights::{UNKNOWN, WeightRule};
+use crate::shader::TangentWeights;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+
+/// A [`TangentWeights`] for the key that each interval of a block starts with.
+pub(crate) struct KeyWeights {
+    rule: WeightRule,
+    /// At a track's ends.
+    end: TangentWeights,
+    is_loop: bool,
+    pub(crate) before: [f32; ROOM],
+    pub(crate) after: [f32; ROOM],
+    pub(crate) outgoing: [f32; ROOM],
+    pub(crate) kinds: [f32; ROOM],
+}
+
+impl KeyWeights {
+    pub(crate) fn new(rule: WeightRule, ends: Ends) -> Self {
+        Self {
+            rule,
+            end: WeightRule::end(ends),
+            is_loop: ends == Ends::Loop,
+            before: [UNKNOWN.before; ROOM],
+            after: [UNKNOWN.after; ROOM],
+            outgoing: [UNKNOWN.outgoing; ROOM],
+            kinds: [UNKNOWN.kind; ROOM],
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn at(&self, lane: usize) -> TangentWeights {
+        TangentWeights {
+            before: self.before[lane],
+            after: self.after[lane],
+            outgoing: self.outgoing[lane],
+            kind: self.kinds[lane],
+        }
+    }
+
+    fn set(&mut self, lane: usize, joint: TangentWeights) {
+        self.before[lane] = joint.before;
+        self.after[lane] = joint.after;
+        self.outgoing[lane] = joint.outgoing;
+        self.kinds[lane] = joint.kind;
+    }
+
+    /// Those of all keys.
+    pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
+        in_lanes(&mut Between {
+            weights: self,
+            durations: &intervals.durations,
+        });
+        for stretch in stretches {
+            // Two keys alone have nothing beside them, not in a loop either.
+            let end = match stretch.all {
+                1 => UNKNOWN,
+                _ if self.is_loop => continue,
+                _ => self.end,
+            };
+            if let Some(lane) = stretch.first() {
+                self.set(lane, end);
+            }
+            if let Some(lane) = stretch.last() {
+                self.set(lane + 1, end);
+            }
+        }
+    }
+}
+
+struct Between<'a> {
+    weights: &'a mut KeyWeights,
+    durations: &'a [f64; ROOM],
+}
+
+impl InLanes for Between<'_> {
+    // A loop that the compiler makes vectors of.
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let KeyWeights {
+            rule,
+            before,
+            after,
+            outgoing,
+            kinds,
+            ..
+        } = &mut *self.weights;
+        for j in 0..LANES {
+            let joint = rule.between(self.durations[j], self.durations[j + 1]);
+            before[j + 1] = joint.before;
+            after[j + 1] = joint.after;
+            outgoing[j + 1] = joint.outgoing;
+            kinds[j + 1] = joint.kind;
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Curves that turn little, in vector lanes of f32: what the kernels evaluate comes
+//! straight from the keys, with nothing sampled and nothing fitted.
+// Loops over lanes index many arrays at once.
+#![allow(clippy::needless_range_loop)]
+
+use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
+use crate::fit::single::key_steps::KeySteps;
+use crate::fit::single::key_weights::KeyWeights;
+use crate::shader::PolynomialSegment;
+use crate::shader::{KEY_INNER, LONGEST_STEP};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::twin::small_angle::SmallAngleCubic;
+use crate::twin::small_angle::small_angle_cubic;
+
+/// Lanes of the widest vectors.
+const VECTOR: usize = 16;
+
+/// So few curves are worked out one by one: most lanes would be for nothing.
+const FEW: usize = 6;
+
+/// The curves of a block's intervals.
+pub(crate) struct GentleLanes {
+    /// Whether the keys of the interval, and of both beside it, are near each other.
+    near: [bool; ROOM],
+    /// Whole vectors of lanes, behind which no lane holds such a curve.
+    wanted: usize,
+    powers: [[[f32; 4]; ROOM]; 7],
+    /// Whether a lane has its curve.
+    pub(crate) holds: [bool; ROOM],
+}
+
+impl GentleLanes {
+    pub(crate) fn new() -> Self {
+        Self {
+            near: [false; ROOM],
+            wanted: 0,
+            powers: [[[0.0; 4]; ROOM]; 7],
+            holds: [false; ROOM],
+        }
+    }
+
+    /// Finds out which keys are near each other.
+    pub(crate) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) {
+        for j in 1..LANES {
+            let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
+            self.near[j] = (chords[0] <= LONGEST_STEP)
+                & (chords[1] <= LONGEST_STEP)
+                & (chords[2] <= LONGEST_STEP);
+        }
+        self.holds = [false; ROOM];
+        let mut last = None;
+        for lanes in stretches.iter().map(Stretch::lanes) {
+            let place = self.near[lanes.clone()].iter().rposition(|&near| near);
+            last = place.map(|place| lanes.start + place).or(last);
+        }
+        // A lane's curve is worked out one lane before it.
+        self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
+    }
+
+    /// Prepares them.
+    pub(crate) fn prepare(
+        &mut self,
+        intervals: &Intervals,
+        weights: &KeyWeights,
+        stretches: &[Stretch],
+    ) {
+        let own = stretches.iter().flat_map(Stretch::lanes);
+        let near: Vec<usize> = own.filter(|&lane| self.near[lane]).collect();
+        let mut curves = Curves {
+            lanes: self,
+            intervals,
+            weights,
+        };
+        if near.len() > FEW {
+            in_lanes(&mut curves);
+            return;
+        }
+        for lane in near {
+            let curve = curves.curve(lane - 1);
+            let own = &mut *curves.lanes;
+            for (powers, power) in own.powers.iter_mut().zip(curve.powers) {
+                powers[lane] = power;
+            }
+            own.holds[lane] = curve.holds;
+        }
+    }
+
+    /// Whether any lane may have its curve.
+    pub(crate) fn may_hold(&self) -> bool {
+        self.wanted > 0
+    }
+
+    /// Writes it.
+    #[inline]
+    pub(crate) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
+        for (own, power) in segment.coefficients.iter_mut().zip(&self.powers) {
+            *own = power[lane];
+        }
+    }
+}
+
+struct Curves<'a> {
+    lanes: &'a mut GentleLanes,
+    intervals: &'a Intervals,
+    weights: &'a KeyWeights,
+}
+
+impl Curves<'_> {
+    /// The curve of lane `j + 1`.
+    #[inline(always)]
+    fn curve(&self, j: usize) -> SmallAngleCubic {
+        let Intervals { from, to, .. } = self.intervals;
+        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        let (start, end) = (from[j + 1], to[j + 1]);
+        // Where there is no neighbour, the key again.
+        let before = either(first.kind == KEY_INNER, from[j], start);
+        let after = either(last.kind == KEY_INNER, to[j + 2], end);
+        small_angle_cubic([before, start, end, after], first, last)
+    }
+}
+
+impl InLanes for Curves<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let mut powers = [[[0.0; ROOM]; 4]; 7];
+        let mut holds = [false; ROOM];
+        // The lane before each is context, at least.
+        for j in 0..self.lanes.wanted.min(LANES) {
+            let curve = self.curve(j);
+            for power in 0..7 {
+                for c in 0..4 {
+                    powers[power][c][j + 1] = curve.powers[power][c];
+                }
+            }
+            holds[j + 1] = curve.holds;
+        }
+        self.lanes.holds = holds;
+        for power in 0..7 {
+            let [x, y, z, w] = &powers[power];
+            for j in 0..ROOM {
+                self.lanes.powers[power][j] = [x[j], y[j], z[j], w[j]];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn either(first: bool, a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        if first { a[0] } else { b[0] },
+        if first { a[1] } else { b[1] },
+        if first { a[2] } else { b[2] },
+        if first { a[3] } else { b[3] },
+    ]
+}

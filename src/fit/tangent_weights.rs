@@ -1,0 +1,134 @@
+//! Tangent weights: how the steps on both sides of a key count in its tangent, for curves that are
+//! prepared in f32 straight from keys. Only the weights depend on the key times; they are computed
+//! in f64.
+
+use crate::curve::options::Ends;
+use crate::shader::TangentWeights;
+use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+
+/// The rule for the weights of the steps before and after a key.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum WeightRule {
+    /// Both steps have the same weight: Catmull-Rom.
+    Alike,
+    /// Each step is weighted by the other interval's duration over its own: Bessel-Overhauser.
+    ByTime,
+}
+
+const SIXTH: f32 = 1.0 / 6.0;
+
+/// The largest ratio of two neighbouring durations for which the weights hold.
+const MOST_UNEVEN: f64 = 16.0;
+
+/// A key whose tangent f32 weights do not give.
+pub(crate) const UNKNOWN: TangentWeights = TangentWeights {
+    before: 0.0,
+    after: 0.0,
+    outgoing: 0.0,
+    kind: KEY_UNKNOWN,
+};
+
+impl WeightRule {
+    /// The weights of a key between intervals of `before` and `after` seconds.
+    #[inline(always)]
+    pub(crate) fn between(self, before: f64, after: f64) -> TangentWeights {
+        let by_time = matches!(self, Self::ByTime);
+        let (left, right) = (after / before, before / after);
+        let outgoing = after / (3.0 * (before + after));
+        // Both comparisons are false for NaN, whose weights are unknown then.
+        let is_even = (left <= MOST_UNEVEN) & (right <= MOST_UNEVEN);
+        TangentWeights {
+            before: if by_time { left as f32 } else { 1.0 },
+            after: if by_time { right as f32 } else { 1.0 },
+            outgoing: if by_time { outgoing as f32 } else { SIXTH },
+            kind: if is_even | !by_time {
+                KEY_INNER
+            } else {
+                KEY_UNKNOWN
+            },
+        }
+    }
+
+    /// The weights of the first or the last key of a track of at least three keys.
+    pub(crate) fn end(ends: Ends) -> TangentWeights {
+        match ends {
+            Ends::Parabolic => TangentWeights {
+                kind: KEY_AT_END,
+                ..UNKNOWN
+            },
+            _ => UNKNOWN,
+        }
+    }
+}
+
+/// The weights of some keys of a track, kept for the next track with the same times.
+pub(crate) struct TrackWeights<'a> {
+    rule: WeightRule,
+    ends: Ends,
+    times: &'a [f64],
+    whole: (usize, usize),
+    weights: Vec<TangentWeights>,
+}
+
+impl<'a> TrackWeights<'a> {
+    pub(crate) fn new(rule: WeightRule, ends: Ends) -> Self {
+        Self {
+            rule,
+            ends,
+            times: &[],
+            whole: (0, 0),
+            weights: Vec::new(),
+        }
+    }
+
+    /// The weights of consecutive keys with these times; the first of them is the `first`th of a
+    /// track of `all` keys.
+    pub(crate) fn of(&mut self, times: &'a [f64], first: usize, all: usize) -> &[TangentWeights] {
+        if std::ptr::eq(self.times, times) && self.whole == (first, all) {
+            return &self.weights;
+        }
+        (self.times, self.whole) = (times, (first, all));
+        self.weights.clear();
+        self.weights.resize(times.len(), UNKNOWN);
+        let mut work = Between {
+            rule: self.rule,
+            times,
+            weights: &mut self.weights,
+        };
+        in_lanes(&mut work);
+        let is_curve = all > 2;
+        if first == 0 && is_curve {
+            self.weights[0] = WeightRule::end(self.ends);
+        }
+        if first + times.len() == all && is_curve {
+            self.weights[times.len() - 1] = WeightRule::end(self.ends);
+        }
+        &self.weights
+    }
+}
+
+/// Computes [`WeightRule::between`] for every key but the first and the last.
+struct Between<'a> {
+    rule: WeightRule,
+    times: &'a [f64],
+    weights: &'a mut [TangentWeights],
+}
+
+impl InLanes for Between<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let inner = self.times.len().saturating_sub(2);
+        let (before, own, after) = (
+            &self.times[..inner],
+            &self.times[self.times.len().min(1)..][..inner],
+            &self.times[self.times.len() - inner..],
+        );
+        let start = self.weights.len().min(1);
+        let weights = &mut self.weights[start..][..inner];
+        for j in 0..inner {
+            weights[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
+        }
+    }
+}

@@ -1,4 +1,0 @@
-//! TODO-DOC
-
-pub(crate) mod arc_lanes;
-pub(crate) mod arcs;

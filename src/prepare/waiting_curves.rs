@@ -1,0 +1,210 @@
+//! Curves of a block that are fitted straight from keys: which lanes they are in, and where
+//! they wait until a block of them is full.
+
+use std::ops::Range;
+
+use bytemuck::Zeroable as _;
+
+use crate::fit::double::fit::{MOST, Samples};
+use crate::fit::double::intervals::{LANES, ROOM};
+use crate::fit::single::handles::CurveNumbers;
+use crate::fit::single::hermite_fit::{BetweenKeys, KeyFit};
+use crate::prepare::prepared::Prepared;
+use crate::shader::PolynomialSegment;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+
+/// Some lanes.
+pub(crate) struct List {
+    count: usize,
+    lanes: [u32; ROOM_FOR],
+}
+
+/// As many as a block has, and the last vector. A power of two.
+const ROOM_FOR: usize = 2 * LANES;
+
+impl List {
+    pub(crate) fn new() -> Self {
+        Self {
+            count: 0,
+            lanes: [0; ROOM_FOR],
+        }
+    }
+
+    /// Adds a lane.
+    pub(crate) fn push(&mut self, lane: usize) {
+        self.lanes[self.count % ROOM_FOR] = lane as u32;
+        self.count += 1;
+    }
+
+    /// Adds those of some lanes that are wanted: which they are cannot be foreseen.
+    #[inline]
+    pub(crate) fn push_where(
+        &mut self,
+        lanes: Range<usize>,
+        energies: &[f32],
+        is_wanted: impl Fn(f32) -> bool,
+    ) {
+        let mut count = self.count;
+        for (lane, &energy) in lanes.zip(energies) {
+            self.lanes[count % ROOM_FOR] = lane as u32;
+            count += usize::from(is_wanted(energy));
+        }
+        self.count = count;
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are as many as a block has.
+    fn is_full(&self) -> bool {
+        self.count == LANES
+    }
+
+    /// The lanes.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
+        self.lanes[..self.count].iter().map(|&lane| lane as usize)
+    }
+
+    /// Forgets them.
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+}
+
+/// Curves that wait.
+pub(crate) struct WaitingCurves<F: 'static, const PAIRS: usize> {
+    how: &'static F,
+    /// The lanes of a block that are to be taken.
+    pub(crate) lanes: List,
+    /// Made when there is a curve for it.
+    block: Option<Box<Block>>,
+}
+
+struct Block {
+    numbers: CurveNumbers,
+    places: [u32; ROOM],
+    own: List,
+}
+
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> WaitingCurves<F, PAIRS> {
+    pub(crate) fn new(how: &'static F) -> Self {
+        Self {
+            how,
+            lanes: List::new(),
+            block: None,
+        }
+    }
+
+    /// Takes the curves in the lanes, which become the segments at these places, and fits a
+    /// block of them whenever there is one.
+    pub(crate) fn take(
+        &mut self,
+        numbers: &CurveNumbers,
+        places: &[u32; ROOM],
+        prepared: &mut Prepared,
+    ) {
+        for lane in self.lanes.iter() {
+            let new = || {
+                Box::new(Block {
+                    numbers: [[[0.0; 4]; ROOM]; 5],
+                    places: [0; ROOM],
+                    own: List::new(),
+                })
+            };
+            let block = self.block.get_or_insert_with(new);
+            block.push(numbers, places, lane);
+            if block.own.is_full() {
+                block.fit(self.how, prepared);
+            }
+        }
+        self.lanes.clear();
+    }
+
+    /// Fits those that still wait.
+    pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
+        if let Some(block) = &mut self.block {
+            block.fit(self.how, prepared);
+        }
+    }
+}
+
+impl Block {
+    fn push(&mut self, numbers: &CurveNumbers, places: &[u32; ROOM], lane: usize) {
+        let own = self.own.count;
+        for (waiting, numbers) in self.numbers.iter_mut().zip(numbers) {
+            waiting[own] = numbers[lane];
+        }
+        self.places[own] = places[lane];
+        self.own.push(own);
+    }
+
+    fn fit<const PAIRS: usize>(&mut self, how: &impl KeyFit<PAIRS>, prepared: &mut Prepared) {
+        fit(how, &self.own, &self.numbers, &self.places, prepared);
+        self.own.clear();
+    }
+}
+
+/// Fits the curves in some lanes to the segments at their places.
+pub(crate) fn fit<const PAIRS: usize>(
+    how: &impl KeyFit<PAIRS>,
+    list: &List,
+    curves: &CurveNumbers,
+    places: &[u32; ROOM],
+    prepared: &mut Prepared,
+) {
+    if list.count == 0 {
+        return;
+    }
+    let segments = &mut prepared.segments.polynomials;
+    let count = segments.len();
+    // For the last vector's lanes that have no curve.
+    segments.extend([PolynomialSegment::zeroed(); 2]);
+    in_lanes(&mut Fit::<_, PAIRS> {
+        how,
+        list,
+        curves,
+        places,
+        segments,
+    });
+    segments.truncate(count);
+}
+
+struct Fit<'a, F, const PAIRS: usize> {
+    how: &'a F,
+    list: &'a List,
+    curves: &'a CurveNumbers,
+    places: &'a [u32; ROOM],
+    /// Two more than there are.
+    segments: &'a mut [PolynomialSegment],
+}
+
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let &List { count, ref lanes } = self.list;
+        // Made once, as they are cleared before.
+        let mut samples = Samples::<L, PAIRS>::all(L::all(0.0));
+        for i in (0..count).step_by(L::COUNT) {
+            let lanes = &lanes[i..i + L::COUNT];
+            let own = &lanes[..L::COUNT.min(count - i)];
+            let [starts, firsts, seconds, thirds, ends] = self.curves;
+            let start = L::gather_rotations(starts, lanes);
+            let [x1, y1, z1, _] = L::gather_rotations(firsts, lanes);
+            let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
+            let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
+            let curves = BetweenKeys {
+                start,
+                vectors: [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]],
+                end: L::gather_rotations(ends, lanes),
+            };
+            let mut places = [self.segments.len() - 2; MOST];
+            for (place, &lane) in places.iter_mut().zip(own) {
+                *place = self.places[lane as usize] as usize;
+            }
+            self.how.fit(&mut samples, &curves, &places, self.segments);
+        }
+    }
+}
