@@ -1,5 +1,5 @@
-//! The bindings of a kernel, and the functions that read one element of a buffer: of a storage
-//! buffer as it is, or of a texel buffer, texels of 16 bytes that are put together again.
+//! The bindings of a kernel, and the functions that read one element of a buffer: from a storage
+//! buffer directly, or from a texel buffer, whose texels of 16 bytes are put together to elements.
 
 use std::fmt::Write;
 
@@ -51,12 +51,12 @@ fn output(binding: usize) -> String {
     format!("@group(0) @binding({binding}) var<storage, read_write> rotations: array<Stored>;\n")
 }
 
-/// The words that an element consists of, in order.
+/// A field of an element.
 #[derive(Clone, Copy)]
 enum Field {
     Scalar(ScalarKind),
     Vector(ScalarKind),
-    /// So many vectors of four f32.
+    /// An array of so many vectors of four f32.
     Vectors(u32),
 }
 

@@ -11,7 +11,8 @@ use naga::{
 
 use crate::table::{FORMS, LISTS, STORES};
 
-/// Everything that the kernels declare, each once: two that differ end the build.
+/// Everything that the kernels declare, once each. Two declarations of one name that differ are a
+/// build error.
 #[derive(Default)]
 pub(crate) struct Declared {
     constants: BTreeMap<String, String>,
@@ -20,9 +21,9 @@ pub(crate) struct Declared {
 
 /// A struct as it lies in a buffer.
 struct Layout {
-    /// The members with their offsets, as text: what must be the same wherever it is declared.
+    /// The members with their offsets, as text: they must be the same in every kernel.
     fields: Vec<String>,
-    /// Rust's declaration; none of a struct that no buffer holds.
+    /// Rust's declaration; `None` for a struct that no buffer holds.
     rust: Option<String>,
 }
 
@@ -89,7 +90,7 @@ impl Declared {
     }
 }
 
-/// A type in words that are the same in every module.
+/// A description of a type that is the same in every module.
 fn described(module: &Module, ty: Handle<Type>) -> String {
     match module.types[ty].inner {
         TypeInner::Array { base, size, stride } => {
@@ -199,15 +200,16 @@ fn rust_type(module: &Module, ty: Handle<Type>) -> (String, u32) {
     }
 }
 
-/// A kernel that was compiled: its name, how many bindings it has, and whether there is one that
-/// reads texels.
+/// A kernel that was compiled: its name, how many bindings it has, and whether it has a variant
+/// that reads texel buffers.
 pub(crate) struct Compiled {
     pub(crate) name: String,
     pub(crate) bindings: usize,
     pub(crate) has_texels: bool,
 }
 
-/// The kernels by name: an enum, their code, and which serves a form, a list and a store.
+/// The kernels as Rust: an enum of their names, their code, and the choice of a kernel by form,
+/// list and store.
 pub(crate) fn kernels(all: &[Compiled]) -> String {
     let mut text = String::from(
         "/// A kernel, by its name.\n\

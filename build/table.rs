@@ -25,8 +25,9 @@ pub(crate) struct Kernel {
     pub(crate) name: String,
     /// Files below `shaders/`, without `.wgsl`, in the order in which they are joined.
     pub(crate) files: Vec<&'static str>,
-    /// Bound in this order, from 0 on; then comes the buffer that `store` writes. A kernel that
-    /// declares its own bindings has none here, and exists for storage buffers alone.
+    /// The buffers that it reads, bound in this order from 0 on, before the one that `store`
+    /// writes. A kernel that declares its own bindings has none here, and reads storage buffers
+    /// only.
     pub(crate) reads: Vec<&'static Read>,
 }
 
@@ -110,14 +111,14 @@ const FROM_KEYS: [(&str, &[&str], usize); 3] = [
     ("cubics", &["from_keys/small_angle"], 3),
 ];
 
-/// Kernels over poses that are there already.
+/// Kernels over evaluated poses.
 const POSES: [&str; 4] = ["poses/add", "poses/blend", "poses/mix", "poses/world"];
 
-/// What the self-test of a device computes with.
+/// The files of the self-test.
 const SELF_TEST: [&str; 3] = ["math/sine_cosine", "math/arc_tangent", "self_test"];
 
-/// The store that takes the place of `f32` where kernels read texel buffers: those devices store
-/// words of 64 bits.
+/// The files that take the place of `stores/f32` in kernels that read texel buffers: the devices
+/// that use these store words of 64 bits.
 pub(crate) const WIDE_STORE: [&str; 2] = ["math/wide", "stores/f32_wide"];
 
 /// Every kernel.

@@ -1,19 +1,19 @@
 // Entry point: an invocation evaluates one sample of up to four tracks straight from the keys
 // beside it, for sets with fewer samples than keys; no segment is prepared.
-// The build joins it with a file of `from_keys/` (`Hoisted` and `hoisted`, what is worked out
-// once for all rows, and `rotation_between`), with the functions that read (`key_at`,
-// `sample_at`) and a `store`.
+// The build joins it with a file of `from_keys/` (`hoisted`, which computes once what all rows
+// share, and `rotation_between`), with the functions that read buffers (`key_at`, `sample_at`) and
+// a `store`.
 
 /// Where a sample lies among the keys of its row.
 struct KeySample {
-    /// The key before it; the rotation itself, where this carries `IS_KEY`.
+    /// The index of the key before it; with `IS_KEY` that of the key which the sample is.
     key: u32,
     /// From -1/2 at that key to 1/2 at the next.
     parameter: f32,
 }
 
-/// The shape of what is evaluated: rows are tracks whose samples lie alike among their keys, or
-/// all samples of any tracks are one row.
+/// The rows of a dispatch. Tracks with the same key times are a row each and share one list of
+/// samples; other tracks together are one row.
 struct RowShape {
     /// Samples of each row.
     samples: u32,
@@ -43,7 +43,7 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let sample = sample_at(invocation.x);
     let is_key = (sample.key & IS_KEY) != 0u;
     let first = sample.key & ~IS_KEY;
-    // The last key has none after it, and is its own neighbour.
+    // A sample that is a key has that key as its neighbour: the last key has no next one.
     let next = select(1u, 0u, is_key);
     let all_rows = hoisted(first, first + next, sample.parameter);
     let row = invocation.y * ROWS_PER_INVOCATION;

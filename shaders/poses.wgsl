@@ -1,11 +1,11 @@
-// Entry point of the kernels over poses that are there already. The build joins it with a file
-// of `poses/`, which has `pose`.
+// Entry point of the kernels over evaluated poses. The build joins it with a file of `poses/`,
+// which has `pose`.
 
-/// What the host says of one dispatch over poses.
+/// The arguments of one dispatch over poses.
 struct PoseDispatch {
-    /// Values, and an invocation for each.
+    /// The number of values, each of which has an invocation.
     count: u32,
-    /// What the kernel has to know beside: the number of layers, or of tracks.
+    /// What else the kernel needs: the number of layers, or of tracks.
     detail: u32,
 }
 

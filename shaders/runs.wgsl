@@ -1,5 +1,5 @@
 // Entry point: an invocation evaluates a work item, some consecutive samples of one segment.
-// The build joins it with a form (`Segment`, `evaluate`), with the functions that read
+// The build joins it with a form (`Segment`, `evaluate`), with the functions that read buffers
 // (`segment_at`, `constant_at`, `item_at`), a `distance_from_middle` and a `store`.
 
 /// Consecutive samples of one track that lie in one segment, or hold one constant.
@@ -8,10 +8,11 @@ struct Item {
     source: u32,
     /// Where the first sample is stored.
     output: u32,
-    /// Number of samples, at most `ITEM_SAMPLES`; with `IS_CONSTANT` when it holds a constant.
+    /// Number of samples, at most `ITEM_SAMPLES`, with the bit `IS_CONSTANT` if they are a
+    /// constant.
     count: u32,
-    /// The first sample's distance from the segment's middle in frames; or the index of its
-    /// distance in the list of distances.
+    /// For frames, the first sample's distance from the segment's middle; for explicit times, the
+    /// index of its distance in the list of distances.
     first: i32,
     /// parameter = distance * scale + offset
     scale: f32,

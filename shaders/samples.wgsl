@@ -1,8 +1,8 @@
-// Entry point: an invocation evaluates one listed sample; no two need lie in the same segment.
-// The build joins it with a form (`Segment`, `evaluate`), with the functions that read
-// (`segment_at`, `constant_at`, `sample_at`) and a `store`.
+// Entry point: an invocation evaluates one sample of a sample list; each may lie in another
+// segment. The build joins it with a form (`Segment`, `evaluate`), with the functions that read
+// buffers (`segment_at`, `constant_at`, `sample_at`) and a `store`.
 
-/// One sample.
+/// One sample of the list.
 struct ListedSample {
     /// The segment's index; the constant's, with `IS_CONSTANT`.
     source: u32,
@@ -22,8 +22,8 @@ fn main(
     let sample = sample_at(dispatch.first_item + index);
     let is_constant = (sample.source & IS_CONSTANT) != 0u;
     let source = sample.source & ~IS_CONSTANT;
-    // Both are read, and the one that is not meant is the first of its list: a branch would be
-    // taken both ways in most groups, and each way would store.
+    // Both sources are read, the unused one at index 0: in most workgroups a branch would be taken
+    // both ways, and each way would need a store of its own.
     let constant = constant_at(select(0u, source, is_constant));
     let segment = segment_at(select(source, 0u, is_constant));
     let own = canonical(evaluate(segment, sample.parameter));

@@ -40,9 +40,9 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let low = probe.n & 0xfff;
     let turn = sine_cosine(c);
     var reply: Reply;
-    // Fused, a product is not rounded before the addition.
+    // A fused multiply-add would not round the product.
     reply.contraction = a * b + c;
-    // Simplified, this is b.
+    // A driver that simplifies this sum returns b.
     reply.reassociation = (a + b) - a;
     reply.rounding = a + c;
     reply.association = (a * b) * c;

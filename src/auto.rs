@@ -1,4 +1,4 @@
-//! The choice of a device by what it costs.
+//! The choice of a device by measured time.
 
 use std::time::{Duration, Instant};
 
@@ -11,11 +11,11 @@ use crate::output::rotations::Layout;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
-/// Rotations that the CPU evaluates (in 1 to 3 ms) before a device has been opened (in
-/// 50): see [`Engine::auto`].
+/// Fewer rotations than this the CPU evaluates in 1 to 3 ms, while opening a device alone takes 50
+/// ms; see [`Engine::auto`].
 const FEW_FOR_A_DEVICE: usize = 1 << 20;
 
-/// Work that tells how fast a device is.
+/// A workload that measures how fast a device is.
 struct Probe {
     set: TrackSet,
     frames: Frames,
@@ -44,7 +44,7 @@ impl Probe {
         }
     }
 
-    /// The shortest of three evaluations after one that does not count.
+    /// The shortest time of three evaluations, after one that does not count.
     fn time(&self, engine: &Engine) -> Result<Duration, Error> {
         let clip = engine.upload(&self.set, crate::method::slerp::SLERP)?;
         let mut output = vec![Quat::IDENTITY; self.rotations];
@@ -61,8 +61,8 @@ impl Probe {
 }
 
 impl Engine {
-    /// The device that evaluates calls of `rotations` rotations each soonest, into the
-    /// host's memory. The rule:
+    /// The device that evaluates calls of `rotations` rotations each fastest, into the host's
+    /// memory. The rule:
     ///
     /// * fewer than 2^20: the CPU. It has done them before a device is even open.
     /// * Software devices never: they compute on the CPU too, and slower.

@@ -64,8 +64,8 @@ impl Clip {
     }
 
     /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again ([`OutputBuffer`]): the first touch of fresh memory costs more than
-    /// evaluating.
+    /// is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch of
+    /// fresh memory costs more than evaluating.
     ///
     /// # Errors
     /// Also when `output` is not exactly as long as the result.
@@ -85,8 +85,8 @@ impl Clip {
         self.evaluate_window_into(&timeline, &whole, output)
     }
 
-    /// Evaluates a window of the result, which `output` fits; explicit times are folded
-    /// into the keys.
+    /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
+    /// must be folded into the keys already, as the wrap mode has it.
     pub(crate) fn evaluate_window_into(
         &self,
         timeline: &Timeline,
@@ -119,8 +119,8 @@ impl Clip {
         Ok(())
     }
 
-    /// Every track at every sample in another form: what [`Encoding::encode`] makes of
-    /// [`Clip::evaluate_as`]'s, bit by bit, but made where they are evaluated.
+    /// The rotation of every track at every sample, encoded where it is evaluated. The bytes are
+    /// those that [`Encoding::encode`] makes of the result of [`Clip::evaluate_as`].
     ///
     /// # Errors
     /// When the frames do not fit the clip, the encoding is for rotations and the clip

@@ -50,12 +50,12 @@ impl Engine {
     /// Opens a device with the default options.
     ///
     /// # Errors
-    /// When the device cannot be opened, or fails a canary.
+    /// When the device cannot be opened, or fails the self-test.
     pub fn new(device: Device) -> Result<Self, Error> {
         Self::with_options(device, &EngineOptions::default())
     }
 
-    /// The first Vulkan device that opens and passes its canaries, else the CPU.
+    /// The first Vulkan device that opens and passes the self-test, else the CPU.
     ///
     /// # Errors
     /// When the system refuses what the CPU needs.
@@ -70,7 +70,7 @@ impl Engine {
     /// Opens a device.
     ///
     /// # Errors
-    /// When the device cannot be opened, or fails a canary and
+    /// When the device cannot be opened, or fails the self-test and
     /// [`EngineOptions::allow_inexact`] is off.
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit()?;
@@ -112,8 +112,8 @@ impl Engine {
         }
     }
 
-    /// How the device did on the canaries; empty on the CPU, which they are
-    /// compared with.
+    /// The results of the device's self-test, one report for each check; empty on the CPU, which
+    /// devices are compared with.
     #[must_use]
     pub fn canaries(&self) -> &[CanaryReport] {
         match &*self.backend {
@@ -198,8 +198,8 @@ impl Engine {
     }
 
     /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again ([`OutputBuffer`]): the first touch of fresh memory costs more than
-    /// evaluating.
+    /// is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch of
+    /// fresh memory costs more than evaluating.
     ///
     /// # Errors
     /// Also when `output` is not exactly as long as the result.
@@ -223,8 +223,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Which way a set takes to its rotations, in words: whether it is prepared, and in what
-    /// pieces. All ways give the same bits.
+    /// Describes in words how a set would be evaluated: whether it is prepared, and in what
+    /// pieces. All routes give the same bits.
     ///
     /// # Errors
     /// When the frames do not fit the set.

@@ -38,7 +38,7 @@
 //! # What is promised
 //!
 //! * **Identical bits** from the CPU, at any vector width and number of threads, and
-//!   from every Vulkan device that passes its canaries, at any memory budget.
+//!   from every Vulkan device that passes the self-test, at any memory budget.
 //! * **Accuracy that does not decay**: at hour 24 as in the first second; slerp
 //!   within 6e-7 rad of the f64 reference, cubic methods within 1e-6 rad.
 //! * **Keys are met exactly**: a sample on a key returns the key's own bits (for

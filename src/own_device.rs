@@ -1,5 +1,5 @@
-//! Evaluation on an application's own Vulkan device, and into its own buffers: what the
-//! application promises of its handles the compiler cannot check.
+//! Evaluation on an application's own Vulkan device, and into its own buffers. These functions are
+//! unsafe, because the compiler cannot check what the application promises of its handles.
 #![allow(unsafe_code)]
 
 use crate::clip::Clip;
@@ -43,13 +43,13 @@ impl Clip {
     /// to the queue afterwards sees them.
     ///
     /// # Errors
-    /// When the engine is the CPU, the frames do not fit the clip, the stretch is not
-    /// aligned or too short, or the device fails.
+    /// When the engine is the CPU, the frames do not fit the clip, the range is not aligned or too
+    /// short, or the device fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, have memory, be made for use as
-    /// `STORAGE_BUFFER` and `TRANSFER_DST`, have the stretch given, and not be used by
-    /// anyone else before this returns.
+    /// `STORAGE_BUFFER` and `TRANSFER_DST`, contain the given range, and not be used by anyone
+    /// else before this returns.
     pub unsafe fn evaluate_to_buffer(
         &self,
         frames: &Frames,

@@ -18,8 +18,8 @@ use crate::prepare::clip_data::Wanted;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
-/// Some of a result: chunks come in the order in which the whole lies in memory, and
-/// leave nothing out.
+/// A contiguous part of a result. Chunks come in the order of the whole result in memory, without
+/// gaps.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Chunk<'a> {
@@ -29,11 +29,12 @@ pub struct Chunk<'a> {
     pub tracks: Range<usize>,
     /// Its samples.
     pub samples: Range<usize>,
-    /// `[track][sample]` or `[sample][track]` of those, as the layout says.
+    /// The rotations of these tracks and samples, `[track][sample]` or `[sample][track]` as the
+    /// layout says.
     pub rotations: &'a [Quat],
 }
 
-/// Buffers on their way round: one is filled, one is used, one waits.
+/// Buffers that are used in turn: one is filled, one is read, one waits.
 const BUFFERS: usize = 3;
 
 /// A filled buffer, and what is in it.
@@ -99,7 +100,8 @@ impl Engine {
             .resolve(set.track_count(), set.time_span())
             .map_err(Error::from)?;
         if layout == Layout::FrameMajor || timeline.len() > chunk {
-            // A chunk has some samples of many tracks, or some of one track.
+            // A chunk has some samples of many tracks, or some of one track: every chunk needs
+            // segments that others need too, so all are prepared at once.
             let wanted = Wanted {
                 only_for: Some(&timeline),
                 ..Wanted::all(set)
@@ -147,7 +149,7 @@ fn run<E: From<Error>>(
     })
 }
 
-/// Stops early when nobody takes what it hands over.
+/// Fills the windows in order; stops after an error, or when the receiver is gone.
 fn fill_all(
     windows: Vec<Window>,
     fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error>,

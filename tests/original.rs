@@ -5,7 +5,8 @@
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::angle_between;
 use tumble::{Device, Engine, Frames, Interpolation, METHODS, Method, Path, TrackSet};
-use tumble_formats::dat::{DatOptions, open_dat};
+use tumble_formats::ReadOptions;
+use tumble_formats::dat::open_dat;
 use tumble_formats::generate::{Generate, Steps};
 
 const FRAME_RATE: f64 = 25.0;
@@ -179,6 +180,6 @@ fn files_of_ones_own_match_the_original_program() {
     let Some(path) = std::env::var_os("ORIGINAL_DATA") else {
         return;
     };
-    let loaded = open_dat(path.as_ref(), &DatOptions::default()).unwrap();
+    let loaded = open_dat(path.as_ref(), &ReadOptions::default()).unwrap();
     assert_matches_the_original(&loaded.set, &path.to_string_lossy());
 }

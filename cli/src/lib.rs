@@ -1,8 +1,8 @@
 //! The program `tumble`: keyframe tracks in, interpolated rotations out.
 //!
-//! Arguments are parsed into validated values ([`arguments`]), one command runs
-//! ([`commands`]), and what went wrong becomes a message on standard error and an exit code
-//! ([`messages`]). Data goes to standard output and words to standard error. A library, so
+//! Arguments are parsed into validated values (`arguments`), one command runs
+//! (`commands`), and what went wrong becomes a message on standard error and an exit code
+//! (`messages`). Data goes to standard output and words to standard error. A library, so
 //! that other front ends run the same program; it promises no stable interface.
 
 mod arguments;

@@ -7,7 +7,9 @@ use std::io::{BufReader, Read};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tumble_formats::dat::{DatOptions, Loaded, read_dat};
+use tumble_formats::Loaded;
+use tumble_formats::ReadOptions;
+use tumble_formats::dat::read_dat;
 use tumble_formats::{Code, Diagnostic};
 
 struct Counting;
@@ -56,7 +58,7 @@ fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
     let reader = BufReader::with_capacity(1 << 18, input);
-    let loaded = read_dat("t", reader, &DatOptions::default());
+    let loaded = read_dat("t", reader, &ReadOptions::default());
     (loaded, PEAK.load(Ordering::Relaxed) - before)
 }
 

@@ -6,7 +6,42 @@ use std::io::{self, Write};
 
 use glam::Quat;
 
-use tumble::{Encoding, Timeline, TrackSet};
+use tumble::{Encoding, Layout, Timeline, TrackSet};
+
+use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
+
+/// Comma-separated values.
+pub static FORMAT: Format = Format {
+    name: "csv",
+    summary: "text, a row for each frame",
+    read: None,
+    write: Some(WriteResults {
+        is_text: true,
+        // A row holds one frame.
+        layout: Some(Layout::FrameMajor),
+        rotation_bytes: |_| 8.0, // four times a digit and a comma
+        rotations: |out, result| {
+            let &ResultShape {
+                set,
+                timeline,
+                encoding,
+                ..
+            } = result;
+            Ok(Box::new(CsvWriter::new(out, set, timeline, encoding)?))
+        },
+        poses: |poses, mut out| poses.write_csv(&mut out),
+    }),
+};
+
+impl<W: Write> ResultWriter for CsvWriter<'_, W> {
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        self.write(rotations)
+    }
+
+    fn finish(self: Box<Self>) -> io::Result<()> {
+        (*self).finish()
+    }
+}
 
 /// Writes frames as they come, with as many digits as it takes to read the same bits
 /// again; times are seconds.

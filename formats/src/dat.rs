@@ -15,10 +15,11 @@ use std::path::Path;
 use glam::{DQuat, Quat};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Format, Loaded, ReadOptions};
 use crate::quaternion::{dot, rounded, unit};
 use crate::source::Source;
 use crate::text::blocks::Blocks;
-use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use tumble::{NORM_TOLERANCE, TrackSet, UNIT_TOLERANCE};
 
@@ -31,31 +32,19 @@ const QUIET_NORM: f64 = 0.0077;
 /// A dot product this close to 0 is a half turn within f32 rounding.
 const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// How a `.dat` file is read.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct DatOptions {
-    /// How much is read at most.
-    pub limits: Limits,
-    /// Named pipes are read too.
-    pub pipes: bool,
-}
-
-/// What was read.
-#[derive(Debug, Clone)]
-pub struct Loaded {
-    /// The tracks, one for each box, with shared times.
-    pub set: TrackSet,
-    /// The length of each box (a length, not a duration), as the header says.
-    pub box_length: f64,
-    /// What is remarkable, one entry for each kind.
-    pub warnings: Vec<Diagnostic>,
-}
+/// Keyframes of boxes with shared times, as text.
+pub static FORMAT: Format = Format {
+    name: "dat",
+    summary: "keyframes of a chain of boxes, as text",
+    read: Some(open_dat),
+    write: None,
+};
 
 /// Reads a file; `-` is standard input.
 ///
 /// # Errors
 /// The first fault that refuses the file.
-pub fn open_dat(path: &Path, options: &DatOptions) -> Result<Loaded, Diagnostic> {
+pub fn open_dat(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
     let loaded = read_dat(&name, &mut source.reader, options)?;
@@ -70,7 +59,7 @@ pub fn open_dat(path: &Path, options: &DatOptions) -> Result<Loaded, Diagnostic>
 pub fn read_dat(
     name: &str,
     reader: impl BufRead,
-    options: &DatOptions,
+    options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::new(name, reader, options.limits)?;
     let header = read_header(&mut lines)?;

@@ -11,7 +11,8 @@ use glam::{DQuat, DVec3};
 
 use tumble::TrackSet;
 
-use crate::dat::{DatOptions, MAX_BOXES, read_dat};
+use crate::dat::{MAX_BOXES, read_dat};
+use crate::format::ReadOptions;
 
 /// How key times are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -150,7 +151,7 @@ impl Generate {
         self.check()?;
         let mut file = Vec::new();
         self.write(&mut file).expect("memory takes everything");
-        let loaded = read_dat("generated", &*file, &DatOptions::default());
+        let loaded = read_dat("generated", &*file, &ReadOptions::default());
         Ok(loaded.expect("what is generated can be read").set)
     }
 }

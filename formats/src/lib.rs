@@ -5,6 +5,7 @@
 pub mod csv;
 pub mod dat;
 pub mod diagnostic;
+pub mod format;
 pub mod generate;
 pub mod npy;
 pub mod output;
@@ -15,4 +16,5 @@ mod text;
 pub mod times;
 
 pub use crate::diagnostic::{Code, Diagnostic, Severity};
+pub use crate::format::{FORMATS, Format, Loaded, ReadOptions};
 pub use crate::text::lines::Limits;

@@ -6,7 +6,9 @@ use std::io::{self, Write};
 use glam::Quat;
 use npyz::WriterBuilder;
 
-use tumble::Encoding;
+use tumble::{Encoding, Layout};
+
+use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
 
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -18,6 +20,34 @@ pub enum ComponentOrder {
     Wxyz,
 }
 
+/// `NumPy`'s array files.
+pub static FORMAT: Format = Format {
+    name: "npy",
+    summary: "NumPy's, float32",
+    read: None,
+    write: Some(WriteResults {
+        is_text: false,
+        layout: None,
+        rotation_bytes: |encoding| encoding.bytes() as f64,
+        rotations: |out, result| Ok(Box::new(NpyWriter::of(out, result)?)),
+        poses: |poses, mut out| poses.write_npy(&mut out),
+    }),
+};
+
+/// Rotations written at once, so that a signal is noticed soon: 4 MB.
+const PIECE: usize = 1 << 18;
+
+impl<W: Write> ResultWriter for NpyWriter<W> {
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        let mut pieces = rotations.chunks(PIECE);
+        pieces.try_for_each(|piece| self.write(piece))
+    }
+
+    fn finish(self: Box<Self>) -> io::Result<()> {
+        (*self).finish().map(drop)
+    }
+}
+
 /// Writes rotations as they come, some at a time.
 pub struct NpyWriter<W> {
     writer: W,
@@ -27,6 +57,16 @@ pub struct NpyWriter<W> {
 }
 
 impl<W: Write> NpyWriter<W> {
+    /// Writes the header of a result.
+    fn of(writer: W, result: &ResultShape<'_>) -> io::Result<Self> {
+        let (tracks, samples) = (result.set.track_count(), result.timeline.len());
+        let (rows, columns) = match result.layout {
+            Layout::TrackMajor => (tracks, samples),
+            Layout::FrameMajor => (samples, tracks),
+        };
+        Self::new(writer, rows, columns, result.order, result.encoding)
+    }
+
     /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is
     /// int16, to be divided by 32767. The order is that of quaternions; nothing else has
     /// one.

@@ -9,7 +9,8 @@ use glam::Quat;
 use proptest::prelude::*;
 use tumble::TrackSet;
 use tumble_formats::Limits;
-use tumble_formats::dat::{DatOptions, open_dat, read_dat, write_dat};
+use tumble_formats::ReadOptions;
+use tumble_formats::dat::{open_dat, read_dat, write_dat};
 use tumble_formats::times::read_times;
 use tumble_formats::{Code, Diagnostic, Severity};
 
@@ -32,7 +33,7 @@ fn name(path: &Path) -> String {
 /// What a person would be told: the verdict, then each message.
 fn said(path: &Path) -> String {
     let bytes = fs::read(path).unwrap();
-    match read_dat(&name(path), &*bytes, &DatOptions::default()) {
+    match read_dat(&name(path), &*bytes, &ReadOptions::default()) {
         Ok(loaded) => {
             let (tracks, keys) = (loaded.set.track_count(), loaded.set.key_count());
             let mut text = format!("accepted: {tracks} tracks, {keys} keys\n");
@@ -93,7 +94,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
 }
 
 fn refusal(path: &Path) -> Diagnostic {
-    open_dat(path, &DatOptions::default()).unwrap_err()
+    open_dat(path, &ReadOptions::default()).unwrap_err()
 }
 
 #[test]
@@ -131,9 +132,9 @@ fn limits_refuse_before_memory_runs_out() {
         line: 1000,
         file: 5000,
     };
-    let options = DatOptions {
+    let options = ReadOptions {
         limits,
-        ..DatOptions::default()
+        ..ReadOptions::default()
     };
     assert_eq!(
         read_dat("t", endless(), &options).unwrap_err().code,
@@ -158,7 +159,7 @@ fn what_cannot_be_read_on_is_refused() {
     }
     for start in ["", "# 1 1\n", "# 1 1\n0 1 0 0 0\n1 1 0"] {
         let reader = BufReader::new(io::Cursor::new(start).chain(Failing));
-        let error = read_dat("t", reader, &DatOptions::default()).unwrap_err();
+        let error = read_dat("t", reader, &ReadOptions::default()).unwrap_err();
         assert_eq!(error.code, Code::Open);
         assert!(error.message.contains("the disk is on fire"), "{error}");
         assert_eq!(
@@ -171,7 +172,7 @@ fn what_cannot_be_read_on_is_refused() {
 /// 65 536 boxes are allowed; a header alone must not cost what they would.
 #[test]
 fn the_largest_header_costs_nothing() {
-    let error = read_dat("t", &b"# 65536 1\n0 1 0 0 0\n"[..], &DatOptions::default());
+    let error = read_dat("t", &b"# 65536 1\n0 1 0 0 0\n"[..], &ReadOptions::default());
     assert_eq!(error.unwrap_err().code, Code::Columns);
 }
 
@@ -180,7 +181,7 @@ fn the_largest_header_costs_nothing() {
 fn the_widest_file_is_read() {
     let row = " 0 1 0 0".repeat(65_536);
     let text = format!("# 65536 3\n0{row}\n1{row}\n");
-    let loaded = read_dat("t", text.as_bytes(), &DatOptions::default()).unwrap();
+    let loaded = read_dat("t", text.as_bytes(), &ReadOptions::default()).unwrap();
     assert_eq!(
         (loaded.set.track_count(), loaded.set.key_count()),
         (65_536, 131_072)
@@ -190,7 +191,7 @@ fn the_widest_file_is_read() {
 proptest! {
     #[test]
     fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        let _ = read_dat("t", &*bytes, &DatOptions::default());
+        let _ = read_dat("t", &*bytes, &ReadOptions::default());
     }
 
     /// Nearly right files reach deeper than arbitrary bytes.
@@ -200,7 +201,7 @@ proptest! {
         let place = place % bytes.len();
         bytes[place] = byte;
         bytes.truncate(cut);
-        let _ = read_dat("t", &*bytes, &DatOptions::default());
+        let _ = read_dat("t", &*bytes, &ReadOptions::default());
     }
 
     #[test]
@@ -214,7 +215,7 @@ proptest! {
         let set = TrackSet::with_shared_times(&times, &quats).unwrap();
         let mut file = Vec::new();
         write_dat(&mut file, &set, 0.1).unwrap();
-        let loaded = read_dat("t", &*file, &DatOptions::default()).unwrap();
+        let loaded = read_dat("t", &*file, &ReadOptions::default()).unwrap();
         let read = loaded.set;
         prop_assert_eq!(read.track(0).times, set.track(0).times);
         let bits = |set: &TrackSet| -> Vec<[u32; 4]> {

@@ -11,8 +11,9 @@ use tumble::{
     Speed, TrackSet, WrapMode,
 };
 use tumble_formats::Limits;
+use tumble_formats::ReadOptions;
 use tumble_formats::csv::CsvWriter;
-use tumble_formats::dat::{DatOptions, read_dat, write_dat};
+use tumble_formats::dat::{read_dat, write_dat};
 use tumble_formats::npy::{ComponentOrder, NpyWriter};
 use tumble_formats::times::read_times;
 
@@ -78,7 +79,7 @@ impl Numbers<'_> {
 /// The `.dat` parser: what it takes is a valid set that reads back bit for bit, what it
 /// refuses has a place within the input.
 pub(crate) fn dat(bytes: &[u8]) -> u64 {
-    let options = DatOptions {
+    let options = ReadOptions {
         limits: Limits {
             line: 4096,
             file: 65_536,
@@ -108,7 +109,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
             let mut written = Vec::new();
             write_dat(&mut written, &loaded.set, loaded.box_length)
                 .expect("memory takes everything");
-            let again = read_dat("fuzz", &*written, &DatOptions::default()).expect("our own");
+            let again = read_dat("fuzz", &*written, &ReadOptions::default()).expect("our own");
             assert_eq!(bits(&again.set), bits(&loaded.set));
             let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
             signature((codes, loaded.set.track_count().min(3)))

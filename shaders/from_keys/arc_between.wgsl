@@ -30,7 +30,8 @@ fn arc_between(start: vec4f, end: vec4f) -> ArcSegment {
     let half = (start + end) * 0.5;
     let difference = end - start;
     let x = norm_squared(difference) * 0.25;
-    // Neighbouring powers are added in pairs: chains of half as many operations.
+    // Neighbouring powers are added in pairs (Estrin's scheme), which halves the chains of
+    // operations.
     let xx = x * x;
     let secant_7 = SECANT_8 * x + SECANT_7;
     let secant_5 = SECANT_6 * x + SECANT_5;

@@ -1,4 +1,4 @@
-// An arc as a polynomial: what smooth methods make of a track of two keys. Taylor's series of
+// An arc as a polynomial, into which smooth methods turn a track of two keys: the Taylor series of
 // cosine and sine about the middle.
 // Twin: src/fit/constant_velocity.rs.
 

@@ -2,19 +2,20 @@
 // `polynomial` evaluates.
 //
 // The curve in cumulative form is q0 exp(w1 B1) exp(w2 B2) exp(w3 B3) with half-rotation vectors
-// w1, w2, w3. About its middle m it is m exp(v1 b1) exp(v2 b2) exp(v3 b3): b1, b2, b3 are what the
-// basis functions gain from the middle on, and v1, v2, v3 the vectors, each rotated back by what
-// follows it. Where they are short the series of the product to the third order is enough: sums and
-// products of the vectors, times powers of b1, b2, b3, which are the same for every curve.
+// w1, w2, w3. About its middle m it is m exp(v1 b1) exp(v2 b2) exp(v3 b3): b1, b2, b3 are the
+// basis functions minus their values at the middle, and v1, v2, v3 are w1, w2, w3, each rotated
+// back by the factors that follow it there. For short vectors the series of this product to the
+// third order is enough: sums and products of the vectors, times powers of b1, b2, b3, which are
+// the same for every curve.
 // Twin: src/twin/small_angle.rs.
 
-/// How the steps beside a key count in its tangent; it depends on key times alone.
+/// How the tangent at a key weighs the steps to its neighbours; this depends on key times alone.
 struct TangentWeights {
     /// The weight of the step before the key, and of the step after it.
     before: f32,
     after: f32,
-    /// The part of the tangent that is the handle after the key; the handle before it gets what
-    /// is left of a third.
+    /// The handle after the key is the tangent times this; the handle before it is the tangent
+    /// times 1/3 minus this.
     outgoing: f32,
     /// `KEY_INNER`, `KEY_AT_END` or `KEY_UNKNOWN`.
     kind: f32,
@@ -48,8 +49,8 @@ const THIRD: f32 = 0.33333334;
 const TWO_THIRDS: f32 = 0.6666667;
 
 // Coefficients of the polynomials of degree 6 through b1 b2 b3, -b1³/6, -b1 b2²/2, -b1 b3²/2,
-// -b2³/6 and -b2 b1²/2 at Chebyshev nodes, one of which is the middle: B_ijk_n is that of sⁿ. Those
-// that are missing are 0.
+// -b2³/6 and -b2 b1²/2 at Chebyshev nodes, one of which is the middle: B_ijk_n is that of sⁿ.
+// Coefficients that are not listed are 0.
 const B_123_1: f32 = 0.003631591796875;
 const B_123_3: f32 = 0.72412109375;
 const B_123_5: f32 = -1.2109375;
@@ -81,8 +82,8 @@ const B_211_4: f32 = 1.8515625;
 const B_211_5: f32 = -0.80078125;
 const B_211_6: f32 = -1.3125;
 
-// A rotation minus the identity, [vector, cosine - 1]: f32 keeps it exact where the angle is
-// small.
+// A rotation minus the identity, [vector, cosine - 1]: for a small angle f32 holds the cosine
+// minus one far more precisely than the cosine.
 struct FromIdentity {
     vector: vec3f,
     cosm1: f32,
@@ -91,7 +92,7 @@ struct FromIdentity {
 struct SmallAngleCubic {
     // The coefficients of 1, s, s², … s⁶.
     powers: array<vec4f, 7>,
-    // Whether the curve turns little enough for them.
+    // Whether the curve turns little enough for the series.
     holds: bool,
 }
 
@@ -155,8 +156,8 @@ fn canonical_product(m: vec4f, v: vec3f, w: f32) -> vec4f {
     ));
 }
 
-// The curve between `start` and `end`; each of the four keys has the sign nearer to the key before
-// it.
+// The curve between `start` and `end`. Each of the four keys has the sign that is nearer to the
+// key before it.
 fn small_angle_cubic(
     before: vec4f,
     start: vec4f,

@@ -1,5 +1,5 @@
 // From keys: tracks of two keys, which smooth methods join at constant velocity. The arc is
-// evaluated as the polynomial that segments of such methods are.
+// evaluated as a polynomial, as the segments of such methods are.
 // Twin: src/from_keys/arcs.rs.
 
 struct TwoKeysHoisted {

@@ -1,14 +1,14 @@
-// What the host says of one dispatch over segments, and which invocation does what.
+// The arguments of one dispatch over segments, and the index of an invocation in it.
 
-/// What the host says of one dispatch over segments.
+/// The arguments of one dispatch over segments.
 struct Dispatch {
     /// The first work item, or listed sample, of this dispatch.
     first_item: u32,
-    /// How many of them it does.
+    /// How many of them it evaluates.
     item_count: u32,
     /// Distance in the result between neighbouring samples of a track, in rotations.
     stride: u32,
-    /// What the store has to know beside the rotation: the order of a matrix, the axes of angles.
+    /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
     detail: u32,
     /// Where the first listed sample is stored; the others follow.
     first_output: u32,

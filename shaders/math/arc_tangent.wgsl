@@ -55,7 +55,7 @@ fn reciprocal_root(x: f32) -> f32 {
 
 fn root(x: f32) -> f32 {
     let near = x * reciprocal_root(x);
-    // One more of Newton's steps, on the root itself.
+    // One more Newton step, on the root itself.
     return near + (x - near * near) * (0.5 * reciprocal_root(x));
 }
 

@@ -43,7 +43,7 @@ fn slerp(a: vec4f, b: vec4f, t: f32) -> vec4f {
     let difference = flushed4(near - a);
     let square = dot4(difference, difference);
     let whole = dot4(sum, sum);
-    // Half of the angle in R⁴ between them; from there the angle from the middle.
+    // Half of the angle between them in R⁴; `turn` is for the angle from the middle of the arc.
     let half = arc_tangent(root(square), root(whole));
     let turn = sine_cosine((t + t - 1.0) * half);
     let partner = difference * select(reciprocal_root(square), 0.0, square == 0.0);

@@ -29,8 +29,7 @@ fn sine_cosm1(x: f32, z: f32) -> vec2f {
     return vec2f(sine, cosm1);
 }
 
-// The same for |angle| <= pi/4, a quarter of a half turn, where one term less is enough: within
-// 1.9e-9 and 1.1e-10.
+// The same for |angle| <= pi/4, where one term less is enough: within 1.9e-9 and 1.1e-10.
 const QUARTER_SINE_3: f32 = -0.16666650772094727;
 const QUARTER_SINE_5: f32 = 0.008331983350217342;
 const QUARTER_SINE_7: f32 = -0.00019496136519592255;

@@ -1,10 +1,9 @@
-// Adds a layer of rotations to a base: the part `weight` of the layer's rotation from its
-// reference follows the base's rotation.
+// Adds a layer of rotations to a base: base (reference⁻¹ layer)^weight.
 // Twin: src/twin/pose_add.rs.
 
 @group(0) @binding(0) var<storage, read> base: array<vec4f>;
 @group(0) @binding(1) var<storage, read> layer: array<vec4f>;
-// A reference for each value of the layer, and behind them the weight.
+// A reference for each value of the layer, and after the last one the weight.
 @group(0) @binding(2) var<storage, read> reference: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> added: array<vec4f>;
 

@@ -9,7 +9,7 @@
 // 2^-40: a sum whose squared length is below it has no direction, and the first layer is taken.
 const LEAST_SQUARED_SUM: f32 = 9.094947017729282e-13;
 
-// `dispatch.detail` is the number of layers, which lie one behind the other.
+// `dispatch.detail` is the number of layers, which lie one after another.
 fn pose(place: u32) {
     let first = layers[place];
     var sum = first * weights[0];

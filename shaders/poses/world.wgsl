@@ -4,7 +4,7 @@
 
 /// A track's place in a skeleton.
 struct Link {
-    /// Where the track hangs, in its parent's frame; a root's, in the world.
+    /// Its offset in its parent's frame; that of a root in the world.
     offset: vec3f,
     /// Its index among the tracks.
     track: u32,

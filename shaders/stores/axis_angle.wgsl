@@ -1,5 +1,5 @@
-// Stores rotations as axis and angle: a unit vector, and degrees from 0 to 360. The axis of no
-// rotation is x.
+// Stores rotations as axis and angle: a unit vector, and degrees from 0 to 360. The axis of the
+// identity is x.
 // Twin: src/twin/axis_angle.rs.
 
 alias Stored = vec4f;

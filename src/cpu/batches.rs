@@ -19,15 +19,16 @@ use crate::time::frames::Timeline;
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
 
-/// Rotations of a batch at most, where results are long.
+/// A batch has at most as many tracks as make this many rotations. Where a set has too few tracks
+/// to keep all threads busy that way, the limit goes down to [`TASK`] rotations.
 const BATCH_ROTATIONS: usize = 3 * TASK;
 
-/// Keys of a batch: their segments stay in the cache.
+/// The most keys of a batch: so few that their segments stay in a core's cache.
 const BATCH_KEYS: usize = 1024;
 
 impl CpuEngine {
-    /// Evaluates some tracks, `[track][sample]`; whether long ones may be cut into parts,
-    /// which the threads share.
+    /// Evaluates some tracks into `output`, `[track][sample]`. With `cuts_tracks` a long track may
+    /// be cut into parts, which the threads share.
     pub(crate) fn evaluate_batches(
         &self,
         set: &TrackSet,
@@ -40,7 +41,8 @@ impl CpuEngine {
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (samples, rotations) = (timeline.len(), output.len());
         let threads = rayon::current_num_threads();
-        // As many tracks as fill blocks best, where there are batches enough for all threads.
+        // The more tracks a batch has, the better they fill the blocks that are prepared in lanes;
+        // but about eight batches are left for each thread, so that all are busy to the end.
         let shared = tracks.len() / (8 * threads);
         let size = BatchSize {
             keys: BATCH_KEYS,
@@ -55,7 +57,8 @@ impl CpuEngine {
             let mut memory = self.memories.take(interpolation, timeline, set);
             for (i, batch) in batches.iter().enumerate() {
                 memory.prepare(set, batch.intervals(set))?;
-                // By then the results have pushed everything out of the caches.
+                // Fetches the next batch's times and keys while this batch is evaluated: the
+                // results push everything else out of the caches.
                 for (times, keys) in
                     (batches.get(i + 1).into_iter()).flat_map(|next| next.times_and_keys(set))
                 {
@@ -78,15 +81,15 @@ impl CpuEngine {
         if batches.len() <= 1 {
             return task((&batches, output));
         }
-        // Several batches for each task, whose memory serves them all.
+        // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
         let tasks = tasks(set, timeline, &batches, each, PART, output);
         self.on_threads(|| tasks.into_par_iter().try_for_each(task))
     }
 }
 
-/// Batches that lie in the result one behind the other, so many for each task, with their
-/// places; see [`Batch::samples`] for `part`.
+/// Cuts `output` among tasks of `each` consecutive batches; `part` is the argument of
+/// [`Batch::samples`].
 pub(crate) fn tasks<'b, 'o>(
     set: &TrackSet,
     timeline: &Timeline,
@@ -116,7 +119,7 @@ impl Memory {
         self.preparation.push(&mut self.prepared, set, intervals)
     }
 
-    /// What was prepared.
+    /// The parts that were prepared last.
     pub(crate) fn parts(&self) -> impl Iterator<Item = PartRef<'_>> {
         let prepared = &self.prepared;
         (prepared.parts.iter()).map(move |part| PartRef { prepared, part })

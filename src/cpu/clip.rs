@@ -15,10 +15,11 @@ use crate::simd::dispatch::in_lanes_of;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::wrap::TrackCopy;
 
-/// Tracks whose rows are made before they are written into frames: whole cache lines.
+/// Tracks whose rows are evaluated before they are transposed into frames: their rotations at one
+/// frame fill four cache lines.
 const TILE: usize = 16;
 
-/// Frames that one task evaluates: fewer would cost as much as they do.
+/// Frames of one task of a frame-major window: a task with fewer takes hardly less time.
 const TASK_FRAMES: usize = 256;
 
 impl CpuEngine {
@@ -85,7 +86,7 @@ impl CpuEngine {
         })
     }
 
-    /// A window of a result of so many `rotations`, on this thread.
+    /// Evaluates a window on this thread; the whole result has `rotations` rotations.
     fn window(
         &self,
         clip: &ClipData,
@@ -137,7 +138,8 @@ impl CpuEngine {
         }
     }
 
-    /// A window of which each frame lies in a place of its own, on this thread.
+    /// Evaluates a frame-major window on this thread: each of `frames` receives the window's
+    /// tracks at one sample.
     fn frames(
         &self,
         clip: &ClipData,
@@ -164,7 +166,7 @@ impl CpuEngine {
         Ok(())
     }
 
-    /// The samples of one track from `first` on.
+    /// Evaluates the samples of one track from `first` on.
     fn row(
         &self,
         clip: &ClipData,
@@ -190,7 +192,8 @@ impl CpuEngine {
     }
 }
 
-/// A window of frames cut into tasks, each some frames of some tracks, with their places.
+/// Cuts a frame-major window into tasks of some frames of some tracks, each with its slices of the
+/// output.
 fn frame_tasks<'a>(
     window: &Window,
     output: &'a mut [[f32; 4]],
@@ -226,8 +229,8 @@ fn frame_tasks<'a>(
     all
 }
 
-/// A window cut into tasks, each with its own part of the output, which has `each`
-/// elements for a rotation.
+/// Cuts a window into tasks, each with its own part of the output, which has `each` elements for a
+/// rotation.
 fn tasks<'a, T>(
     window: &Window,
     each: usize,

@@ -1,4 +1,5 @@
-//! Where the samples of a run go: to their places, or in whole lines past the caches.
+//! Where the samples of a run are stored: in a slice by ordinary stores, or in whole cache lines
+//! by streaming stores.
 
 use std::slice;
 
@@ -6,10 +7,11 @@ use crate::simd::lanes::Lanes;
 use crate::simd::line::Line;
 use crate::twin::evaluate::{Evaluate, Parameters};
 
-/// Samples of a turn at most.
+/// The most samples that one turn of the evaluation loop makes.
 const MOST: usize = 16;
 
-/// The samples of a run, a turn at a time.
+/// Evaluates a run in turns of the loop, [`Evaluate::samples`] samples each. With `FILTER`
+/// components below 2^-64 become 0; with `FAR` samples are begun several turns ahead.
 pub(crate) struct Turns<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const FAR: bool> {
     pub(crate) segment: &'a S,
     pub(crate) constant: L,
@@ -31,7 +33,7 @@ impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: boo
 }
 
 pub(crate) trait Destination {
-    /// Takes the first `count` samples.
+    /// Stores the first `count` samples.
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
         self,
         count: usize,
@@ -39,7 +41,7 @@ pub(crate) trait Destination {
     );
 }
 
-/// What lies behind `count` may be overwritten up to the end of a turn.
+/// Ordinary stores. Elements after `count` may be overwritten, up to the end of a turn.
 impl Destination for &mut [[f32; 4]] {
     #[inline(always)]
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
@@ -73,13 +75,14 @@ fn store<L: Lanes>(vectors: &impl AsRef<[L]>, rotations: &mut [[f32; 4]]) {
     }
 }
 
-/// Whole lines that lie past the caches, and what is not whole yet. Samples begin where a line
-/// does.
+/// Streaming stores: the whole cache lines of the result, and the staging lines before and after
+/// them. The first sample of the first turn lies at the start of a line.
 pub(crate) struct Places<'a> {
-    /// The first line, whose first so many rotations are there already: they stay.
+    /// The first line as it is staged, and how many of its rotations are there already; these
+    /// stay.
     pub(crate) begun: (Line, usize),
     pub(crate) whole: &'a mut [Line],
-    /// The line behind them.
+    /// The staging line for the samples after the whole lines.
     pub(crate) rest: &'a mut Line,
 }
 
@@ -95,7 +98,7 @@ impl Destination for Places<'_> {
         let (begun, there) = (blocks::<L>(&self.begun.0), self.begun.1);
         let whole: &mut [L::Block] = bytemuck::cast_slice_mut(self.whole);
         let rest = bytemuck::cast_slice_mut(slice::from_mut(self.rest));
-        // In vectors.
+        // From here on samples are counted in vectors.
         let (count, mut made) = (count.div_ceil(rotations), 0);
         while made < begun.len() {
             for (i, vector) in (made..).zip(turns.next().as_ref()) {
@@ -133,7 +136,7 @@ fn blocks<L: Lanes>(line: &Line) -> &[L::Block] {
     bytemuck::cast_slice(slice::from_ref(line))
 }
 
-/// The `i`th vector, in a whole line or behind them.
+/// Stores the `i`th vector: into a whole line, or into the rest after the whole lines.
 #[inline(always)]
 fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Block]) {
     if let Some(place) = whole.get_mut(i) {
@@ -151,7 +154,7 @@ pub(crate) mod tests {
     use crate::cpu::evaluate::{Affine, frames_past_caches};
     use crate::simd::line::EACH;
 
-    /// Frames past the caches, behind so many rotations of their first line.
+    /// Evaluates frames with streaming stores, after `filled` rotations of their first line.
     pub(crate) fn in_lines<L: Lanes, S: Evaluate>(
         segment: &S,
         affine: Affine,

@@ -1,4 +1,4 @@
-//! The CPU as a device: its threads, its vectors, and one part of a track on it.
+//! The CPU as a device: its threads, its vector width, and the evaluation of one part of a track.
 
 use crate::cpu::row::Row;
 use crate::cpu::scratch::Memories;
@@ -21,7 +21,7 @@ pub(crate) struct CpuEngine {
 }
 
 impl CpuEngine {
-    /// `threads` of its own, or the process's shared ones.
+    /// With `threads` threads of its own; by default with the process's shared ones.
     pub(crate) fn new(
         width: VectorWidth,
         threads: Option<usize>,
@@ -36,7 +36,7 @@ impl CpuEngine {
         })
     }
 
-    /// On the process's threads.
+    /// Without threads of its own.
     pub(crate) fn on_shared_threads(width: VectorWidth) -> Self {
         Self {
             width,
@@ -53,7 +53,7 @@ impl CpuEngine {
         }
     }
 
-    /// The samples of one part of a track.
+    /// Evaluates the samples of a track copy that lie in one part of the track.
     pub(crate) fn part(
         &self,
         part: PartRef<'_>,

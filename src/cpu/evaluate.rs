@@ -6,7 +6,7 @@ use crate::cpu::destination::{Destination, Places, Turns};
 use crate::simd::lanes::{Lanes, Number as _};
 use crate::twin::evaluate::{Evaluate, Parameters};
 
-/// So few samples are evaluated one by one: a vector would be mostly waste.
+/// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
 pub(crate) const FEW: usize = 3;
 
 /// How a run's parameter follows from the distance to the segment's middle.
@@ -16,9 +16,9 @@ pub(crate) struct Affine {
     pub(crate) offset: f32,
 }
 
-/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. What lies behind
-/// `count` may be overwritten up to the end of a vector. Distances are whole numbers
-/// of f32, also those that fill the last vector.
+/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be
+/// overwritten, up to the end of a vector. All distances must be integers that f32 holds exactly,
+/// also those that fill up the last vector.
 #[inline(always)]
 pub(crate) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
@@ -41,7 +41,7 @@ const STEPS: [f32; 16] = [
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
 ];
 
-/// As [`frames`], to whole lines past the caches.
+/// As [`frames`], with streaming stores.
 #[inline(always)]
 pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     segment: &S,
@@ -50,7 +50,7 @@ pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     count: usize,
     places: Places<'_>,
 ) {
-    // From where the line begins.
+    // The evaluation starts where the line does; the rotations that are there already stay.
     let (_, there) = places.begun;
     let (first, count) = (first - there as f32, there + count);
     frames_in_vectors::<L, S>(segment, affine, first, count, places);
@@ -64,7 +64,8 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     count: usize,
     output: impl Destination,
 ) {
-    // What is left of a longer run goes into one more wide vector.
+    // Only a run that fits narrow vectors uses them: the rest of a longer run takes one more wide
+    // vector.
     let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
     if all > narrow && count <= narrow {
         run::<L::Narrow, S>(segment, affine, count, Frames::new::<S>(first), output);
@@ -73,8 +74,8 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     }
 }
 
-/// Evaluates the first `count` samples of those whose distances from the middle are given;
-/// behind `count` there are more, up to the end of a vector.
+/// Evaluates the first `count` of the samples whose `distances` from the segment's middle are
+/// given. The list must go on after `count` up to the end of a vector.
 #[inline(always)]
 pub(crate) fn distances<L: Lanes, S: Evaluate>(
     segment: &S,
@@ -93,14 +94,14 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
     run::<L, S>(segment, affine, count, distances, output);
 }
 
-/// Evaluates the sample at a distance from the middle.
+/// Evaluates the sample at a distance from the segment's middle.
 #[inline(always)]
 pub(crate) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
     let rotation = segment.at(distance * affine.scale + affine.offset);
     rotation.canonical().to_array()
 }
 
-/// The distances from the middle of a run's samples, a vector at a time.
+/// The distances of a run's samples from the segment's middle, a vector at a time.
 trait Distances<L> {
     fn next(&mut self) -> L;
 }
@@ -120,7 +121,8 @@ impl<L: Lanes, D: Distances<L>> Parameters<L> for OfDistances<L, D> {
 
 struct Frames<L> {
     next: L,
-    /// Those of the turn behind, so that none waits for them.
+    /// The distances of the turn after the next, computed a turn ahead so that none waits for the
+    /// addition.
     after: L,
     step: L,
 }
@@ -153,7 +155,7 @@ struct Listed<'a, S>(&'a [f32], PhantomData<S>);
 impl<L: Lanes, S: Evaluate> Distances<L> for Listed<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        // The last is asked for more.
+        // The loop asks for parameters beyond its last turn; their values do not count.
         let Some((own, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
             return L::all(0.0);
         };
@@ -181,7 +183,7 @@ fn run<L: Lanes, S: Evaluate>(
     }
 }
 
-/// A turn at a time.
+/// Evaluates a run in turns; [`Turns`] explains `FILTER` and `FAR`.
 #[inline(always)]
 fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     segment: &S,
@@ -197,8 +199,7 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     };
     let constant = L::all(segment.constant());
     let begun = S::begin::<L, FAR>(constant, &mut parameters);
-    // A copy, of which the output is certainly no part: its coefficients are loaded once for
-    // all samples.
+    // A local copy cannot overlap the output, so its coefficients are loaded once for all samples.
     let segment = &{ *segment };
     let turns = Turns::<_, _, _, FILTER, FAR> {
         segment,
@@ -237,7 +238,7 @@ pub(crate) mod tests {
         std::array::from_fn(|_| canonical(hostile(random)))
     }
 
-    /// How many components of some samples are changed by [`canonical`](crate::math::canonical::canonical).
+    /// How many components of some samples [`canonical`] changes.
     fn changed<S: Evaluate>(segment: &S, random: &mut Rng) -> usize {
         let mut changed = 0;
         for _ in 0..32 {
@@ -276,7 +277,7 @@ pub(crate) mod tests {
     }
 
     /// Catches samples that are begun too early or too late, in runs of every length: of frames
-    /// and of distances, with room behind them and without.
+    /// and of distances, with room in the output after them and without.
     pub(crate) fn runs_are_samples<L: Lanes>() {
         let random = &mut Rng::with_seed(1);
         let mut four = || std::array::from_fn(|_| random.f32() - 0.5);
@@ -327,7 +328,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// As near to the limit as it gets: what is left of two numbers that nearly cancel.
+    /// The case nearest to the limit: two numbers that nearly cancel leave 2^-63.
     #[test]
     fn the_limit_is_where_terms_cancel_to_a_tiny_rest() {
         let nearly_zero = |middle: f32| {

@@ -1,5 +1,6 @@
-//! Samples that the keys beside them do not give, because their curves turn too far for the
-//! small-angle series: their intervals alone are prepared.
+//! The fallback of evaluation from keys. A sample whose curve turns too far for the small-angle
+//! series is `UNRESOLVED`; here the intervals of such samples alone are prepared, and the samples
+//! are overwritten.
 
 use std::ops::Range;
 
@@ -16,23 +17,23 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
 
-/// Intervals between two that are wanted, up to which they are one piece.
+/// Two unresolved intervals with at most this many others between them are prepared as one piece.
 const APART: usize = 2;
 
-/// Some samples of a track.
+/// Consecutive samples of a track, some of which may be unresolved.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
     pub(crate) set: &'a TrackSet,
     pub(crate) index: usize,
     pub(crate) interpolation: &'a Interpolation,
     pub(crate) timeline: &'a Timeline,
-    /// The first of them.
+    /// The first sample.
     pub(crate) first: usize,
-    /// A key that none of them lies before.
+    /// The index of a key at or before all of the samples between keys.
     pub(crate) key: usize,
 }
 
-/// Samples that are not resolved, and those between them.
+/// Intervals with unresolved samples, and the samples from the first of these to the last.
 struct Piece {
     intervals: Range<usize>,
     samples: Range<usize>,
@@ -42,7 +43,8 @@ struct Piece {
 type Batch<'o> = Vec<(Piece, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
-    /// Works out what is not resolved in a row.
+    /// Evaluates the unresolved samples of a row by way of segments. Resolved samples between them
+    /// are evaluated again, to the same bits.
     pub(crate) fn resolve(
         &self,
         row: Row<'_>,
@@ -86,7 +88,7 @@ impl<'a> Row<'a> {
         let last = times.len() - 1;
         let mut pieces: Vec<Piece> = Vec::new();
         let Ticks::Frames { rate, start } = self.timeline.ticks else {
-            // They may be in any order.
+            // Explicit times may be in any order, so the whole track is one piece.
             if output.contains(&UNRESOLVED) {
                 pieces.push(Piece {
                     intervals: 0..last,

@@ -14,10 +14,10 @@ use crate::time::spans::{NONE, Source};
 use crate::time::wrap::TrackCopy;
 use crate::twin::evaluate::Evaluate;
 
-/// Samples whose distances are found out together.
+/// Distances are computed for this many samples at a time.
 const CHUNK: usize = 64;
 
-/// The samples of one part of a track in a copy of it.
+/// The samples of one part of a track, within one track copy.
 pub(crate) struct Row<'a, S> {
     pub(crate) part: PartRef<'a>,
     pub(crate) segments: &'a [S],
@@ -27,7 +27,7 @@ pub(crate) struct Row<'a, S> {
 }
 
 impl<S: Evaluate> Row<'_, S> {
-    /// Evaluates them into `output`, which starts with the first of them.
+    /// Evaluates them into `output`, which starts at the first sample of the track copy.
     pub(crate) fn evaluate(&self, output: &mut Output<'_, '_>) -> Result<(), FramesError> {
         match output {
             Output::Here(samples) => in_lanes_into(self.width, self, *samples),
@@ -64,9 +64,9 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
 }
 
 impl<S: Evaluate> Row<'_, S> {
-    /// Evaluates the samples between the keys of a track whose frames are its own, without a
-    /// list of runs: the way of nearly every sample. Returns false where a frame is too far from
-    /// the middle of its segment for that; nothing else may be stored then.
+    /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without
+    /// a list of runs: nearly every sample takes this path. Returns false if a distance from a
+    /// segment's middle is no integer of f32; the caller then evaluates all samples by runs.
     #[inline(always)]
     fn spans<L: Lanes, O: Samples + ?Sized>(&self, clock: FrameClock, output: &mut O) -> bool {
         let PartRef { prepared, part } = self.part;
@@ -124,7 +124,7 @@ impl<S: Evaluate> Row<'_, S> {
 }
 
 impl<S: Evaluate> Row<'_, S> {
-    /// Evaluates a few samples.
+    /// Evaluates at most [`FEW`] samples, one by one.
     #[inline(never)]
     fn few(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
@@ -132,8 +132,8 @@ impl<S: Evaluate> Row<'_, S> {
         (prepared.spans).runs(part, self.timeline, self.copy, &mut samples)
     }
 
-    /// Evaluates all samples by way of a list of their runs. Compiled apart from the usual way,
-    /// which stays small, and once for what finds the runs.
+    /// Evaluates all samples by way of a list of their runs. It is a function of its own to keep
+    /// the usual path small, and to compile the search for runs once, not for each vector width.
     #[inline(never)]
     fn runs(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
@@ -188,7 +188,7 @@ impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
 }
 
 impl<S> Row<'_, S> {
-    /// From the middle of its segment to a run's `j`th sample.
+    /// The distance of a run's `j`th sample from the middle of its segment, in frames or seconds.
     #[inline(always)]
     fn distance(&self, distance: Distance, run: &Run, j: usize) -> f32 {
         match distance {
@@ -203,7 +203,7 @@ impl<S> Row<'_, S> {
         }
     }
 
-    /// A run that is evaluated in f64.
+    /// Evaluates a run in f64.
     #[inline(never)]
     fn exact(&self, run: &Run, output: &mut [[f32; 4]]) {
         let RunSource::Exact { index, parameter } = run.source else {
@@ -218,7 +218,7 @@ impl<S> Row<'_, S> {
     }
 }
 
-/// Takes runs and evaluates their samples one by one, where they are few.
+/// Takes runs and evaluates their samples one by one; for few samples.
 struct OneByOne<'a, 'r, S> {
     row: &'a Row<'r, S>,
     output: &'a mut [[f32; 4]],

@@ -1,5 +1,5 @@
-//! What preparing needs, kept from call to call: to make it takes as long as to prepare a
-//! hundred keys.
+//! The scratch pool: the buffers that preparing needs are kept from call to call, because
+//! allocating them takes as long as preparing a hundred keys.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -9,22 +9,24 @@ use crate::prepare::prepared::Prepared;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// What one thread needs.
+/// The scratch buffers of one thread, for one interpolation.
 pub(crate) struct Memory {
     interpolation: Interpolation,
     pub(crate) prepared: Prepared,
     pub(crate) preparation: Preparation,
 }
 
-/// So many ways to interpolate are asked for in turns; transforms alone take three.
+/// How many are kept for each thread. Programs alternate between interpolations; transforms alone
+/// use three.
 const KEPT_EACH: usize = 4;
 
-/// What threads have given back, the latest last.
+/// The scratch pool: what threads have given back, the latest last.
 #[derive(Default)]
 pub(crate) struct Memories(Mutex<Vec<Memory>>);
 
 impl Memories {
-    /// For the samples of one timeline.
+    /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
+    /// only what the samples of this timeline need.
     pub(crate) fn take(
         &self,
         interpolation: &Interpolation,
@@ -44,7 +46,8 @@ impl Memories {
         memory
     }
 
-    /// Only after success: what failed may be half way.
+    /// Puts scratch buffers back into the pool. Call it only after success: a failed preparation
+    /// may leave them half filled.
     pub(crate) fn give_back(&self, memory: Memory) {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
@@ -63,7 +66,8 @@ mod tests {
     use crate::time::frames::Frames;
     use crate::tracks::set::swinging;
 
-    /// Catches what is made anew where two methods take turns, and memory without end.
+    /// Catches a pool that allocates again when two methods alternate, and one that grows without
+    /// bound.
     #[test]
     fn each_way_to_interpolate_finds_its_memory_again() {
         let set = swinging(4, 26, false);

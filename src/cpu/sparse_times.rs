@@ -1,5 +1,5 @@
-//! A few explicit times of each of many tracks, as a crowd's poses are: a sample to a lane,
-//! and no run for each.
+//! Sparse times: a few explicit times of each of many tracks, such as the poses of a crowd. Each
+//! lane evaluates one sample, and no runs are listed.
 
 use crate::cpu::evaluate::{Affine, one};
 use crate::math::canonical::round_f32;
@@ -12,10 +12,10 @@ use crate::simd::lanes::{Lanes, canonical};
 use crate::time::runs::{Distance, RunSource};
 use crate::twin::evaluate_arc::{on_arc, square};
 
-/// Samples worked out together.
+/// Samples that are evaluated together.
 const LANES: usize = 64;
 
-/// What a window of a clip is made of, where that is told by looking.
+/// A window of a clip at sparse times, evaluated by one lookup for each sample.
 pub(crate) struct FewTimes<'a> {
     pub(crate) clip: &'a ClipData,
     /// Sample `k` of track `t` lies at `times[t × stride + k]`.
@@ -24,21 +24,22 @@ pub(crate) struct FewTimes<'a> {
     pub(crate) window: &'a Window,
     /// `[track][sample]`.
     pub(crate) output: &'a mut [[f32; 4]],
-    /// Places of the tracks in the window that are left to do.
+    /// Tracks with a sample that takes more than a lookup, as places in the window: the caller
+    /// evaluates their rows.
     pub(crate) others: Vec<usize>,
 }
 
-/// Samples of arcs that wait.
+/// Samples on arcs, gathered until the block is full.
 struct Block {
     middles: [[f32; 4]; LANES],
     tangents: [[f32; 4]; LANES],
     parameters: [f32; LANES],
-    /// In the output.
+    /// Where each sample is stored in the output.
     places: [usize; LANES],
     count: usize,
 }
 
-/// What gives one sample.
+/// What one sample is evaluated from.
 enum One<'a> {
     Constant([f32; 4]),
     Arc(&'a ArcSegment, f32),
@@ -109,7 +110,8 @@ impl Block {
 }
 
 impl<'a> PartRef<'a> {
-    /// What gives the rotation at a time; nothing where that takes more than to look.
+    /// What the rotation at a time is evaluated from; `None` where that takes more than a lookup:
+    /// outside the keys, and on curves that are evaluated in f64.
     #[inline(always)]
     fn at_time(self, time: f64) -> Option<One<'a>> {
         let PartRef { prepared, part } = self;

@@ -1,49 +1,55 @@
-//! Long results go to memory past the caches, where a processor gains by it: whole cache lines
-//! as they are made. What is not whole yet, and what is not made in order, lies on a stage,
-//! memory that stays in the first cache.
+//! Long results are written by streaming stores, which bypass the caches, on processors that gain
+//! by it. They need whole cache lines: rotations of a line that is not whole yet, or that are not
+//! made in order, wait in staging lines, 32 KiB that stay in the first-level cache.
 
 use std::ops::Range;
 
+use glam::Quat;
+
 use crate::cpu::destination::Places;
 use crate::cpu::evaluate::{Affine, FEW, frames, frames_past_caches};
-use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
+use crate::simd::dispatch::{
+    InLanes, InLanesInto, VectorWidth, fence, in_lanes_into, in_lanes_of, streaming_stores_from,
+};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
 use crate::twin::evaluate::Evaluate;
 
-/// Bytes of a result of which caches keep so little that its reader misses nothing.
+/// Bytes from which on a result is written by streaming stores: caches would keep so little of it
+/// that its reader loses nothing.
 const LONG: usize = 32 << 20;
 
-/// Samples of a row with which what a stage costs is less than what it saves.
+/// Samples of a row from which on streaming stores save more than staging costs.
 const ROW: usize = 64;
 
-/// Lines of a stage.
+/// Number of staging lines.
 const LINES: usize = 512;
 
-/// Rows one behind the other: where they are made, and where they go.
+/// Writes consecutive rows: directly into their places, or through staging lines by streaming
+/// stores.
 pub(crate) struct Stage<'o> {
     width: VectorWidth,
     place: Place<'o>,
-    /// `None` where rows are made in their places.
+    /// The staging lines; `None` where rows are written directly.
     lines: Option<Box<[Line; LINES]>>,
-    /// Rotations on the stage, from the start of its first line on.
+    /// Rotations that are staged, counted from the start of the first staging line.
     filled: usize,
 }
 
-/// What has not been stored to.
+/// The part of the output that is still to be stored to.
 struct Place<'o> {
-    /// Everything where there is no stage; else what lies before the first whole line, whose
-    /// rotations are the last ones of the stage's first line.
+    /// Without staging lines all of it. Else what lies before the first whole line of the output:
+    /// it is staged at the end of the first staging line.
     before: &'o mut [[f32; 4]],
     lines: &'o mut [Line],
     after: &'o mut [[f32; 4]],
-    /// Lines of the stage that are stored.
+    /// How many of the staging lines are stored already.
     stored: usize,
 }
 
 impl<'o> Stage<'o> {
-    /// For `output`, rows of so many `samples`, a part of a result of so many `rotations`. How
-    /// many samples a run has on average is only asked where all else is long enough.
+    /// For `output`: rows of `samples` each, a part of a result of `rotations`. The average length
+    /// of a run is computed last, only if everything else calls for streaming stores.
     pub(crate) fn new(
         width: VectorWidth,
         rotations: usize,
@@ -63,7 +69,7 @@ impl<'o> Stage<'o> {
     }
 
     fn with(width: VectorWidth, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
-        // Where rotations may lie across lines they are made in their places.
+        // Where a rotation may lie across two cache lines, rows are written directly.
         let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
         if !is_staged || !is_aligned {
             let place = Place {
@@ -95,7 +101,7 @@ impl<'o> Stage<'o> {
         }
     }
 
-    /// Makes the next row, some samples at a time.
+    /// Makes the next row by calls of `make`, each for as many samples as can be staged.
     pub(crate) fn row<E>(
         &mut self,
         count: usize,
@@ -127,7 +133,7 @@ impl<'o> Stage<'o> {
         Ok(())
     }
 
-    /// When all rows are made.
+    /// Stores what is still staged after the last row.
     pub(crate) fn finish(mut self) {
         self.clear();
         if let Some(lines) = &self.lines {
@@ -136,7 +142,7 @@ impl<'o> Stage<'o> {
         }
     }
 
-    /// Stores the whole lines of the stage; the rest moves to its start.
+    /// Stores all staging lines that are whole; what is left moves to the start of the first.
     fn clear(&mut self) {
         let Some(lines) = &mut self.lines else {
             return;
@@ -164,7 +170,7 @@ impl Drop for Stage<'_> {
 }
 
 impl<'o> Place<'o> {
-    /// Stores the first lines of the stage, but for those that are stored.
+    /// Stores `lines`, the first staging lines, except those that are stored already.
     #[inline(always)]
     fn store<L: Lanes>(&mut self, lines: &[Line]) {
         if let [first, ..] = lines
@@ -183,7 +189,7 @@ impl<'o> Place<'o> {
         }
     }
 
-    /// The places of the next lines, which are stored there.
+    /// Takes the places of the next `count` lines, which the caller stores.
     #[inline(always)]
     fn next(&mut self, count: usize) -> &'o mut [Line] {
         let (lines, others) = std::mem::take(&mut self.lines).split_at_mut(count);
@@ -207,19 +213,19 @@ impl InLanes for Store<'_, '_> {
 
 /// Where some samples of a row are made.
 pub(crate) enum Output<'s, 'o> {
-    /// Where they stay.
+    /// In their final place.
     Here(&'s mut [[f32; 4]]),
     Staged(Staged<'s, 'o>),
 }
 
-/// Samples on a stage.
+/// Samples in the staging lines.
 pub(crate) struct Staged<'s, 'o> {
-    /// All of it.
+    /// All staging lines.
     lines: &'s mut [Line],
-    /// The first of the samples, and their end.
+    /// Where these samples start in the lines, and where they end.
     start: usize,
     end: usize,
-    /// What of the stage is made, without a gap.
+    /// All staged rotations before this one are made.
     made: usize,
     place: &'s mut Place<'o>,
 }
@@ -233,12 +239,12 @@ impl Output<'_, '_> {
     }
 }
 
-/// [`Output`] with nothing to tell apart for each run.
+/// [`Output`], matched once for a row instead of once for each run.
 pub(crate) trait Samples {
     fn samples(&mut self) -> &mut [[f32; 4]];
 
-    /// Makes `count` samples from `start` on, frames of a segment, the first at that distance
-    /// from its middle.
+    /// Evaluates `count` frames of a segment into the samples from `start` on; `first` is the
+    /// distance of the first one from the segment's middle.
     fn frames<L: Lanes, S: Evaluate>(
         &mut self,
         segment: &S,
@@ -248,7 +254,7 @@ pub(crate) trait Samples {
         count: usize,
     );
 
-    /// Some of them are made, and do not change any more.
+    /// Says that these samples are final, so that their lines may be stored.
     fn made(&mut self, samples: Range<usize>);
 }
 
@@ -294,7 +300,7 @@ impl Samples for Staged<'_, '_> {
         let (line, end) = (own / EACH, own + count);
         let is_next = self.made == own;
         if is_next && count > FEW && end / EACH < LINES {
-            // What lies before them and waits.
+            // First the staged lines before these samples.
             self.place.store::<L>(&self.lines[..line]);
             if self.place.before.is_empty() {
                 let places = Places {
@@ -321,12 +327,39 @@ impl Samples for Staged<'_, '_> {
     }
 }
 
+/// Stores one rotation everywhere.
+struct Fill([[f32; 4]; EACH]);
+
+impl InLanesInto<[Line]> for Fill {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, lines: &mut [Line]) {
+        let value = L::of_block(&bytemuck::cast_slice(&self.0)[0]);
+        for block in bytemuck::cast_slice_mut::<Line, L::Block>(lines) {
+            value.store_past_caches(block);
+        }
+        fence();
+    }
+}
+
+impl VectorWidth {
+    /// Fills `output` with one rotation by streaming stores, on some processors the fastest way to
+    /// write more than the caches hold: a limit with which the speed of evaluation is compared.
+    pub fn fill_past_caches(self, output: &mut [Quat], value: Quat) {
+        let rotations: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);
+        before.fill(value.to_array());
+        in_lanes_into(self, &Fill([value.to_array(); EACH]), lines);
+        after.fill(value.to_array());
+    }
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use std::cell::Cell;
     use std::convert::Infallible;
 
-    use glam::Quat;
     use proptest::prelude::*;
 
     use super::*;
@@ -342,12 +375,12 @@ pub(crate) mod tests {
     use crate::tracks::set::swinging;
 
     thread_local! {
-        /// Whether this thread makes all rows on a stage.
+        /// Whether this thread stages all rows.
         pub(crate) static IS_STAGED: Cell<bool> = const { Cell::new(false) };
     }
 
-    /// Catches lines stored before they are whole, to another place or not at all, and what
-    /// is left between rows, wherever the output starts.
+    /// Catches lines that are stored too early, in a wrong place or not at all, and gaps between
+    /// rows, for every alignment of the output.
     #[test]
     fn rows_come_to_their_places() {
         let run = |rows: Vec<(usize, usize)>, shift: usize, width| {
@@ -365,7 +398,7 @@ pub(crate) mod tests {
                             *place = [next; 4];
                             next += 1.0;
                         }
-                        // Some are not told of at once.
+                        // Not all samples are reported as made at once.
                         if let Output::Staged(staged) = output
                             && from % 3 != 1
                         {
@@ -388,8 +421,8 @@ pub(crate) mod tests {
         proptest!(|((rows, shift, width) in strategy)| run(rows, shift, width));
     }
 
-    /// Frames, times in any order, and copies of a track, by arcs and by polynomials, with
-    /// vectors of every width; from a clip and from keys.
+    /// Streaming stores change no bit: of frames, of times in any order and of track copies, on
+    /// arcs and on polynomials, with vectors of every width, from a clip and from a set.
     #[test]
     fn rows_on_a_stage_have_the_bits_of_others() {
         let widths = VectorWidth::available().into_iter();
@@ -420,7 +453,7 @@ pub(crate) mod tests {
                     let expected = clip.evaluate(&frames).unwrap();
                     let expected = bytemuck::cast_slice::<Quat, u32>(expected.as_quats());
                     let count = expected.len() / 4;
-                    // So few are evaluated on this thread.
+                    // So few that they are evaluated on this thread, which stages its rows.
                     assert!(count <= 16 * 1024);
                     for shift in 0..4 {
                         let mut found = vec![Quat::IDENTITY; count + 3];

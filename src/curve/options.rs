@@ -1,5 +1,5 @@
-//! What can be asked of a curve, whatever its method: the path between the keys, what happens at
-//! its ends, which quantity is evaluated and how fast the curve is run through.
+//! The options of a curve of any method: the path between the keys, the shape at its ends, the
+//! quantity that is evaluated and the speed at which the curve is run through.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use crate::math::quaternion::{self, dot, length, log, unit};
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 
-/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations
-/// are vectors, `x y z` and 0 in the place of `w`; by the derivative of the formula. On
-/// a key they are those of the segment behind it, on the last key those of the last
-/// segment; before the first key and behind the last nothing moves.
+/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations are
+/// vectors, `x y z` and 0 in the place of `w`, by the derivatives of the formula. On a key they are
+/// those of the segment after it, on the last key those of the last segment; outside the keys they
+/// are 0 while the end value is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Quantity {
     /// The rotation, a unit quaternion.
@@ -30,19 +30,19 @@ pub enum Speed {
     /// As the key times say.
     #[default]
     AsKeyed,
-    /// At one angular speed from the first key to the last (by arc length): the way is the
-    /// same, but inner keys are met when they are reached. Preparing takes milliseconds a
-    /// key. Where a curve had been slow its velocity turns aside fast: velocities are then
-    /// within 1e-5, accelerations within 1e-3 of the largest.
+    /// At one angular speed from the first key to the last (by arc length). The path is the same,
+    /// but inner keys are met at other times than their own. Preparing takes milliseconds per key.
+    /// Where the keyed curve is slow, the direction of its velocity changes fast: there velocities
+    /// are within 1e-5 and accelerations within 1e-3 of the largest.
     Constant,
 }
 
-/// Whose axes a vector is given in.
+/// The axes in which a vector is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axes {
-    /// Those of what turns.
+    /// Those of the body that turns.
     Body,
-    /// Those of what it turns in: of the parent, in a chain.
+    /// Those of the frame in which it turns; in a chain, the parent's.
     World,
 }
 
@@ -58,7 +58,7 @@ pub enum Path {
 }
 
 impl Path {
-    /// The signs that the keys of a track count with.
+    /// The signs of a track's keys on this path.
     pub(crate) fn signs(self, set: &TrackSet, index: usize) -> Signs<'_> {
         match self {
             Self::Shortest => set.signs(index),
@@ -66,8 +66,8 @@ impl Path {
         }
     }
 
-    /// Refuses some intervals of the `index`th track of a set where there is no path between
-    /// their keys.
+    /// Refuses keys without a path between them, in some `intervals` of the `index`th track of a
+    /// set.
     pub(crate) fn check(
         self,
         keys: &[Quat],
@@ -87,8 +87,8 @@ impl Path {
     }
 }
 
-/// What happens in the first and in the last segment, where a neighbour is missing.
-/// Two keys are joined by slerp whatever the ends.
+/// The curve in the first and in the last segment, where a neighbouring key is missing. Two keys
+/// alone are joined by slerp, whatever the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Ends {
     /// The parabola through the last three keys: constant velocity stays constant
@@ -104,23 +104,24 @@ pub enum Ends {
         /// At the last key.
         end: glam::DVec3,
     },
-    /// The angular velocity of slerp between the last two keys: constant velocity stays
-    /// constant too. [`C2`](crate::method::c2::C2)'s own ends.
+    /// The angular velocity of slerp between the last two keys: constant velocity stays constant
+    /// too. The default of [`C2`](crate::method::c2::C2).
     Secant,
     /// The last key repeats the first; neighbours are taken across the seam.
     Loop,
-    /// The first and the last segment stand still, as in the original program.
+    /// The first and the last segment hold their first key.
     Frozen,
 }
 
 /// How far the last key of a loop may be from the first (half-angle, radians).
 const LOOP_TOLERANCE: f64 = 1e-3;
 
-/// Radians per second at an end; more is refused.
+/// The largest angular velocity at an end, radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Ends {
-    /// Refuses a track, the `index`th of its set, that does not end as it must.
+    /// Refuses end velocities that are not finite or too large, and loops whose last key is not
+    /// their first. `index` is the track's place in its set.
     pub(crate) fn check(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
         if let Self::Clamped { start, end } = self {
             for velocity in [start, end] {
@@ -162,10 +163,11 @@ pub enum InterpolationError {
         /// The first of the two keys.
         key: usize,
     },
-    /// Under [`WrapMode::Mirror`] velocities would change their signs from copy to copy.
+    /// Under [`WrapMode::Mirror`](crate::time::wrap::WrapMode::Mirror) velocities would change
+    /// their signs from copy to copy.
     #[error("velocities are not mirrored; hold, loop or extrapolate them")]
     MirroredVelocity,
-    /// Under [`Ends::Clamped`] a velocity is no number, or too large.
+    /// Under [`Ends::Clamped`] a velocity is not finite, or too large.
     #[error(
         "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",
         velocity.x, velocity.y, velocity.z

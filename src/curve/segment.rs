@@ -42,7 +42,7 @@ impl Segments {
         }
     }
 
-    /// Moves all of `other` behind its own.
+    /// Appends the segments of `other`.
     pub(crate) fn append(&mut self, other: Self) {
         self.arcs.extend(other.arcs);
         self.polynomials.extend(other.polynomials);

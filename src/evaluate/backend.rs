@@ -1,4 +1,4 @@
-//! What an engine evaluates on.
+//! What an engine evaluates on: the CPU, or an opened Vulkan device.
 
 use crate::cpu::engine::CpuEngine;
 use crate::gpu::recovery::Opened;

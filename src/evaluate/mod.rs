@@ -1,4 +1,5 @@
-//! The one way from a set to its rotations: which route it takes, and the routes.
+//! From a set to its rotations: the choice of a route, and its execution on the CPU or a Vulkan
+//! device.
 
 pub(crate) mod backend;
 pub(crate) mod route;

@@ -11,8 +11,8 @@ use crate::output::rotations::Layout;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Keys a track on average up to which tracks are not cut: there are enough of them for all
-/// threads.
+/// The average number of keys of a track up to which batches serve a set whose tracks must not be
+/// cut: with longer tracks, too few threads would have work.
 const LONG_TRACK: usize = 16 * 1024;
 
 /// How a set becomes rotations.
@@ -26,10 +26,10 @@ pub(crate) enum Route {
         /// Whether a long track may be cut into several.
         cuts_tracks: bool,
     },
-    /// The segments of all tracks are prepared before the first is evaluated; on a Vulkan
-    /// device those of as many tracks at a time as it has memory for.
+    /// The segments of all tracks are prepared before the first is evaluated. A Vulkan device
+    /// takes as many tracks at a time as it has memory for.
     Clips {
-        /// Whether a long track may be cut where it has not.
+        /// Whether a track that exceeds that memory may be cut.
         cuts_tracks: bool,
     },
 }

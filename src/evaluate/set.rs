@@ -1,4 +1,4 @@
-//! From a set to its rotations, by its route.
+//! Evaluates a set by its route.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -27,14 +27,14 @@ use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::{FramesError, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Bytes of segments that a Vulkan device gets at once where keys are many.
+/// Bytes of segments that a Vulkan device gets at once where a set has far more keys than samples.
 const DENSE_BYTES: usize = 64 << 20;
 
-/// Rotations that one thread looks through for such as are not resolved.
+/// Rotations that one task searches for unresolved ones.
 const LOOK: usize = 16 * 1024;
 
 impl Backend {
-    /// Evaluates a set, into memory of the device's where that saves a copy.
+    /// Evaluates a set; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
         &self,
         set: &TrackSet,
@@ -62,8 +62,8 @@ impl Backend {
         Ok(Box::new(quats))
     }
 
-    /// Some tracks at the samples of a timeline, which is the whole set's; `output` fits
-    /// them.
+    /// Evaluates some tracks into `output`, which is exactly as long as the result. The timeline
+    /// is that of the whole set.
     pub(crate) fn evaluate_tracks(
         &self,
         set: &TrackSet,
@@ -101,9 +101,9 @@ impl Backend {
         }
     }
 
-    /// Batches of tracks whose segments fit the device's budget; and where keys are far more
-    /// than samples, batches that are quickly done with: fresh memory for all of their segments
-    /// would cost more than making them.
+    /// Cuts tracks into batches whose segments fit the device's memory budget. Where keys are far
+    /// more than samples a batch has at most 64 MiB, and each uses the buffers of the one before:
+    /// fresh memory for all segments would cost more than preparing them.
     fn clips(
         &self,
         set: &TrackSet,
@@ -150,8 +150,7 @@ impl Backend {
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
         let is_whole = clips.len() == 1;
-        // What one clip needed, the next one uses again: fresh memory costs more than what is
-        // done with it.
+        // A clip uses the memory of the one before: fresh memory costs more than the work in it.
         let mut used: Option<Uploaded> = None;
         let mut columns: Vec<Quat> = Vec::new();
         while let Some(batch) = clips.pop_front() {
@@ -235,7 +234,7 @@ impl Opened {
 }
 
 impl EvaluateError {
-    /// What it says of the tracks of a batch, said of the set's.
+    /// Turns the index of a track in a batch, which starts at `first`, into its index in the set.
     fn of_tracks_from(mut self, first: usize) -> Self {
         if let Self::Set(SetError::Frames(FramesError::GapTooLong { track, .. })) = &mut self {
             *track += first;

@@ -21,13 +21,13 @@ use crate::tracks::set::TrackSet;
 /// Prepared tracks, and their segments on a Vulkan device.
 pub(crate) struct Uploaded {
     pub(crate) data: ClipData,
-    /// Brought there again when the device was lost.
+    /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
 }
 
 impl Uploaded {
-    /// Prepares what is wanted of a set; into buffers that are no longer needed, where they
-    /// serve.
+    /// Prepares what is wanted of a set, and uploads it where the device is Vulkan's. The buffers
+    /// of `spare`, which are no longer needed, are used again where they are large enough.
     pub(crate) fn new(
         backend: &Backend,
         set: &TrackSet,
@@ -40,7 +40,7 @@ impl Uploaded {
         Ok(Self::of_data(backend, data, spare)?)
     }
 
-    /// What is prepared.
+    /// Uploads data that is prepared already.
     pub(crate) fn of_data(
         backend: &Backend,
         data: ClipData,
@@ -56,14 +56,14 @@ impl Uploaded {
         })
     }
 
-    /// What the next one can use again: its segments, and their buffers on a device.
+    /// The memory that the next clip can use: that of the segments, and their buffers on a device.
     pub(crate) fn into_spare(self) -> (Vec<Prepared>, Option<ClipBuffers>) {
         let buffers = self.buffers.into_inner();
         let buffers = buffers.unwrap_or_else(PoisonError::into_inner);
         (self.data.groups, buffers.and_then(Arc::into_inner))
     }
 
-    /// Evaluates all of it, into memory of the device's where that saves a copy.
+    /// Evaluates all tracks; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
         &self,
         backend: &Backend,
@@ -85,8 +85,8 @@ impl Uploaded {
         }
     }
 
-    /// Evaluates a window of the result, which `output` fits; explicit times are folded
-    /// into the keys.
+    /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
+    /// must be folded into the keys already, as the wrap mode has it.
     pub(crate) fn evaluate_window(
         &self,
         backend: &Backend,
@@ -129,7 +129,7 @@ impl Uploaded {
         }
     }
 
-    /// The segments on a device; brought there where it is not the one that had them.
+    /// The segments on a device; uploaded again where it is not the device that had them.
     pub(crate) fn buffers_on(
         &self,
         engine: &VulkanEngine,

@@ -1,6 +1,6 @@
-//! Twin of `shaders/from_keys/constant_velocity.wgsl`, a component at a time: arcs as polynomials, what smooth methods make of two keys that are alone. Taylor's
-//! series of the sine and cosine about the middle are all that it takes; nothing is
-//! sampled and fitted.
+//! Twin of `shaders/from_keys/constant_velocity.wgsl`, one component at a time: arcs as
+//! polynomials. A smooth method joins a track's only two keys by such an arc. Its coefficients are
+//! Taylor's series of sine and cosine about the middle; nothing is sampled and fitted.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 

@@ -198,7 +198,7 @@ mod tests {
                 if s == 0.0 {
                     let (n, angle) = (n as f64, n as f64 * FRAC_PI_2);
                     let derivative = 2.0 * n * libm::sin(angle);
-                    // By Chebyshev's differential equation.
+                    // From Chebyshev's differential equation.
                     let second = -4.0 * n * n * libm::cos(angle);
                     let halves = of_components(0.5 * second);
                     samples.set_middle(of_components(derivative), halves);

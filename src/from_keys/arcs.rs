@@ -16,14 +16,14 @@ use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{on_arc, square};
 use crate::twin::evaluate_polynomial::polynomial;
 
-/// Samples, or intervals, worked out together.
+/// Samples that are evaluated together.
 pub(crate) const LANES: usize = ARC_LANES;
 
-/// Samples that wait, one behind the other in the result.
+/// Samples that are gathered to be evaluated together; they are consecutive in the result.
 pub(crate) struct TwoKeyBlock {
     pub(crate) form: Form,
-    /// The keys beside each, in the signs that they count with; the same one twice, as it was
-    /// given, where the sample is that key.
+    /// The keys before and after each sample, with continued signs. A sample that is a key itself
+    /// has that key twice, with the sign that it was given.
     pub(crate) from: [[f32; 4]; LANES],
     pub(crate) to: [[f32; 4]; LANES],
     pub(crate) parameters: [f32; LANES],
@@ -48,7 +48,8 @@ impl TwoKeyBlock {
 impl InLanes for TwoKeyBlock {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        // Arcs are evaluated as polynomials where two keys are alone by smooth methods.
+        // Smooth methods join a track's only two keys by an arc, which is evaluated as a
+        // polynomial like their other curves.
         match self.form {
             Form::Arc => self.arcs::<L>(),
             Form::Polynomial => self.polynomials::<L>(),
@@ -89,7 +90,7 @@ impl TwoKeyBlock {
         self.keep(&found);
     }
 
-    /// Components side by side to rotations.
+    /// Turns arrays of components into rotations.
     #[inline(always)]
     fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
         let mut rotations = [[0.0; 4]; LANES];
@@ -100,11 +101,11 @@ impl TwoKeyBlock {
     }
 }
 
-/// Vectors of arcs that are made before the first is evaluated: a processor looks ahead a
-/// vector or two, and one that goes all the way is a long chain to wait for.
+/// Vectors of arcs that are made before the first of them is evaluated. Making and evaluating one
+/// vector is a long chain of operations, and a processor looks ahead only a vector or two.
 const VECTORS: usize = 8;
 
-/// Arcs in vectors.
+/// Arcs in vectors, one for each lane.
 struct Arcs<L> {
     middles: [[L; 4]; VECTORS],
     tangents: [[L; 4]; VECTORS],
@@ -119,7 +120,7 @@ impl<L: Lanes> Arcs<L> {
         }
     }
 
-    /// The arcs of a vector.
+    /// Makes the arcs of a vector.
     #[inline(always)]
     fn put(&mut self, vector: usize, from: [L; 4], to: [L; 4]) {
         let (middle, tangent) = arc_between(from, to);
@@ -127,7 +128,7 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// Their rotations.
+    /// The rotations on the arcs of a vector, times `sign`.
     #[inline(always)]
     fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
         let (middle, tangent) = (
@@ -138,22 +139,23 @@ impl<L: Lanes> Arcs<L> {
     }
 }
 
-/// A rotation of an arc, with that sign.
+/// The rotation on an arc, times `sign`, which is 1 or -1.
 #[inline(always)]
 fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
     let [x, y, z, w] = on_arc(middle, tangent, square(tangent), parameter);
-    // With the other sign, every operation gives what it gives, with the other sign.
+    // Keys of the other sign would only flip the sign of every intermediate result, so the sign
+    // may come last.
     lanes::canonical([x * sign, y * sign, z * sign, w * sign])
 }
 
-/// Samples of one track on arcs between keys that count with one sign, straight into the
-/// result.
+/// Samples of one track on arcs between keys that share one continued sign, evaluated straight
+/// into the result.
 pub(crate) struct ArcRun<'a> {
     pub(crate) samples: &'a [KeySample],
     pub(crate) keys: &'a [[f32; 4]],
     pub(crate) sign: f32,
     pub(crate) output: &'a mut [[f32; 4]],
-    /// How many are worked out: whole vectors.
+    /// How many samples are evaluated: whole vectors only.
     pub(crate) done: usize,
 }
 
@@ -170,7 +172,7 @@ impl InLanes for ArcRun<'_> {
             for (j, sample) in samples.iter().enumerate() {
                 any |= sample.key;
                 from[j] = sample.key & !IS_KEY;
-                // Behind the last key there is none.
+                // A sample that is a key may be the last one, which has no next.
                 to[j] = from[j] + u32::from(sample.key & IS_KEY == 0);
                 parameters[j] = sample.parameter;
             }

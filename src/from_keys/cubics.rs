@@ -11,20 +11,20 @@ use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::small_angle_cubic;
 
-/// Samples that wait, one behind the other in the result.
+/// Samples that are gathered to be evaluated together; they are consecutive in the result.
 pub(crate) struct CubicBlock {
-    /// The four keys about each, in the signs that they count with; where the sample is a key,
-    /// the second is that key as it was given.
+    /// The four keys around each sample, with continued signs. For a sample that is a key itself
+    /// the second is that key, with the sign that it was given.
     pub(crate) keys: [[[f32; 4]; LANES]; 4],
-    /// Of the two keys beside it.
+    /// The tangent weights at the keys before and after each sample.
     pub(crate) weights: [[TangentWeights; LANES]; 2],
     pub(crate) parameters: [f32; LANES],
-    /// 1 where the sample is the key before it.
+    /// 1 where the sample is a key itself, else 0.
     pub(crate) held: [f32; LANES],
     pub(crate) count: usize,
-    /// UNRESOLVED where the curve turns too far.
+    /// `UNRESOLVED` where the curve turns too far for the small-angle series.
     pub(crate) rotations: [[f32; 4]; LANES],
-    /// How many of those there were.
+    /// How many of the samples were unresolved.
     pub(crate) unresolved: usize,
 }
 
@@ -87,8 +87,8 @@ mod tests {
     use crate::simd::dispatch::in_lanes;
     use crate::simd::dispatch::tests::at_every_width;
 
-    /// Catches a wrong digit in a coefficient, which both twins would share, and an
-    /// instruction set whose code fuses: what turns evenly stays even.
+    /// Keys at constant angular velocity give a curve of constant velocity. Catches a wrong digit
+    /// in a coefficient, which both twins would share, and fused operations at any vector width.
     #[test]
     fn constant_velocity_stays_constant_at_every_width() {
         let axis = DVec3::new(0.48, -0.6, 0.64);

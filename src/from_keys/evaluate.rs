@@ -1,5 +1,5 @@
-//! Evaluates samples straight from keys, a sample to a lane: the same operations as by way of
-//! segments, and so the same bits.
+//! Evaluates samples straight from keys, one in each lane, by the operations that preparing and
+//! evaluating segments would do, so with the same bits.
 //! Twin: `shaders/from_keys.wgsl`.
 
 use std::ops::Range;
@@ -21,7 +21,7 @@ use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 use crate::tracks::track_keys::TrackKeys;
 
-/// Evaluates tracks; what it needs for that is kept.
+/// Evaluates tracks from their keys, and keeps its scratch from one to the next.
 pub(crate) struct KeyEvaluator<'a> {
     interpolation: &'a Interpolation,
     block: Block<'a>,
@@ -52,8 +52,8 @@ impl<'a> KeyEvaluator<'a> {
         }
     }
 
-    /// The samples of a batch, `[track][sample]`, those in `window` where it is some intervals
-    /// of a track; whether all of them are resolved.
+    /// Evaluates the samples of a batch that lie in `window`, `[track][sample]`; returns whether
+    /// all of them are resolved.
     pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,
@@ -70,7 +70,7 @@ impl<'a> KeyEvaluator<'a> {
                 Ticks::Frames { rate, start } => {
                     let last = whole.all - 1;
                     let clock = FrameClock::new(*rate, *start, whole.times[last]);
-                    // Cubics look at the keys beside their own too.
+                    // A cubic needs the keys before and after its own two as well.
                     let beside = usize::from(matches!(self.block, Block::Cubics(..)));
                     let first = own.start.saturating_sub(beside);
                     let keys = whole.between(first, (own.end + beside).min(last));
@@ -85,7 +85,7 @@ impl<'a> KeyEvaluator<'a> {
         Ok(self.block.flush(&mut output))
     }
 
-    /// The frames in `window`, which lie between these keys or beside the whole track.
+    /// Evaluates the frames in `window`, which lie between these keys or outside the track's.
     fn frames(
         &mut self,
         keys: TrackKeys<'a>,
@@ -154,7 +154,7 @@ impl<'a> KeyEvaluator<'a> {
 }
 
 impl Block<'_> {
-    /// Works out what waits; whether all since the last time was resolved.
+    /// Evaluates the samples that wait; returns whether all since the last call are resolved.
     fn flush(&mut self, output: &mut Output<'_>) -> bool {
         match self {
             Block::TwoKeys(block) => {
@@ -169,7 +169,7 @@ impl Block<'_> {
     }
 }
 
-/// Keys of a track with the signs that they count with, where any is turned.
+/// Keys of a track with their continued signs; `signs` is `None` where no key is turned.
 #[derive(Clone, Copy)]
 struct SignedKeys<'a> {
     as_given: &'a [[f32; 4]],
@@ -197,7 +197,7 @@ impl<'a> SignedKeys<'a> {
     }
 }
 
-/// The keys of a track, and their weights.
+/// The keys of a track, and their tangent weights.
 #[derive(Clone, Copy)]
 struct CubicKeys<'a> {
     keys: SignedKeys<'a>,
@@ -213,11 +213,11 @@ impl<'a> CubicKeys<'a> {
     }
 }
 
-/// What is still to be written.
+/// The rotations that are still to be written.
 type Output<'a> = std::slice::IterMut<'a, [f32; 4]>;
 
 impl TwoKeyBlock {
-    /// Adds a sample, and works the block out when it is full.
+    /// Adds a sample, and evaluates the block when it is full.
     #[inline(always)]
     fn push(&mut self, keys: SignedKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
         let lane = self.count;
@@ -226,7 +226,7 @@ impl TwoKeyBlock {
             self.from[lane] = keys.get(key);
             self.to[lane] = keys.get(key + 1);
         } else {
-            // Between a key and itself lies that key.
+            // The arc from a key to itself is that key.
             self.from[lane] = keys.as_given[key];
             self.to[lane] = self.from[lane];
         }
@@ -239,7 +239,7 @@ impl TwoKeyBlock {
 
     fn flush(&mut self, output: &mut Output<'_>) {
         in_lanes(self);
-        // The output second, or one of it would be taken and not written.
+        // `zip` takes from the output second: first, it would lose a place when rotations end.
         for (&rotation, place) in self.rotations[..self.count].iter().zip(output) {
             *place = rotation;
         }
@@ -276,7 +276,7 @@ impl CubicBlock {
     }
 
     fn flush(&mut self, output: &mut Output<'_>) {
-        // Lanes behind the last are worked out too.
+        // Unused lanes are evaluated too; marked as held, they do not count as unresolved.
         self.held[self.count..].fill(1.0);
         in_lanes(self);
         for (&rotation, place) in self.rotations[..self.count].iter().zip(output) {

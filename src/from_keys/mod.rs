@@ -1,5 +1,5 @@
-//! Samples straight from keys, where a set has fewer samples than keys: nothing is prepared,
-//! and intervals without a sample cost nothing but the look at their times.
+//! Evaluation straight from keys, for sets with fewer samples than keys: no segment is prepared,
+//! and an interval without samples costs no more than a look at its times.
 
 pub(crate) mod arcs;
 pub(crate) mod cubics;
@@ -14,11 +14,11 @@ use crate::shader::{Form, LONGEST_STEP};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// What stands for a sample that the keys beside it do not give, because its curve turns too
-/// far for the small-angle series: no rotation is 0. It is worked out by way of segments.
+/// Stands for a sample whose curve turns too far for the small-angle series; no rotation is 0. The
+/// fallback then evaluates it by way of segments.
 pub(crate) const UNRESOLVED: [f32; 4] = [0.0; 4];
 
-/// The curves that follow from a sample's keys alone.
+/// Curves that can be evaluated from the keys around a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum KeyCurve {
     /// Arcs between two keys.
@@ -30,15 +30,15 @@ pub(crate) enum KeyCurve {
 }
 
 impl KeyCurve {
-    /// The curves of a set, where it has fewer samples than keys, and nothing but arcs between
-    /// its keys, or cubics most of which turn through small angles.
+    /// The curves of a set that is evaluated from keys: it has fewer samples than keys, and its
+    /// curves are arcs, or cubics most of which turn through small angles. `None` for any other.
     pub(crate) fn of_set(
         set: &TrackSet,
         interpolation: &Interpolation,
         timeline: &Timeline,
     ) -> Option<Self> {
         let are_fewer = timeline.len() * set.track_count() < set.key_count();
-        // As authored an arc may be of more than half a turn, and is then two segments.
+        // On the path as authored an arc may exceed half a turn; it is then two segments.
         let arcs_are_short = interpolation.path == Path::Shortest || set.arcs_are_short();
         if !are_fewer || !arcs_are_short || !interpolation.wrap().are_held() {
             return None;
@@ -56,8 +56,8 @@ impl KeyCurve {
     }
 }
 
-/// Whether two thirds of some keys looked at are near those before them: with fewer, to
-/// prepare all of them takes no longer. Nothing but time depends on it.
+/// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With
+/// fewer, preparing all segments takes no longer. Only speed depends on this, no bit does.
 fn turns_little(set: &TrackSet) -> bool {
     const LOOKS: usize = 64;
     let (mut near, mut looks) = (0, 0);

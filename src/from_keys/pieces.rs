@@ -1,5 +1,5 @@
-//! Sets with fewer samples than keys on a Vulkan device: keys go there as they are stored,
-//! with where the samples lie among them, some tracks at a time. Nothing is prepared.
+//! Sets with fewer samples than keys, cut into pieces for a Vulkan device: some tracks at a time,
+//! with their keys as they are stored and the places of the samples among them.
 
 use std::ops::Range;
 
@@ -14,10 +14,10 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 
-/// Rows of one piece: workgroups along y.
+/// The most rows of one piece; every Vulkan device allows as many workgroups along y.
 const ROWS: usize = 65_535;
 
-/// Keys that one thread brings at once.
+/// Keys that one task writes.
 const TASK_KEYS: usize = 16 * 1024;
 
 /// What is to be evaluated.
@@ -31,7 +31,7 @@ pub(crate) struct KeyJob<'a> {
 }
 
 impl<'a> KeyJob<'a> {
-    /// Those of cubics; arcs have none.
+    /// The rule for the tangent weights of cubics; arcs have none.
     pub(crate) fn weights(&self) -> Option<WeightRule> {
         match self.curve {
             KeyCurve::Cubics(weights) => Some(weights),
@@ -39,13 +39,13 @@ impl<'a> KeyJob<'a> {
         }
     }
 
-    /// All keys of the set, where kernels can read them as they are stored: weights lie as
-    /// the keys of a piece do.
+    /// All keys of the set, where kernels can read them as they are stored. For cubics they
+    /// cannot, because weights are indexed like the keys of a piece.
     pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
         self.weights().is_none().then_some(self.set.keys())
     }
 
-    /// The pieces of it, which lie in the result one behind the other.
+    /// Its pieces, which are consecutive in the result.
     pub(crate) fn pieces(&self) -> KeyPieces<'a, '_> {
         KeyPieces {
             job: self,
@@ -61,18 +61,19 @@ pub(crate) struct Part<'a> {
     pub(crate) window: Range<usize>,
 }
 
-/// What a device gets at once.
+/// What one dispatch evaluates.
 pub(crate) struct KeyPiece<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     pub(crate) tasks: Vec<Task<'a>>,
-    /// Rows, all of whose samples lie alike among their keys.
+    /// Number of rows. Tracks that share their key times are a row each, because their samples lie
+    /// at the same places among their keys; other tracks together are one row.
     pub(crate) rows: usize,
     pub(crate) keys: usize,
-    /// Samples of which the kernel is told where they lie: those of one row.
+    /// Samples of one row; the kernel gets the place of each among the keys.
     pub(crate) samples: usize,
 }
 
-/// What one thread writes of a piece.
+/// The part of a piece that one thread writes.
 pub(crate) struct Task<'a> {
     pub(crate) what: What<'a>,
     pub(crate) keys: usize,
@@ -85,13 +86,12 @@ pub(crate) enum What<'a> {
     Part(Part<'a>),
 }
 
-/// Walks over a job.
+/// Cuts a job into pieces.
 pub(crate) struct KeyPieces<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     /// The next track.
     next: usize,
-    /// The rest of a track that is more than a piece: what is left of it, from the key and
-    /// the sample on.
+    /// What is left of a track that is larger than a piece.
     long: Option<Long>,
 }
 
@@ -103,7 +103,7 @@ struct Long {
 }
 
 impl<'a, 'j> KeyPieces<'a, 'j> {
-    /// The next piece, of about so many keys and so many samples at most.
+    /// The next piece, of about `most` keys and at most `most` samples.
     pub(crate) fn next(
         &mut self,
         most: usize,
@@ -157,7 +157,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         }))
     }
 
-    /// The next piece of a track that is more than a piece: parts for as many threads.
+    /// The next piece of a track that is larger than a piece: several parts, a task each.
     fn next_of_long(&mut self, most: usize) -> Option<KeyPiece<'a, 'j>> {
         let mut piece = KeyPiece {
             job: self.job,
@@ -185,7 +185,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         (!piece.tasks.is_empty()).then_some(piece)
     }
 
-    /// A stretch of a track that is more than a piece, and what of it is left.
+    /// Takes the next part of a track that is larger than a piece, and notes what is left.
     fn part_of(&mut self, long: Long, most: usize) -> Part<'a> {
         let whole = TrackKeys::whole(self.job.set, long.track);
         let times = whole.times;
@@ -209,7 +209,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         } else {
             None
         };
-        // Cubics look at the keys beside their own too.
+        // A cubic needs the keys before and after its own two as well.
         let beside = usize::from(self.job.weights().is_some());
         let first = long.key.saturating_sub(beside);
         Part {
@@ -220,7 +220,8 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
 }
 
 impl<'a> KeyJob<'a> {
-    /// Refuses tracks that do not end as they must.
+    /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
+    /// velocity that is too large.
     fn check(&self, tracks: Range<usize>) -> Result<(), InterpolationError> {
         let ends = self.interpolation.ends;
         if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {

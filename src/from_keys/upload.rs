@@ -1,4 +1,5 @@
-//! What a kernel reads of a piece: its keys with their signs, where the samples lie, and weights.
+//! What a kernel reads of a piece: keys with their signs, the places of the samples among them,
+//! and tangent weights.
 
 use std::ops::Range;
 
@@ -27,7 +28,7 @@ impl KeyPiece<'_, '_> {
         }
     }
 
-    /// Rotations that it becomes.
+    /// Number of rotations of its result.
     pub(crate) fn rotation_count(&self) -> usize {
         self.samples * self.rows
     }
@@ -71,7 +72,8 @@ impl KeyPiece<'_, '_> {
         let mut first_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
-            // Where all rows are alike only the first one's are told.
+            // Several rows share the samples and weights of the first, which the first task
+            // writes.
             let (told, joined) = match self.rows {
                 1 => (task.samples, task.keys.min(weights.len())),
                 _ => (samples.len(), weights.len()),
@@ -165,7 +167,7 @@ impl KeyPiece<'_, '_> {
         Ok(())
     }
 
-    /// Where the samples of a part lie, but those at explicit times.
+    /// Writes the places of a part's samples if these are frames.
     fn write_frames<'p>(
         &self,
         part: &Part<'p>,
@@ -190,7 +192,8 @@ impl KeyPiece<'_, '_> {
     }
 }
 
-/// Explicit times of some tracks, which may be many with a sample each.
+/// Writes the places of explicit times in lanes, across tracks: a crowd has many tracks with one
+/// sample each.
 struct TimesOfTracks<'a> {
     set: &'a TrackSet,
     tracks: Range<usize>,
@@ -231,7 +234,7 @@ impl InLanes for TimesOfTracks<'_> {
 }
 
 impl TimeLanes {
-    /// Writes the samples that wait; how many.
+    /// Writes the samples that wait; returns how many.
     #[inline(always)]
     fn write(&mut self, samples: &mut [KeySample]) -> usize {
         let count = std::mem::take(&mut self.count);
@@ -248,27 +251,28 @@ impl TimeLanes {
 
 /// Where a kernel reads the keys of a piece.
 pub(crate) enum Keys<'w> {
-    /// Here, with their signs.
+    /// In a buffer of the piece: here they are written, with their signs.
     Copied(&'w mut [[u32; 4]]),
-    /// Where they are stored; the set's first one has this place. None is turned.
+    /// In imported memory, as they are stored: the set's first key has this place there. No key is
+    /// turned.
     Lent(usize),
 }
 
-/// What a thread finds out, and keeps for the next track.
+/// Results that a thread keeps for the next track.
 struct Known<'p> {
     frames: FramePlan<'p>,
-    /// Those of cubics.
+    /// The tangent weights of cubics.
     weights: Option<TrackWeights<'p>>,
 }
 
-/// What a thread has still to write.
+/// What a task has still to write.
 struct Written<'w> {
     keys: &'w mut [[u32; 4]],
     samples: &'w mut [KeySample],
     weights: &'w mut [TangentWeights],
     /// The place of the next key among the piece's.
     next_key: usize,
-    /// The place of the set's first key, where keys are read as they are stored.
+    /// The place of the set's first key in imported memory, where keys are read from there.
     lent: Option<usize>,
 }
 

@@ -35,7 +35,7 @@ impl Residence {
     }
 }
 
-/// Memory that the process has already.
+/// The handle type of imported memory: host allocations of this process.
 const LENT: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
 
@@ -49,7 +49,7 @@ fn usage(is_texels: bool) -> vk::BufferUsageFlags {
     }
 }
 
-/// Whether a device takes such memory for a buffer.
+/// Whether a device can import such memory for a buffer.
 pub(crate) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
     let info = vk::PhysicalDeviceExternalBufferInfo::default()
         .usage(usage(is_texels))
@@ -64,11 +64,11 @@ pub(crate) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
     features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
 }
 
-/// A storage buffer, mapped for as long as it lives where the host touches it.
+/// A storage buffer. One that the host touches stays mapped for as long as it lives.
 pub(crate) struct Buffer {
     device: Arc<LogicalDevice>,
     pub(crate) raw: vk::Buffer,
-    /// As texels of 16 bytes; null where no kernel reads it so.
+    /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     memory: vk::DeviceMemory,
     mapped: Option<NonNull<u8>>,
@@ -81,12 +81,12 @@ unsafe impl Send for Buffer {}
 // SAFETY: as above.
 unsafe impl Sync for Buffer {}
 
-/// No kernel reads more at once.
+/// The size of the largest element that a kernel reads.
 const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
 
 impl Buffer {
-    /// At least `size` bytes; an empty buffer still has room for one of what kernels read,
-    /// which may do so before they choose.
+    /// A buffer of at least `size` bytes. Even an empty one has room for one element of any kind:
+    /// kernels may read element 0 of a list before they choose another.
     pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         name: &str,
@@ -123,10 +123,10 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Around pages of this process's memory; nothing where the device cannot take them.
+    /// Imports pages of this process's memory; `None` where the device cannot.
     ///
     /// # Safety
-    /// They must be there as long as the buffer is, and as anything works on it.
+    /// The pages must stay allocated until the buffer is dropped and no submitted work uses it.
     pub(crate) unsafe fn around(
         device: &Arc<LogicalDevice>,
         name: &str,
@@ -223,7 +223,7 @@ impl Buffer {
         self.size
     }
 
-    /// Some of the mapped bytes; none where the host cannot touch them.
+    /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.
     pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
         match self.mapped {
             // SAFETY: mapped with at least this size for the life of the buffer.

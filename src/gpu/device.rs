@@ -20,7 +20,7 @@ pub(crate) struct LogicalDevice {
     pub(crate) reads_texels: bool,
     queue: Mutex<vk::Queue>,
     names: Option<ext::debug_utils::Device>,
-    /// Where it may work on the caller's memory.
+    /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
     owned: bool,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
@@ -38,8 +38,8 @@ impl LogicalDevice {
             .then_some(khr::shader_float_controls::NAME.as_ptr())
             .into_iter()
             .collect();
-        // Software devices work in threads of this process: waiting for them has an end, and
-        // nothing of them works on memory that was given back.
+        // Memory is imported on software devices only. They work in threads of this process: a
+        // wait for them ends, and afterwards none of them touches memory that its owner may free.
         let reads_texels = physical.reads_texels(reads);
         let borrows = physical.info.kind == DeviceKind::Cpu
             && physical.lent_alignment.is_some()
@@ -123,7 +123,7 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits for everything; a device that cannot even do that is as good as hung.
+    /// Waits until the device is idle. If the wait fails, the device counts as hung.
     pub(crate) fn wait_until_idle(&self) {
         let _queue = self.queue();
         // SAFETY: the device is alive, and its queue is locked.
@@ -133,7 +133,7 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits for everything, however long it takes.
+    /// Waits until the device is idle, and again if the wait fails for lack of memory.
     pub(crate) fn wait_in_any_case(&self) {
         let _queue = self.queue();
         // SAFETY: as in `wait_until_idle`.
@@ -144,7 +144,7 @@ impl LogicalDevice {
         }
     }
 
-    /// Whether it was opened here, and is ours to open again.
+    /// Whether it was opened here, and may be opened again here.
     pub(crate) fn is_owned(&self) -> bool {
         self.owned
     }

@@ -22,11 +22,11 @@ use crate::prepare::clip_data::ClipData;
 use crate::shader::{Item, KERNELS, Kernel};
 use crate::time::frames::Timeline;
 
-/// Rotations of one window, unless limits, the budget or the device's speed say less:
-/// 32 MiB.
+/// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
+/// speed demand fewer.
 const WINDOW: u64 = 1 << 21;
 
-/// Windows are not made smaller than this, 1 MiB, for want of memory or speed.
+/// Rotations down to which windows are halved when memory is short or the device slow: 1 MiB.
 const SMALLEST_WINDOW: usize = 1 << 16;
 
 /// Windows in flight: the host fills one while the device works on another.
@@ -39,15 +39,16 @@ pub(crate) struct VulkanEngine {
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
     pub(crate) slots: Mutex<Vec<Slot>>,
     pub(crate) key_slots: Mutex<Vec<KeySlot>>,
-    /// Results are written in place, or copied out of the device's own memory.
+    /// Whether kernels write into memory that the host reads; else results are copied out of the
+    /// device's own memory.
     pub(crate) in_place: bool,
-    /// Kernels work on the caller's memory where they can.
+    /// Whether the caller's memory is imported where the device can.
     pub(crate) lends: bool,
     /// Rotations of one window.
     window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
     group_bytes: u64,
-    /// Bytes that the segments of one clip may take; no limit unless one was asked.
+    /// Bytes that the segments of one clip may take; `None` without a memory budget.
     clip_bytes: Option<u64>,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
@@ -150,12 +151,12 @@ impl VulkanEngine {
         &self.device.physical.info
     }
 
-    /// Runs every canary.
+    /// Runs the self-test.
     pub(crate) fn canaries(&self) -> Result<Vec<crate::gpu::self_test::CanaryReport>, VulkanError> {
         crate::gpu::self_test::run(self)
     }
 
-    /// Where the time went since this was last asked.
+    /// Where the time went since the last call of this function.
     pub(crate) fn take_timings(&self) -> Timings {
         std::mem::take(&mut *self.timings.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -176,14 +177,14 @@ impl VulkanEngine {
             .map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
     }
 
-    /// Brings a clip's segments to the device, into buffers that are no longer needed where
-    /// they serve.
+    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,
+    /// are used again where they are large enough.
     pub(crate) fn upload(
         &self,
         clip: &ClipData,
         spare: Option<ClipBuffers>,
     ) -> Result<ClipBuffers, VulkanError> {
-        // Where memory is counted, old buffers go before new ones come.
+        // Under a memory budget the old buffers are freed before new ones are allocated.
         let spare = spare.filter(|old| self.clip_bytes.is_none() && self.holds(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
         let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
@@ -213,12 +214,12 @@ impl VulkanEngine {
         })
     }
 
-    /// Whether buffers are this device's: one that was opened anew has none of before.
+    /// Whether buffers belong to this device; those from before it was opened again do not.
     pub(crate) fn holds(&self, buffers: &ClipBuffers) -> bool {
         Arc::ptr_eq(&self.device, &buffers.device)
     }
 
-    /// The same device opened again; nothing for an application's own.
+    /// The same device opened again; `None` for an application's own, which only it can open.
     pub(crate) fn reopened(&self, options: &EngineOptions) -> Result<Option<Self>, VulkanError> {
         if !self.device.is_owned() {
             return Ok(None);
@@ -233,7 +234,7 @@ impl VulkanEngine {
         self.window.load(Ordering::Relaxed)
     }
 
-    /// Halves the windows to come; false when they are as small as they may be.
+    /// Halves the size of later windows; false when it is at its minimum already.
     pub(crate) fn halve_windows(&self) -> bool {
         let half = self.window() / 2;
         let smaller = half >= SMALLEST_WINDOW;
@@ -243,7 +244,7 @@ impl VulkanEngine {
         smaller
     }
 
-    /// Gives back what is kept for the next evaluation; false when that is nothing.
+    /// Frees the buffers that are kept for the next evaluation; false when there are none.
     pub(crate) fn give_back(&self) -> bool {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let mut key_slots = (self.key_slots.lock()).unwrap_or_else(PoisonError::into_inner);
@@ -305,7 +306,7 @@ impl VulkanEngine {
             return Ok(Box::new(quats));
         }
         let mut buffer = match self.output_buffer(bytes) {
-            // Window by window it may fit.
+            // Window by window the result may still be made.
             Err(error) if error.is_out_of_memory() => {
                 let mut quats = OutputBuffer::new(whole.len());
                 self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;

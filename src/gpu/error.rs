@@ -24,7 +24,7 @@ pub enum VulkanError {
         "a Vulkan driver fails as it is loaded: {how}; remove it, or name those to load in VK_DRIVER_FILES"
     )]
     Driver {
-        /// What became of a process that loaded it.
+        /// How a process that loaded it ended.
         how: String,
     },
     /// A Vulkan call failed.
@@ -61,21 +61,21 @@ pub enum VulkanError {
     Inexact {
         /// The device's name.
         device: String,
-        /// The canary that failed.
+        /// The check of the self-test that failed.
         canary: &'static str,
         /// Results that differ.
         differing: usize,
         /// Results compared.
         total: usize,
     },
-    /// A stretch of a buffer given for a result does not fit it.
+    /// The range of a buffer that was given for a result does not fit it.
     #[error(
         "the buffer's stretch of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
     )]
     OwnBuffer {
-        /// Where the stretch starts.
+        /// Where the range starts, bytes.
         offset: u64,
-        /// Its length.
+        /// Its length, bytes.
         size: u64,
         /// Bytes of a rotation.
         rotation: u64,
@@ -102,7 +102,7 @@ impl VulkanError {
         self.result() == Some(vk::Result::ERROR_DEVICE_LOST)
     }
 
-    /// Less at once may do.
+    /// Memory ran out: the same work in smaller windows may succeed.
     pub(crate) fn is_out_of_memory(&self) -> bool {
         matches!(
             self.result(),

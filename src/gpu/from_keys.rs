@@ -1,5 +1,5 @@
-//! Fewer samples than keys, straight from keys: two pieces are in flight, the
-//! host brings the keys of one while the device works on the other.
+//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two pieces are
+//! in flight: the host writes the keys of one while the device works on the other.
 
 use std::ops::Range;
 use std::sync::atomic::Ordering;
@@ -22,23 +22,23 @@ use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::Kernel;
 use crate::shader::{FROM_KEYS_WORKGROUP, ROWS_PER_INVOCATION};
 
-/// What one piece in flight needs; the submission comes first, so that it is waited for
-/// before its buffers go.
+/// What one piece in flight needs. The submission is the first field: dropped first, it waits for
+/// its work to end before the buffers are freed.
 pub(crate) struct KeySlot {
     submission: Submission,
     keys: Option<Buffer>,
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
     weights: Option<Buffer>,
-    /// Where the result of the piece in flight goes, bytes.
+    /// The bytes of the result that the piece in flight makes.
     output: Range<usize>,
     /// As [`Slot::compiled`].
     compiled: bool,
 }
 
-/// Memory of the caller's.
+/// The caller's memory, imported where possible.
 struct Borrowed<'a> {
-    /// The set's keys, where kernels may read them there.
+    /// The set's keys, where kernels read them in place.
     keys: Option<Lent<'a>>,
     target: Target<'a>,
 }
@@ -56,7 +56,7 @@ impl Borrowed<'_> {
 }
 
 impl VulkanEngine {
-    /// Evaluates a job, whose result `output` fits.
+    /// Evaluates a job into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_keys(
         &self,
         job: &KeyJob<'_>,
@@ -70,7 +70,7 @@ impl VulkanEngine {
             slots.push(KeySlot::new(&self.device)?);
         }
         let each = size_of::<Quat>();
-        // A piece's result may begin anywhere.
+        // A piece's result may begin at any rotation, and a binding must be able to as well.
         let alignment = self
             .device
             .physical
@@ -91,7 +91,7 @@ impl VulkanEngine {
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
         let mut result = self.submit_pieces(job, &mut slots, &mut next, &mut lent, &mut stopwatch);
-        // Also after an error: what was submitted uses the slots' buffers.
+        // Also after an error: work that was submitted uses the slots' buffers.
         for i in 1..=SLOTS {
             let finished = slots[(next + i) % SLOTS].finish(&mut lent.target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
@@ -157,7 +157,7 @@ impl KeySlot {
         })
     }
 
-    /// Submits one piece, whose result is that stretch of all, bytes.
+    /// Submits one piece; `output` are the bytes of the whole result that it makes.
     fn start(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -229,7 +229,7 @@ impl KeySlot {
         Ok(())
     }
 
-    /// Waits for the piece in flight, if any, and brings its results home.
+    /// Waits for the piece in flight, if any, and copies its rotations to the caller.
     fn finish(
         &mut self,
         target: &mut Target<'_>,

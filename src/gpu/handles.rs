@@ -13,9 +13,9 @@ use crate::shader::spirv::FloatControls;
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)).
 ///
-/// The device needs no features, but is faster with one where it is software
-/// ([`VulkanHandles::shader_int64`]). Below Vulkan 1.2, enable
-/// `VK_KHR_shader_float_controls` where it is offered.
+/// The device needs no features, but a software device is faster with one
+/// ([`VulkanHandles::shader_int64`]). Below Vulkan 1.2, enable `VK_KHR_shader_float_controls`
+/// where it is offered.
 pub struct VulkanHandles {
     /// The loaded functions; they keep the loader library open.
     pub entry: ash::Entry,
@@ -27,7 +27,7 @@ pub struct VulkanHandles {
     pub physical_device: vk::PhysicalDevice,
     /// The device.
     pub device: ash::Device,
-    /// Whether `VK_KHR_shader_float_controls` is enabled; of no account from Vulkan 1.2 on.
+    /// Whether `VK_KHR_shader_float_controls` is enabled; ignored from Vulkan 1.2 on.
     pub shader_float_controls: bool,
     /// Whether the feature `shaderInt64` is enabled, which makes software devices faster.
     pub shader_int64: bool,
@@ -37,14 +37,14 @@ pub struct VulkanHandles {
     pub queue_family: u32,
 }
 
-/// A stretch of a buffer on an application's own device.
+/// A range of a buffer on an application's own device.
 #[derive(Debug, Clone, Copy)]
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
-    /// Where the stretch starts, bytes: a multiple of a rotation's.
+    /// Where the range starts, bytes: a multiple of the size of a stored rotation.
     pub offset: u64,
-    /// Its length, bytes: at least those of the result.
+    /// Its length, bytes: at least the size of the result.
     pub size: u64,
 }
 
@@ -62,7 +62,7 @@ impl VulkanEngine {
             .ok_or(VulkanError::NoDevice)?;
         physical.queue_family = handles.queue_family;
         if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
-            // What the device could do was not asked for.
+            // The application did not enable what the device offers.
             physical.float_controls = FloatControls::default();
         }
         physical.has_int64 &= handles.shader_int64;

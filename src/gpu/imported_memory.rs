@@ -11,13 +11,13 @@ use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::submission::Binding;
 
-/// Less than this is copied sooner than lent.
+/// Fewer bytes than this are copied faster than imported.
 const LEAST: usize = 1 << 20;
 
-/// What is lent consists of whole pages, which are at least this large.
+/// Memory is imported in whole pages, which are at least this large.
 const PAGE: usize = 4096;
 
-/// Memory that a device may read or write as long as this lives.
+/// Imported memory: the caller's, which a device may read or write as long as this lives.
 pub(crate) struct Lent<'a> {
     device: Arc<LogicalDevice>,
     /// The pages that it lies in.
@@ -26,13 +26,14 @@ pub(crate) struct Lent<'a> {
     start: usize,
     memory: NonNull<u8>,
     size: usize,
-    /// All that was submitted has ended.
+    /// Whether all work that was submitted has ended.
     is_idle: bool,
     lender: PhantomData<&'a mut [u8]>,
 }
 
 impl<'a> Lent<'a> {
-    /// For kernels to write results of `each` bytes; the memory itself where they cannot.
+    /// Imports memory for kernels to write values of `each` bytes; returns the slice where that is
+    /// impossible.
     pub(crate) fn to_write(
         device: &Arc<LogicalDevice>,
         bytes: &'a mut [u8],
@@ -41,13 +42,14 @@ impl<'a> Lent<'a> {
         let (size, start) = (bytes.len(), bytes.as_ptr().addr() % PAGE);
         let alignment = device.physical.info.min_storage_buffer_offset_alignment as usize;
         let is_aligned = |offset: usize| offset.is_multiple_of(alignment.max(1));
-        // A binding may begin at any result, or there is one before it at which it may.
+        // A binding begins at an aligned offset, a whole number of values before the result:
+        // either every value is aligned, or the start of the page is such an offset.
         let binds = is_aligned(start) && is_aligned(each) || start.is_multiple_of(each);
         let lent = binds.then(|| Self::new(device, NonNull::from(&mut *bytes).cast(), size));
         lent.flatten().ok_or(bytes)
     }
 
-    /// For kernels to read.
+    /// Imports memory for kernels to read.
     pub(crate) fn to_read(device: &Arc<LogicalDevice>, bytes: &'a [u8]) -> Option<Self> {
         Self::new(device, NonNull::from(bytes).cast(), bytes.len())
     }
@@ -90,7 +92,7 @@ impl<'a> Lent<'a> {
         Binding::whole(&self.buffer)
     }
 
-    /// Some of its bytes, to write: what no kernel works on.
+    /// Some of its bytes for the host to write, on which no kernel may work.
     pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
         assert!(range.start <= range.end && range.end <= self.size);
         // SAFETY: it is borrowed as a whole, and the range lies within it.
@@ -99,7 +101,7 @@ impl<'a> Lent<'a> {
         }
     }
 
-    /// Says that all that was submitted has ended.
+    /// Says that all work that was submitted has ended, so that dropping need not wait.
     pub(crate) fn has_come_back(&mut self) {
         self.is_idle = true;
     }
@@ -107,7 +109,7 @@ impl<'a> Lent<'a> {
 
 impl Drop for Lent<'_> {
     fn drop(&mut self) {
-        // After an error, or in a panic, something may be under way still.
+        // After an error or a panic, submitted work may not have ended.
         if !self.is_idle {
             self.device.wait_in_any_case();
         }

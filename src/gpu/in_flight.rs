@@ -22,8 +22,8 @@ use crate::shader::List;
 use crate::shader::{Item, ListedSample};
 use crate::time::frames::{Ticks, Timeline};
 
-/// What one window needs; the submission comes first, so that it is waited for
-/// before its buffers go.
+/// What one window in flight needs. The submission is the first field: dropped first, it waits for
+/// its work to end before the buffers are freed.
 pub(crate) struct Slot {
     pub(crate) submission: Submission,
     /// Items and distances, as the host writes them.
@@ -36,9 +36,10 @@ pub(crate) struct Slot {
     pub(crate) rotations: Option<Buffer>,
     pub(crate) readback: Option<Buffer>,
     pub(crate) done: Option<Finish>,
-    /// Work lists to fill again.
+    /// Emptied work lists, whose memory is used again.
     pub(crate) spare: Vec<WorkChunk>,
-    /// The kernel has run before: some drivers compile at the first dispatch.
+    /// Whether the kernel had run before: some drivers compile at the first dispatch, which then
+    /// does not count as slow.
     pub(crate) compiled: bool,
 }
 
@@ -52,15 +53,15 @@ pub(crate) struct Finish {
 #[derive(Default)]
 pub(crate) struct Stopwatch {
     pub(crate) timings: Timings,
-    /// When the last window was seen to have ended: windows overlap, their times
+    /// When the last window was seen to have ended. Windows overlap, and the time that two share
     /// must not count twice.
     last: Option<Instant>,
     /// A window took longer than [`LONG`].
     slow: bool,
 }
 
-/// Systems take a device away from whoever keeps it busy for seconds (Windows after 2 s);
-/// other programs' pictures stand still long before that.
+/// A window should take no longer. Systems reset a device that one program keeps busy for seconds
+/// (Windows after 2 s), and the display stands still long before that.
 const LONG: Duration = Duration::from_millis(100);
 
 impl Stopwatch {
@@ -90,7 +91,7 @@ impl Stopwatch {
 pub(crate) enum Target<'a> {
     /// Straight into a mapped buffer.
     Buffer(&'a mut Buffer),
-    /// Straight into the caller's memory.
+    /// Straight into the caller's memory, which is imported.
     Lent(Lent<'a>),
     /// Through a window's own buffer into the caller's memory.
     Slice(&'a mut [u8]),
@@ -98,7 +99,7 @@ pub(crate) enum Target<'a> {
     External(External),
 }
 
-/// A stretch of a buffer that somebody else made on this device.
+/// A range of a buffer that the application made on this device.
 #[derive(Clone, Copy)]
 pub(crate) struct External {
     pub(crate) raw: vk::Buffer,
@@ -122,7 +123,7 @@ impl Slot {
         })
     }
 
-    /// Makes sure of a buffer of at least `size` bytes.
+    /// Makes a new buffer where there is none of at least `size` bytes.
     pub(crate) fn grow(
         device: &Arc<LogicalDevice>,
         buffer: &mut Option<Buffer>,
@@ -136,8 +137,8 @@ impl Slot {
         Ok(())
     }
 
-    /// Lists the work of a window where the device reads it, that of all groups one behind
-    /// the other; `shift` is added to every place in the output.
+    /// Writes the work list of a window into the slot's buffers, one group after another; `shift`
+    /// is added to every place in the output.
     pub(crate) fn list(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -190,7 +191,8 @@ impl Slot {
         Ok(work)
     }
 
-    /// Waits for the window in flight, if any, and brings its results home.
+    /// Waits for the window in flight, if any, copies its rotations to the caller, and adds those
+    /// that the host computed.
     pub(crate) fn finish(
         &mut self,
         encoding: Encoding,
@@ -230,7 +232,7 @@ impl Slot {
     }
 }
 
-/// Room for so many bytes, where the host writes them.
+/// The first `bytes` bytes of an upload buffer, which is replaced if it is shorter.
 fn room<'b>(
     device: &Arc<LogicalDevice>,
     buffer: &'b mut Buffer,
@@ -243,7 +245,7 @@ fn room<'b>(
     Ok(buffer.bytes_mut(0..bytes))
 }
 
-/// Writes the work lists of all groups, one behind the other.
+/// Writes the work lists of all groups, one after another.
 fn write(lists: &[GroupWork], mut items: &mut [Item], mut distances: &mut [f32]) {
     let mut next_distance = 0;
     let mut places = Vec::new();

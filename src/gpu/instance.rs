@@ -23,7 +23,7 @@ pub(crate) struct Instance {
 struct Messenger {
     functions: ext::debug_utils::Instance,
     raw: vk::DebugUtilsMessengerEXT,
-    /// What the validation layer said; the address is the callback's.
+    /// What the validation layer said; boxed, because the callback holds its address.
     messages: Box<Mutex<Vec<String>>>,
 }
 

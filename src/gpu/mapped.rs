@@ -7,11 +7,11 @@ use glam::Quat;
 use crate::gpu::buffer::Buffer;
 use crate::output::rotations::Storage;
 
-/// Output buffers given back by results: touching fresh memory costs more than
-/// evaluating.
+/// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
+/// than evaluating.
 pub(crate) type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
 
-/// A result in mapped memory; the buffer goes back to its engine.
+/// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
 pub(crate) struct MappedQuats {
     buffer: Option<Buffer>,
     count: usize,
@@ -39,7 +39,7 @@ impl Storage for MappedQuats {
     }
 }
 
-/// Output buffers kept for the next evaluation.
+/// The most output buffers that are kept for later evaluations.
 const KEPT: usize = 4;
 
 impl Drop for MappedQuats {

@@ -1,5 +1,5 @@
-//! Vulkan, through `ash`: the only place, with the CPU's feature dispatch, that is
-//! not safe Rust. One type owns one Vulkan object and destroys it.
+//! Vulkan, through `ash`: evaluation on a device, its work lists and memory, the self-test and
+//! recovery from errors. One type owns one Vulkan object and destroys it; unsafe code is allowed.
 #![allow(unsafe_code)]
 
 pub(crate) mod buffer;

@@ -14,7 +14,7 @@ pub enum Transfer {
     Automatic,
     /// The kernel writes into memory that the host reads.
     InPlace,
-    /// The kernel writes into the device's memory; copies bring it over.
+    /// The kernel writes into the device's memory, from where results are copied.
     Staged,
 }
 
@@ -26,8 +26,8 @@ pub enum Reads {
     Automatic,
     /// Storage buffers.
     StorageBuffers,
-    /// Texel buffers, and stores of 64 bits; where the device has such integers, and can
-    /// hold in one buffer what it may allocate at once.
+    /// Texel buffers, and stores of 64 bits, on devices that have 64-bit integers and texel
+    /// buffers as long as their largest allocation; else storage buffers.
     TexelBuffers,
 }
 
@@ -46,7 +46,7 @@ pub struct EngineOptions {
     pub transfer: Transfer,
     /// How a Vulkan device's kernels read.
     pub reads: Reads,
-    /// Use a device although its canaries fail: its bits may differ.
+    /// Use a device although it fails the self-test: its bits may differ.
     pub allow_inexact: bool,
 }
 
@@ -54,15 +54,15 @@ pub struct EngineOptions {
 /// ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// The host made work lists and recorded commands; the device may have worked on
+    /// Time in which the host made work lists and recorded commands; the device may have worked on
     /// another window meanwhile.
     pub work_lists: Duration,
-    /// From handing work over to seeing its fence; windows in flight together are
-    /// counted once.
+    /// Time from submitting work to seeing its fence signalled; time that several windows in
+    /// flight share is counted once.
     pub submit_to_fence: Duration,
-    /// By the device's own clock; zero where it has none.
+    /// Time in which the device worked, by its own clock; zero where it has none.
     pub on_device: Duration,
-    /// The host copied results to where they were asked for.
+    /// Time in which the host copied results into the caller's memory.
     pub read_back: Duration,
 }
 

@@ -17,7 +17,7 @@ use crate::shader::spirv::FloatControls;
 pub struct DeviceInfo {
     /// Name, as the driver gives it.
     pub name: String,
-    /// The driver's name and version, where it tells.
+    /// The driver's name and version; empty where it does not report them.
     pub driver: String,
     /// Kind of device.
     pub kind: DeviceKind,
@@ -45,7 +45,7 @@ pub struct DeviceInfo {
     pub rounds_to_nearest_even: bool,
 }
 
-/// Bytes of a texel, where a kernel reads so.
+/// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
 
 /// Kinds of Vulkan devices, fastest first.
@@ -82,7 +82,7 @@ pub(crate) struct PhysicalDevice {
     max_texel_buffer_elements: u32,
     /// Shaders may have integers of 64 bits.
     pub(crate) has_int64: bool,
-    /// What memory must be aligned to that the device is to work on where it is, bytes.
+    /// The alignment of imported memory, bytes; `None` where memory cannot be imported.
     pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
 }
@@ -206,9 +206,9 @@ impl PhysicalDevice {
         }))
     }
 
-    /// Whether its kernels are to read texel buffers, and to store 64 bits at once. Cards
-    /// bring together what neighbouring lanes ask for; lavapipe brings it lane by lane, and
-    /// 32 bits of a storage buffer more slowly than a texel of 128.
+    /// Whether its kernels read texel buffers, and store 64 bits at once. Hardware combines the
+    /// loads of neighbouring lanes. Lavapipe loads lane by lane, and takes longer for 32 bits of a
+    /// storage buffer than for a texel of 128.
     pub(crate) fn reads_texels(&self, reads: Reads) -> bool {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;

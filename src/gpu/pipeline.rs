@@ -1,4 +1,4 @@
-//! The kernels as pipelines: one binding list, one entry point, one layout.
+//! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
 use crate::shader::Kernel;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
     pub(crate) set_layout: vk::DescriptorSetLayout,
-    /// Buffers that it binds, of which the last is written.
+    /// How many buffers it binds; it writes the last one.
     pub(crate) bindings: u32,
-    /// The others are texel buffers, not storage buffers.
+    /// Whether the buffers that it reads are texel buffers, not storage buffers.
     reads_texels: bool,
     pub(crate) has_run: AtomicBool,
 }
@@ -91,7 +91,7 @@ impl Pipeline {
         Ok(pipeline)
     }
 
-    /// What a binding is.
+    /// The descriptor type of a binding.
     pub(crate) fn kind(&self, binding: u32) -> vk::DescriptorType {
         if self.reads_texels && binding + 1 < self.bindings {
             vk::DescriptorType::UNIFORM_TEXEL_BUFFER

@@ -1,5 +1,5 @@
-//! Passes over poses that are already there: up to the device, through one kernel, and
-//! back.
+//! Passes over poses: the poses are copied to the device, one kernel runs, and its result is
+//! copied back.
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
@@ -8,7 +8,7 @@ use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::{Kernel, PoseDispatch};
 
 impl VulkanEngine {
-    /// How many values of 16 bytes one pass takes.
+    /// The most values of 16 bytes that one pass takes.
     pub(crate) fn pass_limit(&self) -> usize {
         self.window()
     }

@@ -1,5 +1,5 @@
-//! An opened device that is kept at work: opened again when it is lost, asked for less at
-//! once when it has not the memory.
+//! An opened device, and recovery from its errors: a lost device is opened again, and work that
+//! runs out of memory is repeated in smaller windows.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -22,7 +22,7 @@ pub(crate) struct Opened {
     pub(crate) info: DeviceInfo,
 }
 
-/// What an error says of the device.
+/// An error that may come from a Vulkan device.
 pub(crate) trait OfDevice: From<VulkanError> {
     fn vulkan(&self) -> Option<&VulkanError>;
 }
@@ -43,8 +43,8 @@ impl OfDevice for EvaluateError {
 }
 
 impl Opened {
-    /// Opens a device and runs the canaries; refuses one that fails them, unless told
-    /// otherwise.
+    /// Opens a device and runs the self-test; refuses a device that fails it, unless the options
+    /// allow inexact ones.
     pub(crate) fn new(
         physical: &PhysicalDevice,
         options: &EngineOptions,
@@ -60,7 +60,7 @@ impl Opened {
         }
     }
 
-    /// As [`Opened::new`], a device that is open.
+    /// As [`Opened::new`], for a device that is open already.
     pub(crate) fn trusted(
         engine: VulkanEngine,
         options: &EngineOptions,
@@ -77,8 +77,8 @@ impl Opened {
         Arc::clone(&self.current.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Does some work, again on the same device opened anew when it is lost, at most
-    /// three times. What is done twice gives the same bits.
+    /// Runs `work`. When the device is lost, opens it again and repeats the work, at most three
+    /// times; repeated work gives the same bits.
     pub(crate) fn attempt<T, E: OfDevice>(
         &self,
         mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
@@ -100,8 +100,8 @@ impl Opened {
         work(&self.engine())
     }
 
-    /// Brings a clip's segments to the device; where memory is short, with what is kept for
-    /// the next evaluation given back.
+    /// Copies a clip's segments to the device. If memory is short, frees the buffers that are kept
+    /// for the next evaluation and tries again.
     pub(crate) fn upload(
         &self,
         clip: &ClipData,
@@ -115,8 +115,8 @@ impl Opened {
         })
     }
 
-    /// As [`Opened::attempt`]; where memory runs out, in pieces half as large, down to
-    /// 1 MiB.
+    /// As [`Opened::attempt`]; when memory runs out, repeats the work in windows half as large,
+    /// down to 1 MiB.
     pub(crate) fn attempt_smaller<T, E: OfDevice>(
         &self,
         mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
@@ -131,15 +131,16 @@ impl Opened {
         }
     }
 
-    /// Whether there is anything to be gained from another attempt.
+    /// Frees kept buffers and halves the windows; false when these are at their minimum, so that
+    /// another attempt would fail as well.
     fn shrink(&self) -> bool {
         let engine = self.engine();
         engine.give_back();
         engine.halve_windows()
     }
 
-    /// Puts the device opened anew in the place of one that is lost; false for an
-    /// application's own, which is the application's to open.
+    /// Opens a lost device again and replaces it; false for an application's own, which only the
+    /// application can open.
     fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
         let mut current = (self.current.write()).unwrap_or_else(PoisonError::into_inner);
         if !Arc::ptr_eq(&current, lost) {

@@ -1,5 +1,5 @@
-//! The walk over a result's windows: two are in flight, the host lists the work of one
-//! while the device does that of the other.
+//! The walk over a result's windows. Two are in flight: the host lists the work of one while the
+//! device evaluates the other.
 
 use std::collections::VecDeque;
 use std::sync::PoisonError;
@@ -17,7 +17,7 @@ use crate::shader::WORKGROUP;
 use crate::shader::{Dispatch, Kernel, List};
 
 impl VulkanEngine {
-    /// Evaluates a window of a result, in windows of its own.
+    /// Evaluates a window of a result, cut into smaller windows that suit the device.
     pub(crate) fn run(
         &self,
         job: Job<'_>,
@@ -25,7 +25,7 @@ impl VulkanEngine {
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        // Windows are as large as they may be with 16 bytes a rotation.
+        // `self.window()` counts rotations of 16 bytes; of larger ones a window holds fewer.
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
         let cut = |window: &Window| window.cut((self.window() / each).max(1));
         let mut windows = VecDeque::from(cut(window));
@@ -56,7 +56,7 @@ impl VulkanEngine {
                 break;
             }
         }
-        // Also after an error: what was submitted uses the caller's buffers.
+        // Also after an error: work that was submitted uses the caller's buffers.
         let oldest_first = slots.len();
         for i in 1..=oldest_first {
             let slot = &mut slots[(next + i) % oldest_first];
@@ -103,7 +103,7 @@ impl VulkanEngine {
             Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
             Target::Slice(_) => 0,
         };
-        // Where a binding may begin, whole rotations before it.
+        // The binding begins at an aligned offset, a whole number of rotations before the window.
         let mut aligned = start / alignment * alignment;
         while !(start - aligned).is_multiple_of(rotation) {
             aligned -= alignment;

@@ -1,6 +1,6 @@
-//! The work of windows with no more samples than spans, as those of dense keys, and with few
-//! explicit times of each track, as a crowd's poses: each sample is told by itself, in the
-//! place where it is stored.
+//! The sample list: work in which every sample of a window is listed by itself, in the order in
+//! which samples are stored. It serves dense keys (no more samples than spans) and sparse times (a
+//! few explicit times of each track, such as a crowd's poses); other windows are listed by runs.
 
 use rayon::prelude::*;
 
@@ -23,11 +23,11 @@ use crate::time::spans::{NONE, Part, Source};
 use crate::time::times::TimeLanes;
 use crate::time::wrap::TrackCopy;
 
-/// A window whose samples are told one by one.
+/// A window whose samples are listed one by one.
 pub(crate) struct Singles<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
-    /// Of each group that has any, in the order in which their samples lie.
+    /// The parts of each group that has any in the window, in the order of their samples.
     groups: Vec<GroupParts<'a>>,
 }
 
@@ -35,12 +35,12 @@ struct GroupParts<'a> {
     group: usize,
     prepared: &'a Prepared,
     parts: &'a [Part],
-    /// Where the first one's samples begin in the window.
+    /// Where the samples of the first part begin in the window.
     first: usize,
 }
 
 impl<'a> Singles<'a> {
-    /// Nothing where a window's work is listed by runs.
+    /// `None` for a window whose work is listed by runs.
     pub(crate) fn new(
         clip: &'a ClipData,
         timeline: &'a Timeline,
@@ -57,7 +57,8 @@ impl<'a> Singles<'a> {
             if own.is_empty() {
                 continue;
             }
-            // Parts have about as many spans each, which need not lie in their order.
+            // An estimate: spans need not lie in the order of the parts, which have about equally
+            // many.
             spans += prepared.spans.starts.len() * own.len() / prepared.parts.len();
             parts += own.len();
             groups.push((group, prepared, own));
@@ -65,7 +66,7 @@ impl<'a> Singles<'a> {
         let is_dense = timeline.len().saturating_mul(window.tracks.len()) <= spans;
         let are_told = match timeline.ticks {
             Ticks::Frames { .. } => is_dense,
-            // Times of a track in several parts may go back and forth between them.
+            // Explicit times may alternate between the parts of a track: each must have only one.
             Ticks::Times { .. } => parts == window.tracks.len() && (is_dense || samples <= FEW),
         };
         if !are_told {
@@ -91,12 +92,12 @@ impl<'a> Singles<'a> {
         (starts.clone().next() == Some(0) && starts.is_sorted()).then_some(all)
     }
 
-    /// Samples that are told.
+    /// How many samples are listed.
     pub(crate) fn count(&self) -> usize {
         self.window.len()
     }
 
-    /// Where the samples of a part begin in the window, if that part is before it.
+    /// Where the samples of a part begin in the window; `before` is the part listed before it.
     fn start(&self, prepared: &Prepared, part: &Part, before: Option<&Part>) -> usize {
         let Window {
             samples, tracks, ..
@@ -114,7 +115,7 @@ impl<'a> Singles<'a> {
         row + (first as usize).clamp(samples.start, samples.end) - samples.start
     }
 
-    /// Writes them; `shift` is added to every place in the output.
+    /// Writes the list; `shift` is added to every place in the output.
     pub(crate) fn write(
         &self,
         mut singles: &mut [ListedSample],
@@ -172,7 +173,7 @@ impl<'a> Singles<'a> {
     }
 }
 
-/// What one thread writes.
+/// The piece of the list that one thread writes.
 struct Piece<'a> {
     all: &'a Singles<'a>,
     prepared: &'a Prepared,
@@ -214,10 +215,10 @@ impl InLanes for Piece<'_> {
     }
 }
 
-/// A sample that nothing gives, or the host.
+/// A sample outside every segment, or one that the host computes in f64.
 const NOTHING: ListedSample = held(0);
 
-/// A constant.
+/// A sample that is a constant.
 const fn held(constant: u32) -> ListedSample {
     ListedSample {
         source: constant | IS_CONSTANT,
@@ -239,15 +240,15 @@ impl Emit for PartSamples<'_, '_> {
 }
 
 impl Piece<'_> {
-    /// Tells the samples of a run, as far as they are this piece's and not told yet.
+    /// Lists the samples of a run that belong to this piece and are not listed yet.
     #[inline(always)]
     fn tell(&mut self, track: usize, run: Run) {
         let Singles {
             timeline, window, ..
         } = *self.all;
         let place = window.place(track, run.sample);
-        // Where two parts meet, each settles by itself whose a sample is that is theirs but
-        // for rounding.
+        // A sample within rounding of the boundary between two parts may come from both: the first
+        // one counts.
         let skipped = (self.first + self.told).saturating_sub(place);
         let from = (place + skipped - self.first).min(self.singles.len());
         let to = (place + run.count)
@@ -298,8 +299,8 @@ impl Piece<'_> {
         }
     }
 
-    /// Tells few explicit times of each track: what is looked up, then what is worked out, of
-    /// some of them together.
+    /// Lists sparse times, a block at a time: first each sample is looked up, then the parameters
+    /// of all are computed in lanes.
     #[inline(always)]
     fn tell_few(&mut self, times: &[f64], stride: usize) {
         let samples = self.all.window.samples.clone();
@@ -325,7 +326,8 @@ impl Piece<'_> {
         }
     }
 
-    /// What gives a sample of a part, and from when till when.
+    /// The source of a sample, and the start and end of its segment in seconds; 0 and 1 for a
+    /// constant.
     #[inline(always)]
     fn look_up(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
         let (prepared, time) = (self.prepared, times[sample]);
@@ -345,8 +347,8 @@ impl Piece<'_> {
         )
     }
 
-    /// The constant that gives a sample where that takes more than to look, or the host does.
-    /// Apart, so that what is usual stays small.
+    /// The constant of a sample outside the keys, or 0 for one that the host computes in f64. A
+    /// function of its own, so that the usual path stays small.
     #[inline(never)]
     fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
         let (all, track) = (self.all, part.track as usize);
@@ -354,7 +356,7 @@ impl Piece<'_> {
         (self.prepared.spans).runs_of_times(part, times, sample..sample + 1, &mut found);
         match found.first().map(|run| run.source) {
             Some(RunSource::Constant(constant)) => constant,
-            // Every time lies somewhere in a whole track, or outside, where no segment goes on.
+            // Neither occurs: outside the keys of a whole track lie constants or f64 curves.
             Some(RunSource::Segment { .. }) | None => 0,
             Some(RunSource::Exact { index, parameter }) => {
                 let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);

@@ -1,5 +1,5 @@
-//! Canaries: before a device is trusted it computes a fixed set of inputs, and
-//! every bit is compared with the CPU.
+//! The self-test: before a device is trusted it computes a fixed set of inputs, and every bit is
+//! compared with the CPU's. Each check of it is a canary.
 
 use crate::gpu::error::EvaluateError;
 use crate::shader::Kernel;
@@ -29,7 +29,7 @@ use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 use crate::twin::self_test::reply;
 
-/// How a device did on one canary.
+/// How a device did on one canary, a check of the self-test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CanaryReport {
@@ -97,7 +97,7 @@ fn differing(a: &[Quat], b: &[Quat]) -> usize {
     a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count()
 }
 
-/// Two seconds of uneven keys on several axes, from tiny to half-turn steps.
+/// Five seconds of uneven keys on several axes, with steps from tiny to large.
 fn hostile_set() -> TrackSet {
     let mut set = TrackSet::new();
     let times = [0.0, 0.04, 1.0, 1.25, 2.5, 4.0, 5.0];
@@ -117,7 +117,7 @@ fn hostile_set() -> TrackSet {
 /// One of a reply's results.
 type Value = fn(&Reply) -> f32;
 
-/// The single expressions of `canary.wgsl`.
+/// The single expressions of `shaders/self_test.wgsl`.
 fn expressions(
     device: &Arc<LogicalDevice>,
     exactness: Exactness,
@@ -228,8 +228,8 @@ mod tests {
     use crate::gpu::options::Reads;
     use crate::gpu::physical::{DeviceKind, list};
 
-    /// A comparison that cannot fail proves nothing: without the decorations
-    /// lavapipe folds `(a + b) - a`, and its canary must sing.
+    /// A comparison that cannot fail proves nothing: without the decorations lavapipe folds `(a +
+    /// b) - a`, and that check must fail.
     #[test]
     fn canaries_fail_on_a_driver_that_is_left_free() {
         let devices = list(false).unwrap_or_default();

@@ -13,7 +13,7 @@ use crate::gpu::pipeline::Pipeline;
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
 
-/// No kernel binds more buffers.
+/// The most buffers that a kernel binds.
 const MOST_BINDINGS: u32 = 5;
 
 /// Command buffer, fence and descriptor pool, used again and again.
@@ -39,22 +39,22 @@ pub(crate) struct Spent {
     pub(crate) submitted: Instant,
     /// When its fence was seen.
     pub(crate) finished: Instant,
-    /// On the device, by its own clock; zero where it has none.
+    /// How long it ran, by the device's own clock; zero where it has none.
     pub(crate) on_device: Duration,
 }
 
-/// A stretch of a buffer that a kernel sees.
+/// A range of a buffer that a kernel sees.
 #[derive(Clone, Copy)]
 pub(crate) struct Binding {
     pub(crate) buffer: vk::Buffer,
-    /// As texels, all of the buffer; where a kernel reads it so.
+    /// A view of the whole buffer as texels; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     pub(crate) offset: u64,
     pub(crate) size: u64,
 }
 
 impl Binding {
-    /// A stretch of a buffer that no kernel reads as texels.
+    /// A range of a buffer that no kernel reads as texels.
     pub(crate) fn stretch(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
         Self {
             buffer,
@@ -242,7 +242,7 @@ impl Submission {
         }
     }
 
-    /// Records that what was written before `from` is seen after `to`.
+    /// Records a barrier: what `from` wrote before it is visible to `to` after it.
     pub(crate) fn barrier(&mut self, from: Access, to: Access) {
         let (source_stage, source_access) = from.scope(true);
         let (destination_stage, destination_access) = to.scope(false);
@@ -306,7 +306,7 @@ impl Submission {
                 });
             }
             waited => {
-                // What a lost device was doing has ended.
+                // The work of a lost device has ended.
                 if waited != Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY)
                     && waited != Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
                 {

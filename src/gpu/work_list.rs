@@ -1,4 +1,4 @@
-//! The work list of one window of the output.
+//! The work list of one window of the output: items, each some consecutive samples of one segment.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ use crate::time::spans::Part;
 /// What the device and the host have to do in a window.
 pub(crate) struct Work {
     pub(crate) list: List,
-    /// What is listed of each group lies one behind the other.
+    /// The groups, in the order in which their items lie in the list.
     pub(crate) groups: Vec<GroupItems>,
     /// Rotations that the host computed.
     pub(crate) patches: Vec<Patch>,
@@ -27,9 +27,9 @@ pub(crate) struct Work {
 /// How much the device has to do for one group of a clip.
 pub(crate) struct GroupItems {
     pub(crate) group: usize,
-    /// Items, or single samples.
+    /// How many items, or samples of a sample list.
     pub(crate) items: u32,
-    /// Where the first of single samples is stored.
+    /// Where the first sample of a sample list is stored.
     pub(crate) first_output: u32,
 }
 
@@ -42,8 +42,8 @@ pub(crate) struct GroupWork {
     pub(crate) chunks: Vec<WorkChunk>,
 }
 
-/// A piece of a work list, made by one thread. The `first` of items that take their
-/// distances from `distances` counts from the chunk's own first.
+/// A piece of a work list, made by one thread. Where items take their distances from `distances`,
+/// their `first` is an index into those of the chunk.
 #[derive(Default)]
 pub(crate) struct WorkChunk {
     pub(crate) items: Vec<Item>,
@@ -71,8 +71,8 @@ impl GroupWork {
     }
 }
 
-/// Parts of a group that one thread turns into items: so many, and more where there are
-/// fewer samples.
+/// Parts of a group that one thread turns into items: at least this many, and more while they have
+/// fewer samples than `SAMPLES_PER_CHUNK`.
 const PARTS_PER_CHUNK: usize = 64;
 const SAMPLES_PER_CHUNK: usize = 4096;
 
@@ -80,7 +80,7 @@ pub(crate) fn parts_per_chunk(window: &Window) -> usize {
     (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK)
 }
 
-/// The parts of a group that a window's tracks have.
+/// The parts of a group that belong to a window's tracks.
 pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part] {
     let from = |track: usize| {
         let is_before = |part: &Part| (part.track as usize) < track;
@@ -89,9 +89,9 @@ pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part
     &prepared.parts[from(window.tracks.start)..from(window.tracks.end)]
 }
 
-/// The work lists of a window: one for each group that has any of its tracks. `shift` is
-/// added to every place in the output; `spare` are chunks to use again, whose memory would
-/// cost more than their work.
+/// The work lists of a window: one for each group that has any of its tracks. `shift` is added to
+/// every place in the output. `spare` are emptied chunks to use again: fresh memory would cost
+/// more than listing.
 pub(crate) fn work(
     clip: &ClipData,
     timeline: &Timeline,
@@ -128,7 +128,7 @@ pub(crate) fn work(
     Ok(all)
 }
 
-/// What some parts of a group have to do.
+/// Lists the work of some parts of a group.
 struct PartsList<'a> {
     prepared: &'a Prepared,
     parts: &'a [Part],
@@ -166,7 +166,7 @@ impl InLanes for PartsList<'_> {
     }
 }
 
-/// The runs of one part, as items.
+/// Turns the runs of one part into items.
 struct RunItems<'a> {
     prepared: &'a Prepared,
     timeline: &'a Timeline,
@@ -219,7 +219,8 @@ impl Emit for RunItems<'_> {
     }
 }
 
-/// The item of so many samples; of what the host evaluates it stores nothing.
+/// The item of `count` samples of a run. For a run that the host evaluates its count is 0, and it
+/// stores nothing.
 #[inline(always)]
 pub(crate) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
     let (source, count, scale, offset) = match source {

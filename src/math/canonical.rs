@@ -6,8 +6,8 @@ use glam::{DQuat, Quat};
 use crate::math::quaternion::Quaternion;
 use crate::shader::TINY_BITS;
 
-/// The value with every magnitude below 2^-64 replaced by +0, in inputs and in outputs:
-/// drivers may flush subnormals, and nothing within 2^62 of one remains.
+/// Replaces a magnitude below 2^-64 by +0, in inputs and outputs of kernels. Drivers may flush
+/// subnormals, which lie below 2^-126: what remains is at least 2^62 times as large.
 /// Twin: `shaders/math/canonical.wgsl`.
 #[inline(always)]
 pub(crate) fn canonical(value: f32) -> f32 {
@@ -15,17 +15,17 @@ pub(crate) fn canonical(value: f32) -> f32 {
     if magnitude < TINY_BITS { 0.0 } else { value }
 }
 
-/// In a sum with it what lies behind the point is rounded away.
+/// Neighbouring f64 numbers are 1 apart here, so that adding this rounds the fraction away.
 const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
 
-/// The whole number nearest to `x`, for |x| < 2^51: what lies behind the point is
-/// rounded away in the sum. A call to `round` costs more than all else here.
+/// The whole number nearest to `x`, for |x| < 2^51. A call of `round` would take longer than the
+/// rest of a loop that uses it.
 #[inline(always)]
 pub(crate) fn nearest_whole(x: f64) -> f64 {
     (x + SHIFT) - SHIFT
 }
 
-/// A whole number below 2^51 as an integer: a conversion that saturates takes branches.
+/// A whole number below 2^51 as an integer. Rust's `as` saturates, which takes branches.
 #[inline(always)]
 pub(crate) fn whole_number(x: f64) -> i64 {
     (x + SHIFT).to_bits() as i64 - SHIFT.to_bits() as i64

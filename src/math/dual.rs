@@ -1,27 +1,28 @@
-//! What a curve's formula can be evaluated in: a plain number, or one that carries its
-//! first two derivatives. Formulas are written once, for either.
+//! The numbers in which a curve's formula can be evaluated: f64 over the full range of angles,
+//! polynomials in the principal range, or dual numbers, which carry two derivatives. Each formula
+//! is written once, for all of them.
 
 use std::ops::{Add, Mul, Sub};
 
 use crate::math::quaternion::{Real, arc_tangent, sine_cosine};
 use crate::math::ranges::{near_arc_square, near_waves};
 
-/// A number that depends on time.
+/// A number that depends on the curve's parameter.
 pub(crate) trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// What does not depend on it: f64, or a vector of them.
+    /// A number that does not depend on it: f64, or a vector of f64.
     type Constant: Real;
-    /// A number that does not depend on time.
+    /// Makes a number of a constant.
     fn constant(value: Self::Constant) -> Self;
-    /// The same for all.
+    /// Makes a number of the same constant in every lane.
     #[inline(always)]
     fn all(value: f64) -> Self {
         Self::constant(Self::Constant::all(value))
     }
-    /// `sin(x)/x` and `cos(x)`, given `x²`: both are smooth in it, also at 0.
+    /// `sin(x)/x` and `cos(x)`, given `x²`: both are smooth functions of it, also at 0.
     fn waves(self) -> (Self, Self);
-    /// `x²`, given `sin²(x/2)`, 0 to 1: for `x` up to pi.
+    /// `x²`, given `sin²(x/2)`, for `x` up to pi.
     fn arc_square(self) -> Self;
     /// `1/√x`, for `x > 0`.
     fn reciprocal_root(self) -> Self;
@@ -63,14 +64,14 @@ impl Scalar for f64 {
     }
 }
 
-/// `1/√x`; what is no curve any more shall still be a number.
+/// `1/√x`, limited to 1e150: where a curve degenerates, its values stay numbers.
 #[inline(always)]
 fn reciprocal_root<R: Real>(x: R) -> R {
     R::all(1.0) / x.root().larger(R::all(1e-150))
 }
 
-/// By polynomials alone, without a range reduction, a root or a division for each angle.
-/// NaN, which stays, where an angle is more than pi/2.
+/// A number for the principal range: angles up to pi/2, by polynomials alone, without a range
+/// reduction, a root or a division for each. A longer angle makes the result NaN.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Near<R>(pub(crate) R);
 
@@ -126,7 +127,7 @@ impl<R: Real> Scalar for Near<R> {
     }
 }
 
-/// A number with its first and second derivative.
+/// A dual number of the second order: a value with its first and second derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jet {
     pub(crate) value: f64,
@@ -135,7 +136,7 @@ pub(crate) struct Jet {
 }
 
 impl Jet {
-    /// The parameter itself.
+    /// The parameter itself, whose first derivative is 1.
     pub(crate) fn parameter(value: f64) -> Self {
         Self {
             value,
@@ -144,7 +145,7 @@ impl Jet {
         }
     }
 
-    /// A function of it, given the function's value and derivatives there.
+    /// A function of this number by the chain rule, given the function's value and derivatives.
     fn chain(self, [value, first, second]: [f64; 3]) -> Self {
         Self {
             value,
@@ -213,7 +214,9 @@ impl Scalar for Jet {
     fn waves(self) -> (Self, Self) {
         let z = self.value;
         let (sinc, cosine) = z.waves();
-        // S' = (C - S)/2z and 4z S'' + 6 S' + S = 0; C' = -S/2.
+        // With S = sin(x)/x, C = cos(x) and derivatives by z = x²: `S' = (C - S)/2z`,
+        // `4z S'' + 6 S' + S = 0` and `C' = -S/2`. For small z the differences lose their digits,
+        // and a power series is used.
         let [first, second] = if z < 0.5 {
             let mut coefficients = [1.0; 12];
             for k in 1..12 {
@@ -235,7 +238,7 @@ impl Scalar for Jet {
     fn arc_square(self) -> Self {
         let u = self.value;
         let square = u.arc_square();
-        // A = 4 asin²(√u), u(1-u) A'' + (1/2 - u) A' = 2.
+        // The result A = 4 asin²(√u) satisfies u(1-u) A'' + (1/2 - u) A' = 2.
         if u < 0.02 {
             // asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
             let mut coefficients = [0.0; 12];
@@ -247,7 +250,7 @@ impl Scalar for Jet {
             let [_, first, second] = series(&coefficients, u);
             return self.chain([square, first, second]);
         }
-        // Towards 1 it bends without limit; what comes of it there is refused as a fit.
+        // Towards u = 1 the derivatives grow without limit; a fit to such values is refused.
         let rest = u * (1.0 - u).max(1e-30);
         let first = 2.0 * (square / rest).sqrt();
         self.chain([square, first, (2.0 - (0.5 - u) * first) / rest])
@@ -264,7 +267,7 @@ impl Scalar for Jet {
 mod tests {
     use super::*;
 
-    /// Catches a wrong derivative, and a series that is left too late.
+    /// Catches a wrong derivative, and a series that is used too far from 0.
     #[test]
     fn derivatives_are_those_of_the_values() {
         type Function = (fn(Jet) -> Jet, fn(f64) -> f64);

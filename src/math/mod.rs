@@ -1,4 +1,5 @@
-//! TODO-DOC
+//! Arithmetic with the same bits on every machine: quaternions in f64, exponential and logarithm,
+//! dual numbers, and the rounding of what a kernel reads.
 
 pub(crate) mod canonical;
 pub(crate) mod dual;

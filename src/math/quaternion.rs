@@ -3,15 +3,15 @@
 //! multiplication, division and square root, each rounded once as IEEE 754 says, so
 //! that every machine and every vector width gives the same bits.
 //!
-//! Plain arrays, `x y z w`: glam's types would keep such a loop scalar. What is generic over
-//! [`Real`] is written for vectors of f64 too.
+//! Quaternions are plain arrays, `x y z w`: glam's types would keep such a loop scalar. Functions
+//! that are generic over [`Real`] also take vectors of f64.
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::math::canonical::nearest_whole;
 
-/// What sums and products are made of, be it a number or a vector of them.
+/// A number, or a vector of numbers, that can be added, subtracted, multiplied and negated.
 pub(crate) trait Arithmetic:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
@@ -22,7 +22,7 @@ impl<N> Arithmetic for N where
 {
 }
 
-/// f64, or a vector of them: what holds for one is said of each.
+/// An f64, or a vector of f64, on whose lanes every function works separately.
 pub(crate) trait Real: Arithmetic + Div<Output = Self> {
     /// The same in every lane.
     fn all(value: f64) -> Self;
@@ -30,11 +30,11 @@ pub(crate) trait Real: Arithmetic + Div<Output = Self> {
     /// The square root.
     fn root(self) -> Self;
 
-    /// The smaller and the larger of two numbers; `other` where one of them is none.
+    /// The smaller of two numbers; `other` if either is NaN. `larger` likewise.
     fn smaller(self, other: Self) -> Self;
     fn larger(self, other: Self) -> Self;
 
-    /// `then` up to a limit, else `otherwise`; also where one of them is no number.
+    /// `then` if the number is at most `limit`, else `otherwise`, also if either is NaN.
     fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self;
 }
 
@@ -100,8 +100,8 @@ pub(crate) fn sum<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// `a / b` for positive numbers, at most 1e150: between keys that are next to nothing
-/// apart tangents are meaningless, but they stay numbers.
+/// `a / b` for positive numbers, limited to 1e150: tangents between keys that are almost at the
+/// same time are meaningless, but stay finite.
 #[inline(always)]
 pub(crate) fn ratio<R: Real>(a: R, b: R) -> R {
     (a / b).smaller(R::all(1e150))
@@ -124,7 +124,8 @@ pub(crate) fn step<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     product([-a[0], -a[1], -a[2], a[3]], b)
 }
 
-/// A key in f64, normalised: two steps of Newton's, from keys that are unit to f32.
+/// A key in f64, normalised. Two of Newton's steps suffice for a key that is unit within the
+/// rounding of f32.
 #[inline(always)]
 pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
     let q = [
@@ -136,7 +137,7 @@ pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
     normalised(q)
 }
 
-/// As [`unit()`], of its components in f64.
+/// As [`unit()`], for components that are in f64 already.
 #[inline(always)]
 pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
     let square = dot(q, q);
@@ -146,7 +147,7 @@ pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
     [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 
-/// pi/2 in parts of 24 bits: a whole number below 2^29 times each is exact.
+/// pi/2 as a sum of parts of 24 bits, so that a part times a whole number below 2^29 is exact.
 const HALF_PI: [f64; 4] = [
     1.570_796_251_296_997,
     7.549789415861596e-8,
@@ -154,11 +155,11 @@ const HALF_PI: [f64; 4] = [
     3.2820035428735005e-22,
 ];
 
-/// Sine and cosine, within 2e-16 up to 8e8 radians; beyond, some pair of them.
+/// Sine and cosine, within 2e-16 up to 8e8 radians; beyond, those of some other angle.
 /// Coefficients: fdlibm (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
 #[inline(always)]
 pub(crate) fn sine_cosine(x: f64) -> (f64, f64) {
-    // The whole part of x / (pi/2), and in the last bits its quadrant.
+    // The whole number nearest to x / (pi/2); its last bits are the quadrant.
     const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
     let shifted = x * FRAC_2_PI + SHIFT;
     let whole = shifted - SHIFT;
@@ -214,7 +215,8 @@ const ARC_TANGENT: [f64; 11] = [
 /// The arc tangent of `t`, 0 <= t <= 1, within 5e-16 of it, relative.
 #[inline(always)]
 pub(crate) fn arc_tangent(t: f64) -> f64 {
-    // That of half the angle, twice: a wild tangent multiplies an angle's error.
+    // Twice the arc tangent of half the angle, which the polynomial gives to the last digits: long
+    // tangents of a curve multiply an angle's error.
     let half = t / (1.0 + (1.0 + t * t).sqrt());
     let z = half * half;
     let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = ARC_TANGENT;
@@ -267,7 +269,7 @@ pub(crate) fn log_near(q: Quaternion, near: Vector) -> Vector {
     let principal = log_toward(q, near);
     let own = length(principal);
     let far = length(near);
-    // A principal logarithm of (almost) nothing still has branches along `near`.
+    // If the principal logarithm is almost zero it has no axis, and its branches lie along `near`.
     let has_axis = own > 1e-9;
     let to_own = if has_axis { 1.0 / own } else { 0.0 };
     let to_near = if !has_axis && far > PI {

@@ -1,5 +1,5 @@
-//! Exponentials, logarithms and waves of short angles, by polynomials alone, and what holds
-//! where these do not.
+//! Exponentials, logarithms, sines and cosines in the principal range, half-angles up to pi/2, by
+//! polynomials alone; and exponentials and logarithms over the full range for the rest.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,9 +7,9 @@ use crate::math::quaternion::{
     Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled, square,
 };
 
-/// The exponentials and logarithms that a method's rule is made of. Two of them:
-/// [`Near`] for vector lanes, and [`Anywhere`] for the lanes where it does not hold,
-/// so that a lane's result depends on nothing but its own numbers.
+/// The exponentials and logarithms that a method's rule is made of. There are two: [`Near`] for the
+/// principal range, in vector lanes, and [`Anywhere`] for the full range, for single lanes outside
+/// it. So a lane's result depends on nothing but its own numbers.
 pub(crate) trait Algebra {
     /// f64, or a vector of them.
     type Number: Real;
@@ -21,7 +21,7 @@ pub(crate) trait Algebra {
     fn log_toward(&mut self, q: [Self::Number; 4], axis: [Self::Number; 3]) -> [Self::Number; 3];
     /// See [`log_near`].
     fn log_near(&mut self, q: [Self::Number; 4], near: [Self::Number; 3]) -> [Self::Number; 3];
-    /// The logarithm of a step, of which `near` is [`Near`]'s.
+    /// The logarithm of a step between keys; `near` is the one that [`Near`] gave.
     fn log_of_step(
         &mut self,
         step: [Self::Number; 4],
@@ -29,7 +29,7 @@ pub(crate) trait Algebra {
     ) -> [Self::Number; 3];
 }
 
-/// Everything, at its price: square roots, divisions and a range reduction for each.
+/// The full range, at the price of square roots, divisions and range reductions.
 pub(crate) struct Anywhere;
 
 impl Algebra for Anywhere {
@@ -55,16 +55,16 @@ impl Algebra for Anywhere {
         log_near(q, near)
     }
 
-    // A wild tangent multiplies the error of a step's logarithm.
+    // Not `near`, which is within 1e-12: a long tangent multiplies the error of a step's logarithm.
     #[inline(always)]
     fn log_of_step(&mut self, step: Quaternion, _: Vector) -> Vector {
         log(step)
     }
 }
 
-/// Half-angles up to pi/2, by polynomials alone: within 1e-12.
+/// The principal range: half-angles up to pi/2, by polynomials alone, within 1e-12.
 pub(crate) struct Near<R> {
-    /// 0 as long as every argument was within the range, else 1.
+    /// 0 as long as every argument was in the principal range, else 1.
     pub(crate) doubt: R,
 }
 
@@ -171,8 +171,8 @@ const ARC_SQUARE: [f64; 16] = [
     1.276311607352811,
 ];
 
-/// `1 + x (c₀ + c₁ x + …)`, four coefficients at a time: a chain of a quarter as many
-/// operations. Their number is a multiple of four.
+/// `1 + x (c₀ + c₁ x + …)`, four coefficients at a time, so that the chain of dependent operations
+/// is a quarter as long. The number of coefficients is a multiple of four.
 #[inline(always)]
 fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
     let square = x * x;
@@ -245,7 +245,7 @@ impl<R: Real> Near<R> {
 
     #[inline(always)]
     fn check(&mut self, value: R, limit: f64) {
-        // NaN does not pass.
+        // NaN sets the doubt too.
         self.doubt = value.up_to(R::all(limit), self.doubt, R::all(1.0));
     }
 }
@@ -275,7 +275,7 @@ impl<R: Real> Algebra for Near<R> {
 
     #[inline(always)]
     fn log_near(&mut self, q: [R; 4], near: [R; 3]) -> [R; 3] {
-        // No other branch is nearer.
+        // Up to this length of `near` no other branch is nearer than the principal one.
         self.check(square(near), 1.5 * 1.5);
         self.log(q)
     }

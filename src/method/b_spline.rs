@@ -14,9 +14,9 @@ use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
-/// The cumulative cubic B-spline: the smoothest, but it only nears its keys. Its knots
-/// are the key times, even or not; before the first and behind the last they go on in
-/// steps as long as the last.
+/// The cumulative cubic B-spline: the smoothest method, but it passes near its keys and not through
+/// them. Its knots are the key times, even or not; before the first and after the last key they
+/// continue in steps as long as the interval there.
 pub const B_SPLINE: Method = Method {
     name: "b-spline",
     summary: "continuous angular acceleration; passes near its keys, not through them",
@@ -42,7 +42,8 @@ pub const B_SPLINE: Method = Method {
 static CURVES: Curves =
     Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing)));
 
-/// The lengths of the two intervals before one, and of the two behind it, in its own.
+/// The durations of the two intervals before this one and of the two after it, in units of its own
+/// duration.
 fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
     let last = track.times.len() as isize - 2;
     let closed = matches!(interpolation.ends, Ends::Loop);
@@ -60,8 +61,8 @@ fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f6
     [others, [0.0; 4]]
 }
 
-/// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval
-/// of length 1, of whose neighbours the lengths are given.
+/// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval of length
+/// 1, from the lengths of the two intervals before it and of the two after it.
 fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
     let first = 1.0 / ((1.0 + before) * (1.0 + before + before_that));
     let third = 1.0 / ((1.0 + after) * (1.0 + after + after_that));
@@ -83,7 +84,7 @@ fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     for stretch in stretches {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
-            continue; // the neighbours are those across the seam
+            continue; // the context already has the neighbours across the seam
         }
         let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
         let (first, last) = (stretch.first(), stretch.last());
@@ -118,7 +119,7 @@ fn before_first(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> 
     rotate(scaled(own, value2), scaled(rest, 1.0 / slope1))
 }
 
-/// The logarithm that continues the curve behind the last interval.
+/// The logarithm that continues the curve after the last interval.
 fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
     let own = intervals.log(lane);
     if alone {
@@ -132,7 +133,7 @@ fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Ve
         End::Secant => own,
         End::Clamped(half) => scaled(half, intervals.duration(lane)),
     };
-    // The unknown also turns the frame in which the own slope is seen.
+    // The unknown step also rotates the slope of the own step, so the equation is iterated.
     let own_slope = c1 + 2.0 * c2 + 3.0 * c3;
     (0..END_ITERATIONS).fold(own, |step, _| {
         let turned = rotate(scaled(step, -value3), own);
@@ -141,7 +142,7 @@ fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Ve
     })
 }
 
-/// The parabola through the last three keys, one interval further.
+/// The logarithm of one more interval of the parabola through the three keys at an end.
 fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
     let (own, other) = (intervals.log(lane), intervals.log(next));
     let (h, next_h) = (intervals.duration(lane), intervals.duration(next));
@@ -149,7 +150,7 @@ fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
     sum(own, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
 }
 
-/// Each iteration shrinks the error by at least a fifth, by more than half as a rule.
+/// Each iteration reduces the error by at least a fifth, and usually by more than half.
 const END_ITERATIONS: usize = 120;
 
 /// `exp(a) v exp(-a)`.

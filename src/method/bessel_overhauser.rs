@@ -51,8 +51,8 @@ impl HandleRule for Rule {
         after: Interval<A::Number>,
     ) -> Handles<A::Number> {
         let both = before.duration + after.duration;
-        // The slope of each side, weighted by the other side's step, left one first:
-        // only so does it equal Catmull-Rom on uniform keys.
+        // The slope on each side is weighted by the other side's duration. The left factor comes
+        // first: otherwise the curve would not equal Catmull-Rom on uniform keys.
         let left = scaled(
             algebra.log_of_step(before.step, before.log),
             ratio(after.duration, before.duration),

@@ -1,5 +1,5 @@
-//! Bessel-Overhauser by the mean of the slopes: the parabola through three keys, in
-//! logarithms.
+//! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
+//! through three keys, computed with logarithms.
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::{HandleRule, Handles, Interval};
@@ -55,8 +55,8 @@ impl HandleRule for Rule {
     }
 }
 
-/// The handle towards an interval that lasts `duration`: of the slopes of both sides, each
-/// weighted by the other side's step, and by a weight of its own.
+/// The handle towards an interval that lasts `duration` seconds: the mean of the slopes on both
+/// sides, each weighted by the other side's duration and by a factor of its own.
 #[inline(always)]
 pub(crate) fn handle<R: Real>(
     before: Interval<R>,

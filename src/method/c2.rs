@@ -20,11 +20,11 @@ use crate::tracks::signs::Signs;
 /// and the angular velocities at the keys are such that the angular acceleration is
 /// continuous. Every key moves all of the curve, less and less with distance.
 ///
-/// Backwards in time it is another curve: a cubic seen from one key is none seen from the
-/// next.
+/// Backwards in time it is another curve: a rotation vector that is a cubic as seen from one key is
+/// no cubic as seen from the next.
 ///
-/// Where it would pass a key faster than a turn per interval, as at a short interval
-/// beside a long one, only its velocity is continuous.
+/// Where it would pass a key faster than one turn per interval, as at a short interval beside a
+/// long one, only its velocity is continuous.
 pub const C2: Method = Method {
     name: "c2",
     summary: "continuous angular acceleration through keys at any times",
@@ -56,7 +56,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
         let log = intervals.log(lane);
         let turn = Turn::new(DVec3::from_array(scaled(log, 2.0)));
-        // Half of θ' at both ends.
+        // Half of θ' at both ends, per unit of the parameter.
         let start = scaled([x, y, z], half);
         let end = scaled((turn.to_rate * DVec3::new(u, v, w)).to_array(), half);
         let both = sum(start, end);
@@ -71,13 +71,14 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     }
 }
 
-/// Keys solved for together. Where such a window ends and the track goes on, [`MARGIN`]
-/// more keys are: their influence fades to a quarter from key to key.
+/// The number of keys whose velocities are solved together. Where the track continues beyond such
+/// a window, [`MARGIN`] more keys are added to the equations: the influence of a key fades to a
+/// quarter from key to key.
 const WINDOW: usize = 1024;
 const MARGIN: usize = 64;
 
-/// The angular velocities at the keys of some intervals. They do not depend on which
-/// intervals are asked for together: windows lie where they lie.
+/// The angular velocities at the keys of some intervals. They do not depend on which intervals are
+/// asked for together, because windows always start at multiples of [`WINDOW`].
 fn velocities(
     track: Track,
     signs: Signs<'_>,
@@ -100,7 +101,7 @@ fn velocities(
     velocities
 }
 
-/// The velocities at a window of keys, and which key is the first of them.
+/// The velocities at a window of keys, and the place of the window's first key.
 fn solve(
     track: Track,
     signs: Signs<'_>,
@@ -127,10 +128,11 @@ fn solve(
     (first, Spline::new(&steps, [start, end]).velocities())
 }
 
-/// Seconds; what is shorter counts as this long, so that rates stay numbers.
+/// The shortest duration in seconds; a shorter interval counts as this long, so that its rates
+/// stay finite.
 const SHORTEST: f64 = 1e-150;
 
-/// One interval.
+/// One interval of a track.
 struct Step {
     /// Its length, seconds.
     duration: f64,
@@ -150,16 +152,16 @@ impl Step {
         }
     }
 
-    /// The angular velocity of slerp.
+    /// The angular velocity of slerp, in radians per second.
     fn secant(&self) -> DVec3 {
         self.turn.vector / self.duration
     }
 }
 
-/// A rotation vector, with how velocities are seen at its end.
+/// A rotation vector, with the matrices between its rate of change and the angular velocity.
 struct Turn {
     vector: DVec3,
-    /// From the angular velocity to the vector's rate of change, and back.
+    /// From the angular velocity at its end to the vector's rate of change, and back.
     to_rate: DMat3,
     from_rate: DMat3,
 }
@@ -192,7 +194,7 @@ impl Turn {
         }
     }
 
-    /// What of the angular acceleration depends on the vector's rate of change alone.
+    /// The part of the angular acceleration that is quadratic in the vector's rate of change.
     fn bend(&self, rate: DVec3) -> DVec3 {
         let square = self.vector.dot(self.vector);
         let angle = square.sqrt();
@@ -226,28 +228,28 @@ fn skew(v: DVec3) -> DMat3 {
     )
 }
 
-/// The equations for the velocities: for each key three, which hold its own velocity and
-/// its neighbours'. Linear, but for [`Turn::bend`], which is iterated.
+/// The equations for the velocities: three for each key, with its own velocity and those of its
+/// neighbours as unknowns. They are linear except for [`Turn::bend`], which is iterated.
 struct Spline<'a> {
     steps: &'a [Step],
-    /// Eliminated from the first key on: what is left of the upper blocks, and the
-    /// inverses of those on the diagonal.
+    /// The 3×3 blocks below and above the diagonal, and the inverses of the diagonal blocks after
+    /// elimination from the first key on.
     lower: Vec<DMat3>,
     upper: Vec<DMat3>,
     inverse: Vec<DMat3>,
-    /// The right sides without the bends, and what bends count.
+    /// The right sides without the bends, and the factor of the bend in each equation.
     given: Vec<DVec3>,
     scales: Vec<f64>,
-    /// Which equations may have a bend of the step before them.
+    /// The equations that contain the bend of the step before their key.
     bent: Range<usize>,
 }
 
-/// Radians an interval: where a key is passed faster, the bend is left out, and the
-/// acceleration is continuous only as it would be in flat space. With it there may be no
-/// solution, or none that iteration finds.
+/// The largest rate in radians per interval. Where a key is passed faster, its equation omits the
+/// bend, and the acceleration is not continuous there. With the bend there may be no solution, or
+/// none that iteration finds.
 const FASTEST: f64 = std::f64::consts::TAU;
 
-/// Sweeps at most; a dozen do where steps are below a right angle.
+/// The most iterations; a dozen suffice where steps are below a right angle.
 const SWEEPS: usize = 100;
 
 impl<'a> Spline<'a> {
@@ -298,7 +300,7 @@ impl<'a> Spline<'a> {
         }
         for (i, pair) in (1..).zip(steps.windows(2)) {
             let (h, next_h) = (pair[0].duration, pair[1].duration);
-            // Divided by 1/h + 1/next_h: no number is too large then.
+            // The equation is divided by 1/h + 1/next_h, so that no number overflows.
             let (left, right) = (next_h / (h + next_h), h / (h + next_h));
             spline.lower[i] = pair[0].turn.from_rate * (2.0 * left);
             spline.upper[i] = pair[1].turn.to_rate * (2.0 * right);
@@ -334,7 +336,7 @@ impl<'a> Spline<'a> {
                 break;
             }
         }
-        // Where the iteration flees, the bends are left out everywhere.
+        // If the iteration diverges, the bends are omitted everywhere.
         if velocities.iter().all(|velocity| velocity.is_finite()) {
             velocities
         } else {
@@ -342,7 +344,7 @@ impl<'a> Spline<'a> {
         }
     }
 
-    /// Solves for those right sides; by how much, relatively, the velocities change.
+    /// Solves for these right sides, and returns the largest relative change of a velocity.
     fn sweep(&self, mut sides: Vec<DVec3>, velocities: &mut [DVec3]) -> f64 {
         for i in 0..sides.len() {
             let above = match i {

@@ -10,9 +10,9 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
 use crate::reference;
 use crate::shader::Form;
 
-/// Catmull-Rom on rotations, in cumulative form. It ignores the time steps: on
-/// uneven keys its velocity jumps; [`BESSEL_OVERHAUSER`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER)
-/// is its cure.
+/// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
+/// on uneven keys;
+/// [`BESSEL_OVERHAUSER`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER) corrects this.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",
@@ -50,8 +50,8 @@ impl HandleRule for Rule {
         before: Interval<A::Number>,
         after: Interval<A::Number>,
     ) -> Handles<A::Number> {
-        // The two-step's half-angle may truly approach pi: its sign is never
-        // re-aligned.
+        // The half-angle of both steps together may approach pi, so its sign is not changed to the
+        // nearer one.
         let two_step = product(before.step, after.step);
         let toward = sum(before.log, after.log);
         let handle = scaled(

@@ -1,5 +1,5 @@
-//! Curves by handles: a method says what the handles of an inner key are; this says what
-//! happens at the ends, and makes curves of them.
+//! Curves by handles: a method gives the rule for the handles of inner keys; this file computes the
+//! handles at the ends of tracks, and the curves between handles.
 
 use std::marker::PhantomData;
 
@@ -69,7 +69,7 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
     }
 }
 
-/// What happens at one end.
+/// The condition at one end of a track.
 #[derive(Clone, Copy)]
 pub(crate) enum End {
     Parabolic,
@@ -105,8 +105,9 @@ impl Ends {
     }
 }
 
-/// The handle of an end's key towards the interval in `lane`, whose other handle is
-/// given, and what the step is without the rotation back by that.
+/// The handle of a track's first or last key towards the interval in `lane`. `other` is the handle
+/// of that interval's inner key; `without` returns the interval's step without that handle, given
+/// the exponential of its negative.
 fn end_handle<R: HandleRule>(
     intervals: &Intervals,
     lane: usize,

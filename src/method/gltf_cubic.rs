@@ -12,8 +12,8 @@ use crate::tracks::set::Track;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
 /// ([`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents)), normalised. Keys count
-/// with the signs that they are stored with, as the specification has it, whatever the
-/// path asked for. Without tangents they are 0.
+/// with the signs that they are stored with, as the specification has it, whatever path is
+/// asked for. In a track without tangents all of them are 0.
 pub const GLTF_CUBIC: Method = Method {
     name: "gltf-cubic",
     summary: "glTF's CUBICSPLINE, exactly as specified, with given tangents",
@@ -39,8 +39,7 @@ pub const GLTF_CUBIC: Method = Method {
 static CURVES: Curves =
     Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers)));
 
-/// The tangent with which an interval leaves its first key, and that with which it
-/// arrives at its last.
+/// The tangents with which an interval leaves its first key and reaches its last.
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     let tangent = |key: usize, side: usize| {
         let tangents = track.tangents.get(key);
@@ -59,15 +58,15 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         intervals.set_numbers(lane, 4, &outgoing);
         intervals.set_numbers(lane, 8, &incoming);
         intervals.set_numbers(lane, 12, &end);
-        // About how far it turns: what the tangents have along their keys only changes
-        // the length.
+        // An estimate of the squared extent: the component of a tangent along its key changes only
+        // the quaternion's length.
         let log = intervals.log(lane);
         let across = [cross3(start, outgoing), log, cross3(end, incoming)];
         intervals.set_energy(lane, across);
     }
 }
 
-/// As long as what is left of a tangent across its key.
+/// A vector as long as the component of a tangent that is orthogonal to its key.
 fn cross3(key: Quaternion, tangent: Quaternion) -> Vector {
     let along: f64 = key.iter().zip(tangent).map(|(k, t)| k * t).sum();
     let rest: [f64; 4] = std::array::from_fn(|c| tangent[c] - key[c] * along);

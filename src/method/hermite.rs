@@ -1,4 +1,4 @@
-//! Given angular velocities at the keys.
+//! The Hermite method: angular velocities at the keys are given.
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::BetweenHandles;

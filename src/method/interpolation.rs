@@ -15,24 +15,26 @@ use crate::tracks::set::Track;
 pub struct Interpolation {
     /// The method.
     pub method: Method,
-    /// Which way round, of the two.
+    /// Which of the two ways round between keys is taken.
     pub path: Path,
     /// What happens at the first and the last key.
     pub ends: Ends,
-    /// For [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS), where a track has none of its own.
+    /// Tension, continuity and bias for
+    /// [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS), for tracks that
+    /// have none of their own.
     pub tcb: Tcb,
-    /// What of the rotation is asked for.
+    /// The quantity to evaluate: the rotation, its velocity or its acceleration.
     pub quantity: Quantity,
-    /// How fast the curve is run through.
+    /// How fast the curve is traversed.
     pub speed: Speed,
-    /// What lies before a track's first key, and after its last.
+    /// The wrap mode before a track's first key.
     pub before: WrapMode,
-    /// See `before`.
+    /// The wrap mode after a track's last key.
     pub after: WrapMode,
 }
 
 impl Interpolation {
-    /// What the kernels evaluate for it.
+    /// The form that the kernels evaluate for it.
     #[must_use]
     pub fn form(&self) -> Form {
         match self.method.form {
@@ -52,8 +54,8 @@ impl Interpolation {
             && self.speed == Speed::AsKeyed
     }
 
-    /// How curves that turn little follow from keys alone, where every key counts with the
-    /// sign nearer to its predecessor's.
+    /// The rule for the tangent weights of small-angle curves straight from keys, if method and
+    /// options allow such curves.
     pub(crate) fn small_angle_weights(&self) -> Option<WeightRule> {
         let Curves::Smooth(smooth) = self.method.curves else {
             return None;
@@ -64,7 +66,8 @@ impl Interpolation {
         smooth.direct.filter(|_| suits).map(|direct| direct.weights)
     }
 
-    /// Whether arcs too are curves with a formula: for what follows from derivatives.
+    /// Whether arcs are prepared by their formula, as other curves are: velocities, accelerations,
+    /// extrapolation and constant speed need derivatives.
     pub(crate) fn is_by_formula(&self) -> bool {
         let extrapolates = [self.before, self.after].contains(&WrapMode::Extrapolate);
         let constant = self.speed == Speed::Constant;

@@ -1,8 +1,8 @@
 //! Methods: how the rotation between keys follows from the keys.
 //!
-//! One file per method, and the only place that names it. A method turns a track's
-//! keys into curves, one for each key interval; the few forms those curves have
-//! are what the kernels evaluate ([`Form`]). [`METHODS`] lists them all.
+//! Each method has a file of its own. A method turns a track's keys into curves, one for each key
+//! interval. The kernels evaluate these curves in one of a few forms ([`Form`]). [`METHODS`] lists
+//! all methods.
 
 pub(crate) mod b_spline;
 pub(crate) mod bessel_overhauser;
@@ -97,40 +97,39 @@ pub struct Method {
     pub continuity: Continuity,
     /// How smooth it is where keys are evenly spaced in time.
     pub continuity_on_even_keys: Continuity,
-    /// For which keys a rotation at constant velocity stays one.
+    /// The key times for which it keeps a rotation at constant angular velocity.
     pub keeps_constant_velocity: Keys,
     /// Whether it passes through its keys.
     pub interpolates: bool,
-    /// Whether it takes the same way when the keys are given backwards in time (with
-    /// tangents and bias the other way round).
+    /// Whether the curve is the same when the keys are given backwards in time (with tangents and
+    /// bias reversed).
     pub symmetric: bool,
-    /// Whether its curves depend on keys beyond the two that they join: then [`Ends`]
-    /// matter.
+    /// Whether its curves depend on more keys than the two that they join, so that [`Ends`] matter.
     pub uses_neighbours: bool,
-    /// What the kernels evaluate for it.
+    /// The form of its curves that the kernels evaluate.
     pub form: Form,
-    /// What it does at the ends where nothing else is asked for.
+    /// The ends that it has by default.
     pub ends: Ends,
-    /// The path that it always takes, where that is a part of its definition.
+    /// The path that it always takes, if its definition prescribes one.
     pub path: Option<Path>,
-    /// What it costs.
+    /// Its cost on one thread.
     pub cost: Cost,
     /// Its textbook definition in f64.
     pub reference: reference::Kind,
-    /// How its curves follow from the keys.
-    /// Behind a static: every crate that names a constant compiles the functions in it again,
-    /// with all that they call, for each vector width.
+    /// How its curves follow from the keys. This is a reference to a static because every crate
+    /// that names a constant would compile its functions again, and all that they call, for each
+    /// vector width.
     pub(crate) curves: &'static Curves,
 }
 
-/// What lies between two keys.
+/// The kind of curve between two keys.
 #[derive(Clone, Copy)]
 pub(crate) enum Curves {
-    /// The first of them.
+    /// The first key is held.
     Steps,
-    /// The great circle, at constant speed; and as a formula.
+    /// The great-circle arc at constant speed; its formula serves where derivatives are needed.
     Arcs(Smooth),
-    /// A curve with a formula.
+    /// A curve that is given by a formula.
     Smooth(Smooth),
 }
 
@@ -138,33 +137,32 @@ pub(crate) enum Curves {
 #[derive(Clone, Copy)]
 pub(crate) struct Smooth {
     pub(crate) shape: &'static Shape,
-    /// Gives every interval of a block the numbers of its curve, with those ends where a
-    /// track ends.
+    /// Sets the numbers of every curve in a block, with these ends where a track ends.
     pub(crate) curves: fn(&mut Intervals, &[Stretch], Ends),
     pub(crate) given: Given,
-    /// Two keys that are alone are joined at constant velocity, whatever the ends.
+    /// Whether a track of two keys turns at constant velocity, whatever the ends.
     pub(crate) steady_alone: bool,
-    /// How curves follow from keys alone, in f32.
+    /// How curves follow in f32 straight from keys, for methods that allow it.
     pub(crate) direct: Option<FromKeys>,
 }
 
-/// How curves follow from keys alone.
+/// How curves follow straight from keys, without numbers that a method has beside them.
 #[derive(Clone, Copy)]
 pub(crate) struct FromKeys {
-    /// What tangents are made of, in f32.
+    /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
-    /// Finds the handles of keys that f32 finds none for.
+    /// Finds, in f64, the handles of keys whose tangents are too long for f32's formulas.
     pub(crate) find_far: fn(&mut FarKeys),
 }
 
-/// What a method knows of an interval beside its two keys.
+/// The numbers that a method has for an interval beside its keys.
 #[derive(Clone, Copy)]
 pub(crate) enum Given {
     Nothing,
-    /// Numbers for the key that it starts with, and for that which it ends with.
+    /// Numbers for the key at the interval's start, and for the key at its end.
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
-    /// The angular velocity at every key of some intervals (rad/s, body frame), where
-    /// each depends on all keys.
+    /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on
+    /// all keys of the track.
     Velocities(fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>),
 }
 
@@ -201,17 +199,17 @@ impl Smooth {
     }
 }
 
-/// How smooth a curve is where its segments meet. With given tangents, tension or
-/// continuity of their own, keys may be less smooth than the method.
+/// How smooth a curve is where its segments meet. Keys with given tangents, tension or continuity
+/// may be less smooth than their method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Continuity {
     /// The rotation jumps.
     Jumps,
     /// The rotation is continuous.
     C0,
-    /// So is the angular velocity.
+    /// The angular velocity is continuous too.
     C1,
-    /// So is the angular acceleration.
+    /// The angular acceleration is continuous too.
     C2,
 }
 
@@ -236,14 +234,14 @@ pub struct Cost {
     pub rotation: f64,
 }
 
-/// Key times of which something holds.
+/// The key times for which a property of a method holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Keys {
-    /// None.
+    /// It holds for no key times.
     Never,
-    /// Those evenly spaced.
+    /// It holds for evenly spaced keys.
     Even,
-    /// All.
+    /// It holds for any key times.
     Any,
 }
 
@@ -284,7 +282,7 @@ impl PartialEq for Method {
 
 impl Eq for Method {}
 
-/// A name that is no method's.
+/// The error for a name that no method has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no method `{name}`; there are {}", method_names())]
 pub struct UnknownMethod {

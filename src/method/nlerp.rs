@@ -9,9 +9,8 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
 use crate::reference;
 use crate::shader::Form;
 
-/// Nlerp: the straight line between neighbouring keys, brought back to the sphere. It
-/// takes the way of slerp at another speed, slower near the keys: by up to 8° where keys
-/// are 180° apart.
+/// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
+/// another speed, slower near the keys: it is up to 8° from slerp where keys are 180° apart.
 pub const NLERP: Method = Method {
     name: "nlerp",
     summary: "slerp's way at uneven speed, as many games have it",
@@ -36,7 +35,7 @@ pub const NLERP: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>));
 
-/// No handles.
+/// All handles are 0; the formula does not use them.
 struct Rule;
 
 impl HandleRule for Rule {

@@ -1,4 +1,4 @@
-//! Shoemake's first approach, as lectured, and the rule of all three.
+//! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
@@ -9,9 +9,9 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
 use crate::reference;
 use crate::shader::Form;
 
-/// Approach I of the lecture: the control rotation is the bisector itself. It passes its
-/// keys three times too fast, and overshoots; for comparison.
-/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) is its cure.
+/// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
+/// times too fast and overshoots; it is here for comparison.
+/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
@@ -39,10 +39,10 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
     ends::controls::<Bisector<1>>,
 ));
 
-/// Handles that are a part, one `PART`th, of the way to the bisector.
+/// Handles that go 1/`PART` of the way from the key to the bisector.
 ///
-/// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Seen from `q_i`,
-/// `Double(q_{i-1}, q_i)` is the step before the key once more.
+/// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Relative to `q_i`,
+/// `Double(q_{i-1}, q_i)` is the step before the key, taken once more.
 pub(crate) struct Bisector<const PART: u8>;
 
 impl<const PART: u8> HandleRule for Bisector<PART> {
@@ -60,7 +60,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
             A::Number::all(0.0),
             A::Number::all(1.0),
         );
-        // Half a turn there and back: no bisector, no handle.
+        // After half a turn there and back the sum is 0: there is no bisector, and the handle is 0.
         let scale = norm.up_to(none, zero, one / norm);
         let w = norm.up_to(none, one, both[3] * scale);
         let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];
@@ -78,7 +78,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // Such handles are too long by 3/PART, everywhere alike.
+            // These handles are 3/PART times as long as the parabola's, at inner keys too.
             EndHandle::Parabolic => {
                 let whole = scaled(log, 2.0 / f64::from(PART));
                 sum(whole, scaled(other, -1.0))

@@ -7,8 +7,8 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
 use crate::reference;
 use crate::shader::Form;
 
-/// Shoemake's own construction: the handle is a third of the bisector's. It ignores the
-/// time steps: on uneven keys its velocity jumps.
+/// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
+/// time steps, so its velocity jumps on uneven keys.
 pub const SHOEMAKE_1985: Method = Method {
     name: "shoemake-1985",
     summary: "Bezier curves of rotations as their author has them; smooth through evenly spaced keys",

@@ -32,7 +32,7 @@ pub const SLERP: Method = Method {
 
 static CURVES: Curves = Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves));
 
-/// For what follows from the derivatives: `q0 exp(t log(q0⁻¹ q1))`.
+/// The formula `q0 exp(t log(q0⁻¹ q1))`, for quantities that need derivatives.
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
         let log = intervals.log(lane);

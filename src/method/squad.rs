@@ -9,7 +9,7 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
 use crate::reference;
 use crate::shader::Form;
 
-/// Squad. It ignores the time steps: on uneven keys its velocity jumps.
+/// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
 pub const SQUAD: Method = Method {
     name: "squad",
     summary: "smooth through evenly spaced keys, as many engines have it",
@@ -51,7 +51,8 @@ impl HandleRule for Rule {
         }
     }
 
-    /// At its ends a squad turns by `log + 2 outgoing` and by `log + 2 incoming`.
+    /// The derivative of a squad is `log + 2 outgoing` at its start and `log + 2 incoming` at its
+    /// end, as half-rotation vectors per interval.
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),

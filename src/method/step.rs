@@ -1,11 +1,11 @@
-//! Keys that are held.
+//! The step method: each key is held until the next.
 
 use crate::curve::options::Ends;
 use crate::method::{Continuity, Cost, Curves, Keys, Method};
 use crate::reference;
 use crate::shader::Form;
 
-/// The key at or before the time: for what switches and does not move.
+/// Holds each key until the next: for things that switch and do not move.
 pub const STEP: Method = Method {
     name: "step",
     summary: "holds each key until the next; for what switches",

@@ -1,10 +1,10 @@
-//! How translations and scales move between their keys.
+//! The interpolation methods for translations and scales.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A method of interpolation for vectors. What happens at the ends is as for rotations;
-/// clamped ends are at rest.
+/// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are
+/// at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum VectorMethod {
     /// The key at or before the time.
@@ -17,12 +17,12 @@ pub enum VectorMethod {
     /// Cubics with the tangents of the parabola through three keys (Bessel, Overhauser
     /// 1968).
     BesselOverhauser,
-    /// glTF's CUBICSPLINE, with given tangents; 0 where none are.
+    /// glTF's CUBICSPLINE with given tangents, which are 0 for a track without them.
     GltfCubic,
 }
 
 impl VectorMethod {
-    /// All of them.
+    /// All methods for vectors.
     pub const ALL: [Self; 5] = [
         Self::Step,
         Self::Linear,
@@ -50,7 +50,7 @@ impl fmt::Display for VectorMethod {
     }
 }
 
-/// A name that is no method's.
+/// The error for a name that no method for vectors has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there is no method `{name}` for vectors; there are step, linear, catmull-rom, bessel-overhauser, gltf-cubic"

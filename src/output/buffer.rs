@@ -1,4 +1,4 @@
-//! Memory for results.
+//! Memory for results that a caller allocates once and reuses.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -7,13 +7,14 @@ use glam::Quat;
 
 use crate::output::rotations::Storage;
 
-/// Bytes from which on allocators take fresh pages for every result, and give them back.
+/// For this many bytes or more, allocators take fresh pages from the system each time and give them
+/// back afterwards.
 #[cfg(target_os = "linux")]
 const LONG: usize = 32 << 20;
 
-/// Memory for a result, zeros at first, for what evaluates into the caller's memory:
-/// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into) and its like. Long ones lie on
-/// huge pages where the system has them (Linux): fresh ones are filled in half the time.
+/// Memory for a result, zero at first, for functions that write to the caller's memory, such as
+/// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into). On Linux, buffers of 32 MiB or
+/// more lie on huge pages if the system has them, which halves the time to fill fresh memory.
 ///
 /// ```
 /// # use glam::Quat;
@@ -36,7 +37,7 @@ enum Memory {
 }
 
 impl OutputBuffer {
-    /// For so many rotations.
+    /// A buffer for this number of rotations.
     #[must_use]
     pub fn new(rotations: usize) -> Self {
         #[cfg(target_os = "linux")]
@@ -44,7 +45,7 @@ impl OutputBuffer {
             && bytes >= LONG
             && let Ok(memory) = memmap2::MmapMut::map_anon(bytes)
         {
-            // Advice: where it is not taken, pages are of the ordinary size.
+            // If the system does not take the advice, pages are of the ordinary size.
             let _ = memory.advise(memmap2::Advice::HugePage);
             return Self(Memory::HugePages(memory));
         }
@@ -90,7 +91,7 @@ impl fmt::Debug for OutputBuffer {
 mod tests {
     use super::*;
 
-    /// Catches memory that is too short, too long or not zero, short and long.
+    /// Catches buffers of a wrong length and contents that are not zero, below and above 32 MiB.
     #[test]
     fn all_that_was_asked_for_is_there() {
         for rotations in [0, 1, 1000, (32 << 20) / 16 - 1, (32 << 20) / 16 + 1] {

@@ -1,4 +1,4 @@
-//! What a rotation is stored as.
+//! The representations in which rotations are stored, and the conversions on the CPU.
 
 use glam::{Mat3, Quat, Vec3};
 
@@ -13,8 +13,8 @@ use crate::twin::f16::to_half;
 use crate::twin::matrix::rows;
 use crate::twin::snorm16::to_snorm;
 
-/// What a rotation is stored as. It is converted where it is evaluated, so that only
-/// what is asked for is moved; with the same bits on every device.
+/// The representation in which a rotation is stored. It is converted on the device that evaluates
+/// it, so that only the converted numbers are moved; every device gives the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Encoding {
@@ -28,16 +28,16 @@ pub enum Encoding {
     /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each
     /// component.
     Snorm16,
-    /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360;
-    /// without a turn the axis is x. Four f32.
+    /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360. If `v` is
+    /// zero the axis is x. Four f32.
     AxisAngle,
     /// The 3 × 3 matrix that turns column vectors: nine f32.
     Matrix3x3(MatrixOrder),
     /// The same with a translation of 0: twelve f32.
     Matrix3x4(MatrixOrder),
-    /// Three angles in degrees, in the order of the sequence; the first and the third
-    /// within ±180, the second within ±90, or 0 to 180 where the first axis comes twice.
-    /// Where the first and the third turn about one axis, the third is 0. Three f32.
+    /// Three angles in degrees, in the order of the sequence: the first and the third within ±180,
+    /// the second within ±90, or from 0 to 180 if the third axis equals the first. In gimbal lock,
+    /// where the first and the third angle turn about the same axis, the third is 0. Three f32.
     Euler(EulerSequence),
     /// `x y z` alone, for velocities and accelerations: three f32.
     Vector,
@@ -93,7 +93,7 @@ impl Encoding {
         }
     }
 
-    /// What its numbers are called, in their order.
+    /// The names of its numbers, in order.
     #[must_use]
     pub fn components(self) -> Vec<String> {
         let names: &[&str] = match self {
@@ -121,12 +121,12 @@ impl Encoding {
         names.iter().map(|&name| name.to_owned()).collect()
     }
 
-    /// Whether it stores only rotations.
+    /// Whether it can store rotations only, not velocities and accelerations.
     pub(crate) fn needs_rotations(self) -> bool {
         !matches!(self, Self::F32 | Self::Vector)
     }
 
-    /// How kernels store it.
+    /// The store of the kernels for it.
     pub(crate) fn store(self) -> Store {
         match self {
             Self::F32 => Store::F32,
@@ -140,7 +140,7 @@ impl Encoding {
         }
     }
 
-    /// What the kernels are told.
+    /// The parameter of the kernels' store: a matrix's order, or the sequence of Euler angles.
     pub(crate) fn detail(self) -> u32 {
         match self {
             Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle | Self::Vector => 0,
@@ -165,7 +165,7 @@ impl Encoding {
         }
     }
 
-    /// What is stored: the rotation, up to rounding and sign, or the vector.
+    /// Reads what is stored: the rotation, up to rounding and sign, or the vector.
     ///
     /// # Panics
     /// When `bytes` are not those of one rotation.
@@ -221,7 +221,7 @@ fn from_columns(columns: Mat3, order: MatrixOrder) -> [f32; 4] {
     Quat::from_mat3(&matrix).to_array()
 }
 
-/// Rotations to something else, in f32.
+/// Converts rotations to a representation in f32: the encoding, the rotations, the output.
 struct Converted<'a>(Encoding, &'a [[f32; 4]], &'a mut [u8]);
 
 impl InLanes for Converted<'_> {
@@ -270,7 +270,7 @@ fn components(rotations: &[[f32; 4]]) -> &[f32] {
     rotations.as_flattened()
 }
 
-/// From and to.
+/// Converts f32 to half precision: the input and the output.
 struct Halves<'a>(&'a [f32], &'a mut [u8]);
 
 impl InLanes for Halves<'_> {
@@ -282,7 +282,7 @@ impl InLanes for Halves<'_> {
     }
 }
 
-/// From and to.
+/// Converts f32 to whole numbers of 1/32767: the input and the output.
 struct WholeNumbers<'a>(&'a [f32], &'a mut [u8]);
 
 impl InLanes for WholeNumbers<'_> {
@@ -308,8 +308,8 @@ fn from_half(half: u16) -> f32 {
 mod tests {
     use super::*;
 
-    /// Every half from 0 to 1 and what lies between: the nearest one is stored, the
-    /// even one where two are.
+    /// Every half from 0 to 1, and values between two of them: the nearest half is stored, and the
+    /// even one if two are equally near.
     #[test]
     fn halves_are_the_nearest() {
         for half in 0..0x3c00u16 {

@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use crate::shader::{INTRINSIC, NEGATIVE, SYMMETRIC};
 
-/// The three axes about which a rotation is taken apart: one of twelve sequences, about
-/// axes that turn along or that stand still.
+/// The three axes of Euler angles: one of twelve sequences, about axes that turn with the body
+/// (intrinsic) or that stay fixed (extrinsic).
 ///
 /// ```
 /// use tumble::EulerSequence;
@@ -22,7 +22,7 @@ pub struct EulerSequence {
 }
 
 impl EulerSequence {
-    /// About the turned x, y and z axes in turn.
+    /// Intrinsic: about x, then about the turned y, then about the turned z.
     pub const XYZ: Self = Self {
         axes: [0, 1, 2],
         intrinsic: true,
@@ -48,13 +48,14 @@ impl EulerSequence {
         self.axes.map(usize::from)
     }
 
-    /// Whether each angle is about an axis that those before it have turned.
+    /// Whether each angle is about an axis that the angles before it have turned.
     #[must_use]
     pub fn is_intrinsic(self) -> bool {
         self.intrinsic
     }
 
-    /// What the kernels are told.
+    /// The parameter of the kernels' store: two bits for each axis, then the flags of
+    /// `shaders/stores/euler.wgsl`.
     pub(crate) fn detail(self) -> u32 {
         let [mut i, j, mut k] = self.axes.map(i32::from);
         if self.intrinsic {
@@ -82,7 +83,7 @@ impl fmt::Display for EulerSequence {
     }
 }
 
-/// Three letters that are no sequence.
+/// The text is not a sequence of Euler angles.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{name}` is no sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
@@ -135,7 +136,7 @@ mod tests {
             let axis = DVec3::new((x * 0.7).sin(), (x * 1.3).cos(), (x * 0.4).sin());
             all.push(DQuat::from_axis_angle(axis.normalize(), x * 0.0031 - 6.2));
         }
-        // Locked, and next to it.
+        // In gimbal lock, and next to it.
         for axis in AXES {
             for angle in [90.0, -90.0, 180.0, 90.001, 1e-4, 179.999] {
                 let turn = DQuat::from_axis_angle(axis, f64::to_radians(angle));

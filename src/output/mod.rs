@@ -1,4 +1,5 @@
-//! TODO-DOC
+//! Results in memory: their layout, the representations in which rotations are stored, and the
+//! windows into which long results are cut.
 
 pub(crate) mod buffer;
 pub(crate) mod encoding;

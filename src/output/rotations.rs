@@ -1,4 +1,4 @@
-//! What comes out: the rotation of every track at every sample.
+//! The result of an evaluation: the rotation of every track at every sample.
 
 use std::fmt;
 
@@ -15,7 +15,8 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// The layout of a result of so many samples: one sample lies by tracks either way.
+    /// The layout for this number of samples. With a single sample both orders are the same, and
+    /// track-major stands for either.
     pub(crate) fn of(self, samples: usize) -> Self {
         if samples == 1 { Self::TrackMajor } else { self }
     }
@@ -30,7 +31,7 @@ impl Layout {
     }
 }
 
-/// Memory that holds a result: the process's own, or a device's, mapped.
+/// Memory that holds a result: the process's own, or mapped memory of a device.
 pub(crate) trait Storage: Send + Sync {
     fn quats(&self) -> &[Quat];
 }

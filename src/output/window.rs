@@ -1,13 +1,13 @@
-//! A result in windows: what is evaluated at once, on a device or into a stream.
+//! Cuts a result into windows: the parts that are evaluated at once, on a device or into a stream.
 
 use std::ops::Range;
 
 use crate::output::rotations::Layout;
 
-/// A contiguous stretch of a result: some samples of some tracks.
+/// A part of a result that is contiguous in memory: some samples of some tracks.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Window {
-    /// Where it starts in what it was cut from, in rotations.
+    /// Where it starts in the result that it was cut from, in rotations.
     pub(crate) start: usize,
     pub(crate) tracks: Range<usize>,
     pub(crate) samples: Range<usize>,
@@ -45,8 +45,7 @@ impl Window {
             .index(track, sample, self.tracks.len(), self.samples.len())
     }
 
-    /// Cuts it into windows of at most `limit` rotations, in the order in which they
-    /// lie in memory.
+    /// Cuts it into windows of at most `limit` rotations, in the order in which they lie in memory.
     pub(crate) fn cut(&self, limit: usize) -> Vec<Self> {
         let (rows, columns) = match self.layout {
             Layout::TrackMajor => (&self.tracks, &self.samples),
@@ -55,7 +54,7 @@ impl Window {
         if rows.is_empty() || columns.is_empty() {
             return Vec::new();
         }
-        // Whole rows while they fit, pieces of one row where it does not.
+        // As many whole rows as fit, or parts of a row if a single one does not fit.
         let rows_each = (limit / columns.len()).max(1);
         let columns_each = columns.len().min(limit.max(1));
         let pieces = |of: &Range<usize>, each: usize| -> Vec<Range<usize>> {
@@ -85,7 +84,7 @@ impl Window {
 }
 
 impl Window {
-    /// Its own windows, as those of what it was cut from.
+    /// Cuts it further; the new windows start in the result that this one was cut from.
     pub(crate) fn within(&self, cut: impl Fn(&Self) -> Vec<Self>) -> Vec<Self> {
         let mut windows = cut(self);
         for window in &mut windows {

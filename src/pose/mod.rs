@@ -1,4 +1,5 @@
-//! TODO-DOC
+//! Poses: blending and adding layers of rotations, skeletons with rotations and positions in the
+//! world, and transforms of rotations, translations and scales.
 
 pub(crate) mod on_cpu;
 pub(crate) mod poses;

@@ -1,4 +1,4 @@
-//! Passes over poses, a task for each thread.
+//! Passes over poses on the CPU, in tasks for all threads.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 /// Values in one task.
 const TASK: usize = 8192;
 
-/// Layers, one behind the other, into one.
+/// Blends layers, which lie one after another, into one.
 pub(crate) fn blend(layers: &[[f32; 4]], weights: &[f32], output: &mut [[f32; 4]]) {
     let count = output.len();
     for_each(output, |place| {
@@ -18,14 +18,14 @@ pub(crate) fn blend(layers: &[[f32; 4]], weights: &[f32], output: &mut [[f32; 4]
     });
 }
 
-/// Two layers by slerp.
+/// Mixes two layers by slerp.
 pub(crate) fn mix(from: &[[f32; 4]], to: &[[f32; 4]], weight: f32, output: &mut [[f32; 4]]) {
     for_each(output, |place| {
         pose_mix::pose(from[place], to[place], weight)
     });
 }
 
-/// What `layer` turns from `reference`, behind `base`.
+/// Adds a layer to a base: `base · (reference⁻¹ layer)^weight`.
 pub(crate) fn add(
     base: &[[f32; 4]],
     layer: &[[f32; 4]],
@@ -38,7 +38,7 @@ pub(crate) fn add(
     });
 }
 
-/// Frames of local rotations to rotations and positions in the world.
+/// Turns frames of local rotations into rotations and positions in the world.
 pub(crate) fn world(local: &[[f32; 4]], links: &[Link], output: &mut [[f32; 4]]) {
     let tracks = links.len();
     let frames = output

@@ -1,5 +1,5 @@
-//! Poses from poses: layers blended or added, and chains of parents walked down to the
-//! world. On the engine's device, with the CPU's bits.
+//! Poses from poses, on the engine's device: layers are blended, mixed or added, and a skeleton is
+//! walked from its roots down to rotations and positions in the world.
 
 use crate::pose::on_cpu;
 use glam::{Quat, Vec3};
@@ -15,8 +15,8 @@ use crate::shader::Kernel;
 use crate::shader::PoseDispatch;
 
 impl Engine {
-    /// Layers into one: the weighted sum of each rotation, normalised, every layer with
-    /// the sign that is nearer to the first layer's. Weights need not add up to 1.
+    /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
+    /// sign that is nearer to the first layer's. Weights need not add up to 1.
     ///
     /// # Errors
     /// When there is no layer, their shapes differ, a weight is not finite, or the device
@@ -53,8 +53,8 @@ impl Engine {
         })
     }
 
-    /// Every rotation of one result towards that of another, by slerp, the shorter way:
-    /// `weight` from 0 to 1.
+    /// Mixes two results: slerp, the shorter way, from every rotation of one to that of the other,
+    /// by `weight` from 0 to 1.
     ///
     /// # Errors
     /// When their shapes differ, the weight lies outside, or the device fails.
@@ -79,8 +79,8 @@ impl Engine {
         })
     }
 
-    /// An additive layer: what each of its rotations turns from its track's reference, or
-    /// `weight` of that (0 to 1), behind the base: `base · (reference⁻¹ layer)^weight`.
+    /// Adds a layer to a base: `base · (reference⁻¹ layer)^weight`, with one reference rotation
+    /// for each track and a weight from 0 to 1.
     ///
     /// # Errors
     /// When the shapes differ, there is not one reference for each track, the weight lies
@@ -129,7 +129,7 @@ impl Engine {
         })
     }
 
-    /// Rotations in their parents' frames to rotations and positions in the world's.
+    /// Turns rotations in their parents' frames into rotations and positions in the world.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
@@ -187,7 +187,7 @@ impl Engine {
         })
     }
 
-    /// Does some work on the engine's device; nothing is the CPU.
+    /// Does some work on the engine's device; `None` stands for the CPU.
     fn on_device<T>(
         &self,
         mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
@@ -199,7 +199,7 @@ impl Engine {
     }
 }
 
-/// How many values of 16 bytes one pass takes.
+/// The most values of 16 bytes that one pass takes.
 fn limit(device: Option<&VulkanEngine>) -> usize {
     device.map_or(usize::MAX, VulkanEngine::pass_limit)
 }
@@ -207,7 +207,7 @@ fn limit(device: Option<&VulkanEngine>) -> usize {
 /// Rotations and positions in the world, `[frame][track]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorldPoses {
-    /// The rotation, then the position.
+    /// For each frame and track the rotation, then the position.
     values: Vec<[f32; 4]>,
     tracks: usize,
     samples: usize,
@@ -233,7 +233,7 @@ impl WorldPoses {
         Some(Quat::from_array(self.values[place]))
     }
 
-    /// Where a track's box hangs at a sample; `None` out of range.
+    /// The position of a track at a sample, in the world; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
         let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
@@ -288,7 +288,7 @@ fn like(layer: &Rotations, quats: OutputBuffer) -> Rotations {
     Rotations::new(Box::new(quats), tracks, samples, layer.layout())
 }
 
-/// Stretches of at most `limit` values, and where they start.
+/// Slices of at most `limit` values, and where they start.
 fn chunks(quats: &mut [Quat], limit: usize) -> impl Iterator<Item = (usize, &mut [[f32; 4]])> {
     let limit = limit.clamp(1, 1 << 40);
     let chunks = quats.chunks_mut(limit).map(bytemuck::cast_slice_mut);

@@ -1,4 +1,4 @@
-//! Which track hangs from which.
+//! Skeletons: the parent of each track, and its offset from the parent.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use crate::math::canonical::canonical;
 use crate::shader::Link;
 use crate::shader::ROOT;
 
-/// Parents of tracks, and where each hangs.
+/// The parent of each track, and its offset in the parent's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     parents: Vec<Option<usize>>,
@@ -19,7 +19,7 @@ pub struct Skeleton {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkeletonError {
-    /// One offset for each track.
+    /// The numbers of parents and offsets differ.
     #[error("there are {parents} parents but {offsets} offsets; give one of each for a track")]
     Lengths {
         /// Parents given.
@@ -27,7 +27,7 @@ pub enum SkeletonError {
         /// Offsets given.
         offsets: usize,
     },
-    /// No such track.
+    /// A parent that does not exist.
     #[error("track {track} hangs from track {parent}, of {tracks}")]
     NoSuchParent {
         /// The track.
@@ -37,10 +37,10 @@ pub enum SkeletonError {
         /// How many there are.
         tracks: usize,
     },
-    /// A track that hangs from itself, by way of others.
+    /// A track that is its own ancestor.
     #[error("track {track} hangs from itself")]
     TrackCopy {
-        /// One of those concerned.
+        /// One track of the circle.
         track: usize,
     },
     /// An offset is NaN or infinite.
@@ -54,8 +54,8 @@ pub enum SkeletonError {
 }
 
 impl Skeleton {
-    /// Tracks that hang from their parents at offsets (any length unit), seen from the
-    /// parent's frame; a root's is where it hangs in the world.
+    /// A skeleton of these parents (`None` for a root) and offsets, in any unit of length. An
+    /// offset is in the parent's frame, and that of a root in the world.
     ///
     /// # Errors
     /// A [`SkeletonError`] that names the track.
@@ -86,13 +86,13 @@ impl Skeleton {
                 }
             }
         }
-        // Level by level.
+        // Breadth first: parents come before their children.
         let mut next = 0;
         while let Some(&track) = order.get(next) {
             order.append(&mut children[track]);
             next += 1;
         }
-        // What no root leads to hangs from itself.
+        // Tracks that no root leads to form a circle, or hang from one.
         if let Some(track) = children.iter().position(|left| !left.is_empty()) {
             return Err(SkeletonError::TrackCopy { track });
         }
@@ -130,7 +130,7 @@ impl Skeleton {
         self.parents.is_empty()
     }
 
-    /// What the kernels walk.
+    /// The tracks in the order in which the kernels walk them, parents before children.
     pub(crate) fn links(&self) -> Vec<Link> {
         let link = |&track: &usize| Link {
             offset: self.offsets[track].to_array().map(canonical),

@@ -45,9 +45,8 @@ impl Vectors {
 }
 
 impl Engine {
-    /// Evaluates rotations, translations and scales of a set at the same frames; the
-    /// latter two by `vectors`, with the ends and what lies outside the keys as
-    /// `interpolation` has it.
+    /// Evaluates rotations, translations and scales of a set at the same frames. Translations and
+    /// scales follow the method `vectors`, with the ends and wrap modes of `interpolation`.
     ///
     /// ```
     /// use glam::{Quat, Vec3};

@@ -1,5 +1,5 @@
-//! Arcs from keys, in vector lanes: one key interval to a lane, of as many tracks as
-//! it takes to fill them.
+//! Prepares arcs from keys in vector lanes: one key interval to a lane, of as many tracks as it
+//! takes to fill a block.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ use crate::twin::arc_between::arc_between;
 /// Intervals that wait for their block, and the arcs that they become.
 struct ArcBlock {
     from: [[f32; 4]; LANES],
-    /// Each in the sign nearer to `from`.
+    /// The key at the end of each interval, in the sign nearer to `from`.
     to: [[f32; 4]; LANES],
     count: usize,
     middles: [[f32; 4]; LANES],
@@ -41,7 +41,7 @@ impl ArcBlock {
 }
 
 impl InLanes for ArcBlock {
-    /// Works out every interval that waits.
+    /// Computes the arc of every interval that waits.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         for j in (0..self.count).step_by(L::COUNT) {
@@ -150,7 +150,7 @@ impl Prepare for ArcPreparation {
     }
 }
 
-/// The middle of an arc of more than half a turn, which is made of two.
+/// The middle of an arc of more than half a turn, which becomes two arcs.
 struct Half {
     /// The key that the arc starts with.
     key: usize,
@@ -158,7 +158,8 @@ struct Half {
 }
 
 impl ArcPreparation {
-    /// Where signs count as authored an arc may be up to a whole turn: such arcs among some.
+    /// The arcs of more than half a turn among some intervals. They occur only on
+    /// [`Path::AsAuthored`], where an arc may be up to a whole turn.
     fn long_arcs(&self, track: Track, intervals: Range<usize>) -> Vec<Half> {
         let mut long = Vec::new();
         if self.path == Path::Shortest {
@@ -176,7 +177,7 @@ impl ArcPreparation {
         long
     }
 
-    /// Takes intervals between these keys, none of which is long.
+    /// Takes intervals between these keys, none of more than half a turn.
     fn push(
         &mut self,
         prepared: &mut Prepared,

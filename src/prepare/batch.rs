@@ -1,5 +1,5 @@
-//! Sets in batches: what is prepared together, all of some tracks or some intervals of a long
-//! one.
+//! Cuts sets into batches that are prepared together: whole tracks, or some intervals of a long
+//! track.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ pub(crate) enum Batch {
 }
 
 impl Batch {
-    /// The tracks that it is of.
+    /// The tracks of which it has intervals.
     pub(crate) fn tracks(&self) -> Range<usize> {
         match *self {
             Self::Tracks(ref tracks) => tracks.clone(),
@@ -33,7 +33,7 @@ impl Batch {
         }
     }
 
-    /// Its intervals, by their tracks.
+    /// Each track with the intervals of it that belong to the batch.
     pub(crate) fn intervals(&self, set: &TrackSet) -> impl Iterator<Item = (usize, Range<usize>)> {
         let own = match self {
             Self::Tracks(_) => None,
@@ -45,7 +45,7 @@ impl Batch {
         })
     }
 
-    /// The times and keys of its intervals, by their tracks.
+    /// The times and keys of its intervals, one pair of slices for each track.
     pub(crate) fn times_and_keys<'a>(
         &self,
         set: &'a TrackSet,
@@ -56,9 +56,10 @@ impl Batch {
         })
     }
 
-    /// Its samples: those from its first key up to its end, and what lies before a track's
-    /// first key and after its last. Where it is cut into parts of so many intervals, each
-    /// settles by its own end which sample is a key but for rounding.
+    /// The samples that the batch gives: those from its first key up to its end, and those before a
+    /// track's first key or after its last. `part` is the number of intervals in each part of a
+    /// track: a sample counts as being on a key within a tolerance that depends on the time at
+    /// which the key's part ends.
     pub(crate) fn samples(&self, set: &TrackSet, timeline: &Timeline, part: usize) -> Range<usize> {
         let Self::Intervals { track, intervals } = self else {
             return 0..timeline.len();
@@ -89,10 +90,10 @@ fn first_sample(times: &[f64], timeline: &Timeline, interval: usize, part: usize
 /// How a set is cut into batches.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BatchSize {
-    /// Keys and tracks at most; a track with more keys is a batch of its own.
+    /// The most keys and the most tracks of a batch; a track with more keys is a batch of its own.
     pub(crate) keys: usize,
     pub(crate) tracks: usize,
-    /// Such a track is cut after so many intervals, where that is allowed.
+    /// A track with more keys is cut after this many intervals; `None` if it may not be cut.
     pub(crate) cut: Option<usize>,
 }
 
@@ -101,7 +102,7 @@ pub(crate) struct Batches<'a> {
     set: &'a TrackSet,
     size: BatchSize,
     tracks: Range<usize>,
-    /// What is left of a track that is cut.
+    /// The track that is being cut, and its remaining intervals.
     long: Option<(usize, Range<usize>)>,
 }
 

@@ -1,4 +1,4 @@
-//! A whole set, prepared: the groups of its tracks, and where each track is.
+//! A set, prepared: its tracks in groups, and the places of each track's parts.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -22,21 +22,21 @@ use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::Channel;
 
-/// Tracks whose vectors are prepared as one piece of work.
+/// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
-/// The prepared tracks, on the host: what every device's schedule is made from.
+/// The prepared tracks on the host, from which every device's schedule is made.
 pub(crate) struct ClipData {
     pub(crate) interpolation: Interpolation,
     pub(crate) groups: Vec<Prepared>,
-    /// Every part in order of tracks and time: (group, place in the group).
+    /// Every part in order of tracks and time, as (group, place in the group).
     parts: Vec<(u32, u32)>,
-    /// Where each track's parts start in `parts`, and one end more.
+    /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
     span: Option<(f64, f64)>,
 }
 
-/// A part and the lists that it points into.
+/// A part and the prepared group whose lists it points into.
 #[derive(Clone, Copy)]
 pub(crate) struct PartRef<'a> {
     pub(crate) prepared: &'a Prepared,
@@ -46,20 +46,20 @@ pub(crate) struct PartRef<'a> {
 /// Which tracks of a set to prepare, and for what.
 pub(crate) struct Wanted<'a> {
     pub(crate) batch: Batch,
-    /// Groups are merged while their segments stay within so many bytes: each becomes a
-    /// buffer of a device. Without a limit they stay as they were prepared.
+    /// Groups are merged while the segments of each stay within this many bytes, as each becomes a
+    /// buffer of a device. With `None` they stay as they were prepared.
     pub(crate) group_bytes: Option<usize>,
-    /// Groups are few from the start, and not merged: to copy them together would cost
-    /// more than a dispatch each.
+    /// Few groups are made from the start and not merged: copying them together would cost more
+    /// than one dispatch for each.
     pub(crate) few_groups: bool,
-    /// The samples of one timeline: what is prepared serves no other then.
+    /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
-    /// Memory to use again.
+    /// Groups whose memory is reused.
     pub(crate) spare: Vec<Prepared>,
 }
 
 impl Wanted<'_> {
-    /// All of a set, for any samples.
+    /// All tracks of a set, for any timeline.
     pub(crate) fn all(set: &TrackSet) -> Self {
         Self {
             batch: Batch::Tracks(0..set.track_count()),
@@ -70,8 +70,8 @@ impl Wanted<'_> {
         }
     }
 
-    /// Keys of a group: so many that the groups are few, where that is wanted, but enough for
-    /// all threads.
+    /// The most keys of a group. If few groups are wanted, it is as many as leave four groups for
+    /// each thread, within the limit of bytes.
     fn group_keys(&self, set: &TrackSet, form: Form) -> usize {
         let (Some(limit), true) = (self.group_bytes, self.few_groups) else {
             return PART;
@@ -108,7 +108,7 @@ fn prepare(
             prepared.reserve(set.keys_of(tracks.clone()));
         }
         preparation.push(&mut prepared, set, batch.intervals(set))?;
-        // Their places are those among the tracks asked for.
+        // A part's track counts from the first of the tracks asked for.
         for part in &mut prepared.parts {
             part.track -= first_track;
         }
@@ -147,7 +147,7 @@ impl ClipData {
             Channel::Translation => Vec3::ZERO,
             Channel::Scale => Vec3::ONE,
         };
-        // Vectors, as velocities are: what is for rotations is refused.
+        // As a velocity, a vector is refused where an output is for rotations only.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::World),
             ..*interpolation
@@ -194,7 +194,7 @@ impl ClipData {
         }
     }
 
-    /// How many samples of a timeline one segment gives, on average.
+    /// The mean number of a timeline's samples for each span.
     pub(crate) fn samples_of_a_run(&self, timeline: &Timeline) -> usize {
         let spans = self.groups.iter().map(|group| group.spans.starts.len());
         timeline.len() * self.track_count() / spans.sum::<usize>().max(1)
@@ -208,8 +208,8 @@ impl ClipData {
         self.span
     }
 
-    /// The parts of one track that may hold any of `samples` of the track itself, in order
-    /// of time.
+    /// The parts of one track that may contain any of `samples`, which are samples of the track
+    /// itself, not of its copies; in order of time.
     #[inline]
     pub(crate) fn parts_of(
         &self,
@@ -222,8 +222,8 @@ impl ClipData {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time(track, samples.start);
                 let last = timeline.time(track, samples.end - 1);
-                // One more on either side: a time within its rounding of a boundary
-                // may lie on the other side of it.
+                // One more part on either side: a time within rounding of a boundary may lie on
+                // the other side of it.
                 let from = all.partition_point(|&place| self.part(place).part.end < first);
                 let to = all.partition_point(|&place| self.part(place).start() <= last);
                 &all[from.saturating_sub(1).min(all.len() - 1)..(to + 1).min(all.len())]
@@ -233,7 +233,7 @@ impl ClipData {
         own.iter().map(|&place| self.part(place))
     }
 
-    /// The part of a track that has only one.
+    /// The part of a track that has exactly one part.
     #[inline(always)]
     pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
         let places = self.tracks[track]..self.tracks[track + 1];
@@ -244,7 +244,7 @@ impl ClipData {
         }
     }
 
-    /// The parts of one track in the order in which a copy of it meets them.
+    /// The parts of one track in the order in which a copy of it traverses them.
     pub(crate) fn parts_in(
         &self,
         track: usize,
@@ -274,14 +274,15 @@ impl ClipData {
         wrap.copies(span, timeline, samples)
     }
 
-    /// The first and the last key time of a track, where copies of it are asked for.
+    /// The first and the last key time of a track, if its wrap mode needs them.
     fn track_span(&self, track: usize) -> Option<(f64, f64)> {
         let &first = self.parts.get(self.tracks[track])?;
         let beyond = self.part(first).part.beyond.as_ref()?;
         Some(beyond.span)
     }
 
-    /// The timeline, with explicit times folded into the keys of their tracks.
+    /// The timeline with explicit times folded into the time range of their track's keys, if the
+    /// wrap mode repeats tracks.
     pub(crate) fn folded<'t>(&self, timeline: &'t Timeline) -> Cow<'t, Timeline> {
         let wrap = self.interpolation.wrap();
         if !wrap.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
@@ -304,7 +305,7 @@ impl ClipData {
 }
 
 impl PartRef<'_> {
-    /// Where its first span starts, seconds.
+    /// The start of its first span, in seconds.
     fn start(self) -> f64 {
         let starts = &self.prepared.spans.starts[self.part.spans.clone()];
         starts.first().copied().unwrap_or(self.part.end)

@@ -1,5 +1,5 @@
-//! Tracks at constant speed: their curves wait until the whole track is there, then each
-//! gets the part of the time that it has of the length.
+//! Tracks at constant speed. The curves of a track wait until all of them are known; then each gets
+//! the fraction of the track's time that its arc length is of the track's.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::time::spans::{NONE, Part, Source};
 
-/// Where an interval is.
+/// The place of an interval in its track and in time.
 pub(crate) struct Place {
     /// Its part of the prepared tracks.
     pub(crate) part: usize,
-    /// Seconds.
+    /// When it starts as keyed, in seconds.
     pub(crate) start: f64,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) key: u32,
 }
 
-/// Intervals that wait, in order; those without a curve stand still.
+/// The intervals that wait, in order. Those without a curve stand still.
 #[derive(Default)]
 pub(crate) struct Waiting(Vec<(Place, Option<Curve>)>);
 
@@ -30,7 +30,7 @@ impl Waiting {
         self.0.push((place, curve));
     }
 
-    /// Hands everything to be fitted.
+    /// Gives the curves of every track their times, and hands them over to be fitted.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         let mut waiting = std::mem::take(&mut self.0);
         while let Some((Place { part, .. }, _)) = waiting.first() {
@@ -72,7 +72,7 @@ fn retime(
         still.get_or_insert(place);
     }
     if let (true, Some(place)) = (paced.is_empty(), still) {
-        // It does not move at all.
+        // The track does not move at all.
         let Part { before, beyond, .. } = &prepared.parts[part];
         let held = match (*before, place.key) {
             (NONE, NONE) => {
@@ -119,7 +119,7 @@ fn retime(
 }
 
 impl Curve {
-    /// Makes what goes on at constant velocity go on at that speed, rad/s.
+    /// Sets the speed of a curve of constant angular velocity, in radians per second.
     fn set_speed(&mut self, speed: f64) {
         let half = [self.numbers[4], self.numbers[5], self.numbers[6]];
         let own = 2.0 * length(half);

@@ -1,5 +1,6 @@
-//! Smooth curves straight from keys, in f32: those that turn little as a series, others by
-//! a fit of the whole or of its halves. What is left over waits for a block of its own, in f64.
+//! Smooth curves straight from keys, in f32: small angles by a series, longer curves by a Hermite
+//! fit of the whole or of its halves. Intervals that f32 cannot prepare wait for a block of their
+//! own, in f64.
 
 use std::ops::Range;
 
@@ -20,37 +21,39 @@ use crate::prepare::waiting_curves::{List, WaitingCurves, fit};
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::NONE;
 
-/// Where more than one interval of so many is left over, all of a block is worked out in
-/// f64: alone each would bring two neighbours.
+/// If more than one in this many intervals of a block is left over, the whole block is computed in
+/// f64: in a block of its own each would bring two neighbours as context.
 const MOST_ALONE: usize = 3;
 
-/// As many as the lanes of a block become. A power of two.
+/// The most spans that the lanes of a block become. A power of two, for a cheap modulo.
 const SPANS: usize = 2 * LANES;
 
-/// The curves of a block that come straight from keys.
+/// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
     steps: KeySteps,
     weights: KeyWeights,
     gentle: GentleLanes,
     whole: WholeLanes,
-    /// The spans and the segments that lanes become, the first where there are two.
+    /// The span and the segment that each lane becomes; the first of the two if it is cut.
     spans: [u32; ROOM],
     places: [u32; ROOM],
-    /// Lanes to fit.
+    /// Lanes that are fitted whole by degree 10.
     usual: List,
-    /// Those that few powers serve, and those to fit in two: of either a block has few.
+    /// Curves that are fitted with degree 8, and curves that are split at their middle. A block has
+    /// few of each, so they wait until they fill a block.
     few_powers: WaitingCurves<Part<1, 4>, 4>,
     halves: WaitingCurves<Halves, 5>,
-    /// Lanes that are fitted in two, or not here.
+    /// Lanes with a squared extent above [`LONGEST_WHOLE`], before they are divided into `halves`
+    /// and `left_over`.
     long: List,
-    /// 1 where a lane becomes two spans.
+    /// 1 if a lane becomes two spans, else 0.
     cut: [u32; ROOM],
-    /// Of spans that begin.
+    /// The start times of new spans, in seconds, and the constants there.
     starts: [f64; SPANS],
     keys: [u32; SPANS],
-    /// Lanes that are left over.
+    /// Lanes that f32 cannot prepare.
     left_over: List,
-    /// Where they wait; made when there is one.
+    /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
     find_far: fn(&mut FarKeys),
@@ -82,7 +85,7 @@ impl Direct {
         }
     }
 
-    /// Finds what curves are made of.
+    /// Finds the steps, handles and curves of a block's intervals, and the small-angle cubics.
     pub(crate) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         in_lanes(&mut FindSteps {
             steps: &mut self.steps,
@@ -109,8 +112,8 @@ impl Direct {
         });
     }
 
-    /// Takes the curves in some lanes: they become the next spans, the first with this constant
-    /// at its start.
+    /// Takes the curves in some lanes: they become the next spans, the first with the constant
+    /// `key` at its start.
     pub(crate) fn take(
         &mut self,
         prepared: &mut Prepared,
@@ -120,7 +123,7 @@ impl Direct {
     ) {
         if self.gentle.may_hold() {
             for lane in lanes.clone().filter(|&lane| self.gentle.holds[lane]) {
-                // On no list.
+                // A negative squared extent puts the lane on no list.
                 self.whole.energies[lane] = -1.0;
             }
         }
@@ -135,7 +138,7 @@ impl Direct {
         }
     }
 
-    /// Lists what is to become of lanes.
+    /// Puts lanes on the list of the fit for their squared extent.
     fn list(&mut self, lanes: Range<usize>) {
         let energies = &self.whole.energies[lanes.clone()];
         let [few, whole, direct] =
@@ -161,7 +164,7 @@ impl Direct {
         self.long.clear();
     }
 
-    /// Begins the spans and the segments that lanes become.
+    /// Adds the spans and the segments that lanes become.
     fn begin(
         &mut self,
         prepared: &mut Prepared,
@@ -177,7 +180,7 @@ impl Direct {
             self.places[lane] = first_place + next as u32;
             let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
             let own = if key == NONE { NONE } else { key + i as u32 };
-            // The next one takes the place of the second where this one is not cut.
+            // Both halves are always written; the next lane overwrites the second if it is not cut.
             let second = (next + 1) % SPANS;
             (self.starts[next % SPANS], self.keys[next % SPANS]) = (start, own);
             (self.starts[second], self.keys[second]) = (start + (end - start) * 0.5, NONE);
@@ -189,8 +192,8 @@ impl Direct {
         prepared.new_segments(next);
     }
 
-    /// Fits the curves that were taken. What is left over waits, here or in `fitting`;
-    /// `is_exact` where the intervals' numbers in f64 are there.
+    /// Fits the curves that were taken. Those left over wait, here or in `fitting`. `is_exact` says
+    /// that the f64 numbers of the intervals are computed already.
     pub(crate) fn fit(
         &mut self,
         prepared: &mut Prepared,
@@ -219,7 +222,7 @@ impl Direct {
         self.left_over.clear();
     }
 
-    /// Lets what is left over wait with its neighbours.
+    /// Moves intervals that are left over to `rest`, with their neighbours as context.
     fn leave(
         &mut self,
         prepared: &mut Prepared,
@@ -245,7 +248,7 @@ impl Direct {
         }
     }
 
-    /// Has what was left over fitted.
+    /// Fits the curves that still wait, and hands those left over to `fitting`.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         self.few_powers.finish(prepared);
         self.halves.finish(prepared);
@@ -255,7 +258,7 @@ impl Direct {
     }
 }
 
-/// Intervals that are left over, each between its neighbours.
+/// Intervals that are left over, each run of them between its neighbours as context.
 struct Rest {
     intervals: Intervals,
     stretches: Vec<Stretch>,
@@ -275,12 +278,12 @@ impl Rest {
         }
     }
 
-    /// Whether there is room for so many that follow one another.
+    /// Whether there is room for `count` consecutive intervals and their context.
     fn has_room(&self, count: usize) -> bool {
         self.intervals.count + count + 2 <= LANES
     }
 
-    /// Takes some intervals of a stretch, which are to become these spans; there is room.
+    /// Takes some intervals of a stretch, which become these spans; there must be room for them.
     fn push(
         &mut self,
         intervals: &Intervals,
@@ -305,7 +308,7 @@ impl Rest {
         self.spans.extend(spans);
     }
 
-    /// Makes all of them into curves, which then wait for their fit.
+    /// Computes the curves of all intervals in f64, and queues them to be fitted.
     fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         if self.spans.is_empty() {
             return;

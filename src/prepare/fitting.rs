@@ -1,5 +1,5 @@
-//! Curves to segments: they wait in lanes until a block of them is full. Each becomes one
-//! span at once, and several where it turns out that it is to be cut.
+//! Fits curves into segments. Curves wait until they fill a block. Each becomes one span at once;
+//! that span is replaced by several if the curve has to be cut.
 
 use std::ops::Range;
 
@@ -17,28 +17,28 @@ use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::{NONE, Part, Source, Spans};
 
-/// Fits curves; what it needs for that is kept. Each is that of the next span, whose source
-/// is not there yet.
+/// Fits curves in blocks, whose memory is kept. A curve that is taken belongs to the next span,
+/// which is the first without a source.
 pub(crate) struct Fitting {
     shape: &'static Shape,
     quantity: Quantity,
     gentle: Queue,
     full: Queue,
-    /// Made when there is an interval for it.
+    /// Made for the first track of two keys.
     steady: Option<Box<SteadyBlock>>,
     cutter: Cutter,
-    /// Spans while curves among them are cut.
+    /// The spans as they were before the curves among them were cut.
     uncut: Spans,
 }
 
-/// Curves that wait for a block to fill.
+/// Curves of one tier that wait to fill a block.
 struct Queue {
     tier: Tier,
-    /// Made when there is a curve for it: to make one takes longer than to fit few.
+    /// Made for the first curve: making a block takes longer than fitting a few curves.
     block: Option<Box<FitBlock>>,
-    /// The lanes of those that are not in the block yet.
+    /// The lanes of curves that are not copied into the block yet.
     lanes: Vec<u8>,
-    /// Which spans they are of: those in the block, then those in `lanes`.
+    /// The spans of the curves: of those in the block, then of those in `lanes`.
     spans: Vec<usize>,
 }
 
@@ -66,9 +66,9 @@ impl Fitting {
         }
     }
 
-    /// Takes the curves in some lanes of `curves`, which are to be [brought](Fitting::bring)
-    /// before they are others: each becomes the next span, the first with this constant at its
-    /// start.
+    /// Takes the curves in some lanes of `curves`: each becomes the next span, the first with the
+    /// constant `key` at its start. [`Fitting::bring`] must copy them before the lanes of `curves`
+    /// change.
     #[inline]
     pub(crate) fn take(
         &mut self,
@@ -84,7 +84,7 @@ impl Fitting {
         }
     }
 
-    /// As [`Fitting::take`], the curve of a span that has its segment.
+    /// Takes, as [`Fitting::take`] does, the curve of a span that has its segment already.
     #[inline]
     pub(crate) fn queue(
         &mut self,
@@ -108,7 +108,7 @@ impl Fitting {
         queue.spans.push(span);
     }
 
-    /// Brings the curves that were taken into blocks.
+    /// Copies the curves that were taken into blocks, and fits the blocks that are full.
     pub(crate) fn bring(&mut self, prepared: &mut Prepared, curves: &Intervals) {
         for queue in [&mut self.gentle, &mut self.full] {
             let mut lanes = &queue.lanes[..];
@@ -126,7 +126,7 @@ impl Fitting {
         }
     }
 
-    /// Takes two keys that are alone.
+    /// Takes the only two keys of a track, which are joined at constant velocity.
     pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
         let (source, segment) = new_segment(prepared);
         let new = || Box::new(SteadyBlock::new());
@@ -139,14 +139,15 @@ impl Fitting {
         source
     }
 
-    /// Takes any curve.
+    /// Takes a curve of any length as the next span. [`Fitting::finish`] fits it, and cuts it if
+    /// necessary.
     pub(crate) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
         self.cutter.push_whole(prepared.spans.sources.len(), curve);
         UNTRIED
     }
 
-    /// Fits what still waits, and puts the parts of curves that were cut where these are
-    /// among the spans.
+    /// Fits the curves that still wait, and replaces the spans of cut curves by those of their
+    /// parts.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         for queue in [&mut self.gentle, &mut self.full] {
             if let Some(block) = &mut queue.block {
@@ -163,7 +164,7 @@ impl Fitting {
     }
 }
 
-/// Fits the curves of a block, which are of the first of the `spans`.
+/// Fits the curves of a block, which belong to the first of the `spans`.
 fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
     let own = &spans[..block.count()];
     let sources = &prepared.spans.sources;
@@ -184,15 +185,16 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     block.clear();
 }
 
-/// Segments that are not fitted yet: as a constant, so many of them are cleared at once.
+/// Zeroed segments for curves that are not fitted yet. New segments are copied from this constant,
+/// all at once.
 static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
     coefficients: [[0.0; 4]; 11],
 }; 2 * LANES];
 
-/// Of curves that are cut untried.
+/// The source of a span whose curve the cutter fits; it has no segment yet.
 const UNTRIED: Source = Source::Segment(NONE);
 
-/// A segment, which is zero; and its place.
+/// Adds a zeroed segment, and returns it as a source and by its place.
 pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
     let segments = &mut prepared.segments.polynomials;
     let place = segments.len();
@@ -201,8 +203,8 @@ pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
 }
 
 impl Prepared {
-    /// As many segments, two for each lane at most, which are zero, each the source of the next
-    /// span; the first of these spans.
+    /// Adds `count` zeroed segments (at most two for each lane of a block), each as the source of
+    /// the next span, and returns the first of these spans.
     #[inline]
     pub(crate) fn new_segments(&mut self, count: usize) -> usize {
         let segments = &mut self.segments.polynomials;
@@ -214,7 +216,7 @@ impl Prepared {
         first_span
     }
 
-    /// Puts the parts of curves that were cut where these are among the spans.
+    /// Replaces the spans of curves that were cut by those of their parts.
     fn put_parts(&mut self, cutter: &Cutter, uncut: &mut Spans) {
         let mut cut = cutter.parts();
         let Some(first) = cut.first().map(|part| part.span) else {
@@ -252,7 +254,8 @@ impl Prepared {
         }
     }
 
-    /// Puts the parts of the first curve there, whose span ends at `end`; the others' parts.
+    /// Adds the spans of the first curve's parts; the curve's own span ends at `end`. Returns the
+    /// parts of the other curves.
     fn put_first<'c>(
         &mut self,
         cutter: &Cutter,

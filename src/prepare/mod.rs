@@ -1,7 +1,9 @@
-//! Keys to segments: the constants that the kernels read, computed once per clip; arcs in
-//! f32 as a kernel could, curves in f64 and rounded once, those that turn moderately and know
-//! their four keys mostly in f32. Independent of frame rate and
-//! device, so the CPU and every Vulkan device evaluate the same segments.
+//! Prepares tracks: turns their keys into segments, the coefficients that the kernels evaluate,
+//! once per clip. They do not depend on frame rate or device, so the CPU and every Vulkan device
+//! evaluate the same segments.
+//!
+//! Arcs are computed in f32, with the operations of the arc kernel's twin. Curves are computed in
+//! f64 and rounded once; curves of moderate angle that depend on four keys alone mostly in f32.
 
 pub(crate) mod arcs;
 pub(crate) mod batch;

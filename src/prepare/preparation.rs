@@ -1,4 +1,5 @@
-//! From key intervals to segments, by what the method's curves are made of.
+//! The trait by which key intervals become segments, and the choice of its implementation for a
+//! method.
 
 use std::ops::Range;
 
@@ -13,9 +14,9 @@ use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Makes segments from key intervals, in blocks that may hold several tracks'.
+/// Makes segments from key intervals, in blocks that may hold intervals of several tracks.
 pub(crate) trait Prepare: Send {
-    /// Adds some intervals of a track, the `index`th of its set, as a part of their own.
+    /// Adds some intervals of the `index`th track of a set, as a part of their own.
     fn add(
         &mut self,
         prepared: &mut Prepared,
@@ -24,14 +25,15 @@ pub(crate) trait Prepare: Send {
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError>;
 
-    /// Finishes what was added.
+    /// Finishes the segments of all intervals that were added.
     fn finish(&mut self, prepared: &mut Prepared);
 
-    /// From now on only intervals that hold a frame need segments; or all.
+    /// From now on only intervals that contain a frame need segments, given the frames' rate and
+    /// start; with `None` all need them.
     fn only_frames(&mut self, _frames: Option<(FrameRate, f64)>) {}
 }
 
-/// Prepares whole tracks, with memory that serves many.
+/// Prepares tracks by the implementation of [`Prepare`] for their method; its memory is reused.
 pub(crate) struct Preparation(Box<dyn Prepare>);
 
 impl Preparation {
@@ -46,8 +48,9 @@ impl Preparation {
         })
     }
 
-    /// From now on intervals without a sample of that timeline need not be prepared,
-    /// if that saves anything. What is prepared then serves no other.
+    /// From now on intervals without a sample of this timeline may be left out, which is done if
+    /// the timeline has fewer samples than tracks have keys on average. The segments then serve no
+    /// other timeline.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
         self.0.only_frames(match timeline.ticks {
@@ -56,7 +59,7 @@ impl Preparation {
         });
     }
 
-    /// Prepares some intervals of tracks of a set together: each becomes a part.
+    /// Prepares intervals of a set's tracks; each range of intervals becomes a part.
     pub(crate) fn push(
         &mut self,
         prepared: &mut Prepared,
@@ -93,8 +96,8 @@ mod tests {
         prepared.spans.sources.iter().map(segment).collect()
     }
 
-    /// Catches a piece that forgets the signs of the keys before it, or lanes that
-    /// mix up tracks.
+    /// Catches a part of a track that ignores the signs of the keys before it, and lanes that mix
+    /// up tracks.
     #[test]
     fn a_track_in_pieces_is_prepared_like_a_whole_one() {
         let count = 3 * PART + 17;

@@ -1,4 +1,4 @@
-//! What tracks become: segments and constants, and where in time they lie.
+//! Prepared tracks: their segments and constants, and the spans of time to which these belong.
 
 use std::ops::Range;
 
@@ -17,13 +17,14 @@ use crate::tracks::set::Track;
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
     pub(crate) segments: Segments,
-    /// Rotations that are stored as they are: keys, end values.
+    /// Rotations that are stored as they are: keys and end values.
     pub(crate) constants: Vec<[f32; 4]>,
-    /// Curves too wild for the kernels.
+    /// Curves that the host evaluates in f64: pieces that no polynomial fits, and the continuation
+    /// of tracks beyond their ends.
     pub(crate) exact: Vec<Curve>,
     pub(crate) spans: Spans,
     pub(crate) parts: Vec<Part>,
-    /// What lies outside the keys.
+    /// The wrap modes before the first key and after the last.
     pub(crate) wrap: Wrap,
 }
 
@@ -39,7 +40,7 @@ impl Prepared {
         }
     }
 
-    /// Makes room for so many keys: to grow into it would copy it all over again.
+    /// Makes room for this many keys, so that the lists are not copied as they grow.
     pub(crate) fn reserve(&mut self, keys: usize) {
         self.segments.reserve(keys);
         self.constants.reserve(keys);
@@ -94,7 +95,7 @@ impl Prepared {
         self.exact.extend(other.exact);
     }
 
-    /// The rotation of a sample that is evaluated in f64.
+    /// The value of a sample by the `index`th curve of `exact`, evaluated in f64.
     pub(crate) fn exact(
         &self,
         index: u32,
@@ -106,7 +107,7 @@ impl Prepared {
         let t = match parameter {
             Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
             Parameter::Seconds { start, seconds } => {
-                // Further away than keys may be, a curve's powers overflow.
+                // At times beyond those allowed for keys, a curve's powers would overflow.
                 let time = timeline.time(track, sample).clamp(-LATEST, LATEST);
                 (time - start) / seconds
             }
@@ -125,7 +126,8 @@ impl Prepared {
         self.wrap.copies(span, timeline, samples)
     }
 
-    /// What a part needs from the start, where copies of its track are asked for.
+    /// The [`Beyond`] of a part of this track if the wrap mode repeats tracks: it holds the track's
+    /// time span.
     pub(crate) fn beyond_of_copies(&self, track: Track) -> Option<Box<Beyond>> {
         let new = || Box::new(Beyond::new(track.times));
         self.wrap.repeats().then(new)

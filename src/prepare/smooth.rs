@@ -1,5 +1,5 @@
-//! Smooth curves from keys: intervals of as many tracks as it takes to fill the lanes, made
-//! into curves by the method.
+//! Prepares smooth curves: collects intervals of as many tracks as it takes to fill a block,
+//! computes their curves by the method's functions, and has them fitted.
 
 use std::ops::Range;
 
@@ -23,10 +23,10 @@ use crate::time::wrap::WrapMode;
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 
-/// What moves neither nor turns faster.
+/// The angular velocity and the angular acceleration of a track that stands still.
 const STILL: [f32; 4] = [0.0; 4];
 
-/// Lanes that a stretch needs beside those of its intervals.
+/// The lanes of context that a stretch needs beside those of its intervals.
 const CONTEXT: usize = 2;
 
 /// No stretch with fewer intervals than this is begun at the end of a block, unless
@@ -40,11 +40,11 @@ pub(crate) struct SmoothPreparation {
     intervals: Intervals,
     stretches: Vec<Stretch>,
     fitting: Fitting,
-    /// Where the method has such curves.
+    /// Prepares curves straight from keys in f32, if method and options allow it.
     direct: Option<Box<Direct>>,
-    /// Curves that are to be run through at constant speed.
+    /// Curves that are traversed at constant speed, until their whole track is there.
     waiting: Waiting,
-    /// Where only intervals with a frame are wanted: the frames' rate and start.
+    /// The frames' rate and start, if only intervals that contain a frame are wanted.
     frames: Option<(FrameRate, f64)>,
 }
 
@@ -84,7 +84,7 @@ impl Prepare for SmoothPreparation {
     ) -> Result<(), InterpolationError> {
         let track = set.track(index);
         self.interpolation.ends.check(track.keys, index)?;
-        // A method that takes its own path has its own way between opposite keys.
+        // A method with a path of its own also defines the curve between opposite keys.
         if self.interpolation.method.path.is_none() {
             self.interpolation
                 .path
@@ -97,7 +97,7 @@ impl Prepare for SmoothPreparation {
         // A curve that does not pass through its keys has end values of its own.
         let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
         let last_key = first_key + intervals.len() as u32;
-        // What stands still stands at its keys.
+        // Intervals that stand still are held at a key, so the keys are stored for them too.
         if of_rotations && (meets_keys || self.is_frozen()) {
             let keys = &track.keys[intervals.start..=intervals.end];
             prepared
@@ -140,7 +140,8 @@ impl Prepare for SmoothPreparation {
                 self.flush(prepared);
             }
             let to = from + left.min(LANES - context - self.intervals.count);
-            // Across the seam of a loop keys count as seen from the last one.
+            // Across the seam of a loop, keys are multiplied by the last key's sign, so that they
+            // continue the signs on this side.
             let beyond = signs.sign(all);
             if context > 0 {
                 match from.checked_sub(1) {
@@ -184,15 +185,16 @@ impl Prepare for SmoothPreparation {
 }
 
 impl SmoothPreparation {
-    /// Adds an interval on the other side of a loop's seam, as context.
+    /// Adds an interval from the other side of a loop's seam as context, with its keys multiplied
+    /// by `sign`.
     fn push_beyond(&mut self, track: Track, signs: Signs<'_>, interval: usize, sign: f32) {
         let lane = self.intervals.count;
         self.push(track, signs, interval..interval + 1, None);
         self.intervals.turn(lane, sign);
     }
 
-    /// Adds some intervals of a track; `velocities` start with that of the first one's
-    /// first key.
+    /// Adds some intervals of a track. `velocities` starts with the velocity at the first
+    /// interval's first key.
     fn push(
         &mut self,
         track: Track,
@@ -205,14 +207,14 @@ impl SmoothPreparation {
         for (i, interval) in intervals.enumerate() {
             let velocities = velocities.and_then(|all| all.get(i..));
             let Some([outward, inward]) = self.given(track, interval, velocities) else {
-                break; // the method has none for any
+                break; // the method has no numbers of its own for any interval
             };
             self.intervals.set_given(first + i, outward, inward);
         }
     }
 
-    /// The method's own numbers for an interval; `velocities` start with that of its
-    /// first key.
+    /// The method's own numbers for an interval. `velocities` starts with the velocity at its first
+    /// key.
     fn given(
         &self,
         track: Track,
@@ -228,7 +230,7 @@ impl SmoothPreparation {
         }
     }
 
-    /// Makes the intervals that wait into curves, and has them fitted.
+    /// Computes the curves of the intervals that wait, and has them fitted.
     fn flush(&mut self, prepared: &mut Prepared) {
         let is_exact = self.curves();
         let stretches = std::mem::take(&mut self.stretches);
@@ -262,7 +264,7 @@ impl SmoothPreparation {
         self.stretches.clear();
     }
 
-    /// Lets a stretch wait until all of its track is there.
+    /// Lets the curves of a stretch wait until all of its track is there.
     fn wait(&mut self, stretch: &Stretch) {
         for (i, lane) in stretch.lanes().enumerate() {
             let place = Place {
@@ -330,7 +332,7 @@ impl SmoothPreparation {
         }
     }
 
-    /// Makes the intervals that wait into curves; whether in f64.
+    /// Computes the curves of the intervals that wait. Returns whether they are there in f64.
     fn curves(&mut self) -> bool {
         if let Some(direct) = &mut self.direct {
             direct.find_curves(&self.intervals, &self.stretches);
@@ -352,7 +354,8 @@ impl SmoothPreparation {
         self.is_frozen() && at_end && stretch.all > 1
     }
 
-    /// What stands still at its ends does so outside them.
+    /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in
+    /// its first and last interval stands still outside them too.
     fn goes_on(&self, outside: WrapMode) -> bool {
         outside == WrapMode::Extrapolate && !self.is_frozen()
     }
@@ -362,7 +365,8 @@ impl SmoothPreparation {
         uses_ends && matches!(self.interpolation.ends, Ends::Frozen)
     }
 
-    /// Where it goes on outside its keys, it does so at the velocity of its ends.
+    /// Adds the curves that extrapolate a track at the angular velocity of its ends, where the wrap
+    /// mode asks for it.
     fn beyond(&self, prepared: &mut Prepared, stretch: &Stretch) {
         let sides = [
             (stretch.first(), self.interpolation.before, 0.0),
@@ -385,8 +389,8 @@ impl SmoothPreparation {
         }
     }
 
-    /// A curve that does not pass through its keys is held at its own ends; what is held
-    /// does not move.
+    /// Adds the constants held outside a curve that does not pass through its keys: its own end
+    /// values for rotations, 0 for velocities and accelerations.
     fn end_values(&self, prepared: &mut Prepared, stretch: &Stretch) {
         if stretch.key != NONE {
             return;

@@ -1,4 +1,4 @@
-//! Keys that are held until the next: nothing is evaluated, every sample is a key.
+//! Prepares tracks whose keys are held until the next key: every sample is a constant.
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! Translations and scales to segments: cubics in each component, about the middle of
-//! their intervals. They are polynomials already; nothing is fitted.
+//! Prepares translations and scales: a segment is a cubic in each component about the middle of its
+//! interval. It is a polynomial already, so nothing is fitted.
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
@@ -17,7 +17,7 @@ use crate::time::spans::{Beyond, NONE, Part, Source};
 use crate::time::wrap::WrapMode;
 use crate::tracks::vectors::VectorTrack;
 
-/// Adds a track's vectors; those of a track without any are `rest`.
+/// Adds the vectors of the `index`th track; a track without vectors is held at `rest`.
 pub(crate) fn add(
     prepared: &mut Prepared,
     index: usize,
@@ -91,7 +91,7 @@ pub(crate) fn add(
     });
 }
 
-/// The cubic with these ends and slopes by the parameter, in powers from its middle.
+/// The cubic with these ends and slopes per unit of the parameter, in powers about its middle.
 fn cubic(start: DVec3, leaving: DVec3, arriving: DVec3, end: DVec3) -> PolynomialSegment {
     let rise = end - start;
     let powers = [
@@ -107,7 +107,7 @@ fn cubic(start: DVec3, leaving: DVec3, arriving: DVec3, end: DVec3) -> Polynomia
     segment
 }
 
-/// From a point on, so much a second.
+/// A straight line from a point, with this slope per second.
 fn line(from: DVec3, slope: DVec3) -> Curve {
     let shape = Shape::LINE;
     let mut numbers = shape.shared;
@@ -123,7 +123,7 @@ fn line(from: DVec3, slope: DVec3) -> Curve {
     }
 }
 
-/// How a method's curves leave and reach their keys.
+/// The slopes with which a method's curves leave and reach their keys.
 struct Slopes<'a> {
     track: &'a VectorTrack,
     method: VectorMethod,
@@ -146,7 +146,7 @@ impl Slopes<'_> {
         self.track.times[i + 1] - self.track.times[i]
     }
 
-    /// Of interval `i` at both of its keys, by its parameter.
+    /// The slopes of interval `i` at its first and its last key, per unit of its parameter.
     fn of(&self, i: usize) -> [DVec3; 2] {
         let last = self.track.keys.len() - 2;
         let (rise, duration) = (self.rise(i), self.duration(i));
@@ -172,7 +172,8 @@ impl Slopes<'_> {
         }
     }
 
-    /// At the key between two intervals, by the parameter of one that lasts `duration`.
+    /// The slope at the key between two intervals, per unit of the parameter of an interval that
+    /// lasts `duration` seconds.
     fn at_key(&self, before: usize, after: usize, duration: f64) -> DVec3 {
         let (left, right) = (self.rise(before), self.rise(after));
         if self.method == VectorMethod::CatmullRom {

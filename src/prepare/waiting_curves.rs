@@ -1,5 +1,5 @@
-//! Curves of a block that are fitted straight from keys: which lanes they are in, and where
-//! they wait until a block of them is full.
+//! Lists of a block's lanes, and curves straight from keys that wait until they fill a block for
+//! the Hermite fit.
 
 use std::ops::Range;
 
@@ -14,13 +14,14 @@ use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
-/// Some lanes.
+/// A list of lanes.
 pub(crate) struct List {
     count: usize,
     lanes: [u32; ROOM_FOR],
 }
 
-/// As many as a block has, and the last vector. A power of two.
+/// Room for all lanes of a block and the rest of the last vector. A power of two, for a cheap
+/// modulo.
 const ROOM_FOR: usize = 2 * LANES;
 
 impl List {
@@ -37,7 +38,8 @@ impl List {
         self.count += 1;
     }
 
-    /// Adds those of some lanes that are wanted: which they are cannot be foreseen.
+    /// Adds each of some lanes whose squared extent is wanted, without a branch, as its outcome
+    /// could not be predicted.
     #[inline]
     pub(crate) fn push_where(
         &mut self,
@@ -53,12 +55,12 @@ impl List {
         self.count = count;
     }
 
-    /// How many there are.
+    /// The number of lanes.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// Whether there are as many as a block has.
+    /// Whether the list has as many lanes as a block.
     fn is_full(&self) -> bool {
         self.count == LANES
     }
@@ -68,18 +70,18 @@ impl List {
         self.lanes[..self.count].iter().map(|&lane| lane as usize)
     }
 
-    /// Forgets them.
+    /// Empties the list.
     pub(crate) fn clear(&mut self) {
         self.count = 0;
     }
 }
 
-/// Curves that wait.
+/// Curves that wait to be fitted in one way.
 pub(crate) struct WaitingCurves<F: 'static, const PAIRS: usize> {
     how: &'static F,
-    /// The lanes of a block that are to be taken.
+    /// The lanes whose curves [`WaitingCurves::take`] takes.
     pub(crate) lanes: List,
-    /// Made when there is a curve for it.
+    /// Made for the first curve.
     block: Option<Box<Block>>,
 }
 
@@ -98,8 +100,8 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> WaitingCurves<F, PAIRS> {
         }
     }
 
-    /// Takes the curves in the lanes, which become the segments at these places, and fits a
-    /// block of them whenever there is one.
+    /// Takes the curves in the listed lanes, which become the segments at these places, and fits
+    /// them whenever they fill a block.
     pub(crate) fn take(
         &mut self,
         numbers: &CurveNumbers,
@@ -123,7 +125,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> WaitingCurves<F, PAIRS> {
         self.lanes.clear();
     }
 
-    /// Fits those that still wait.
+    /// Fits the curves that still wait.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         if let Some(block) = &mut self.block {
             block.fit(self.how, prepared);
@@ -147,7 +149,7 @@ impl Block {
     }
 }
 
-/// Fits the curves in some lanes to the segments at their places.
+/// Fits the curves in the listed lanes into the segments at their places.
 pub(crate) fn fit<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
     list: &List,
@@ -160,7 +162,7 @@ pub(crate) fn fit<const PAIRS: usize>(
     }
     let segments = &mut prepared.segments.polynomials;
     let count = segments.len();
-    // For the last vector's lanes that have no curve.
+    // The lanes of the last vector that have no curve write to two extra segments.
     segments.extend([PolynomialSegment::zeroed(); 2]);
     in_lanes(&mut Fit::<_, PAIRS> {
         how,
@@ -177,7 +179,7 @@ struct Fit<'a, F, const PAIRS: usize> {
     list: &'a List,
     curves: &'a CurveNumbers,
     places: &'a [u32; ROOM],
-    /// Two more than there are.
+    /// All segments, and two extra ones at the end.
     segments: &'a mut [PolynomialSegment],
 }
 
@@ -185,7 +187,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let &List { count, ref lanes } = self.list;
-        // Made once, as they are cleared before.
+        // Made outside the loop, so that they are cleared only once.
         let mut samples = Samples::<L, PAIRS>::all(L::all(0.0));
         for i in (0..count).step_by(L::COUNT) {
             let lanes = &lanes[i..i + L::COUNT];

@@ -19,7 +19,7 @@ pub(crate) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
             Ends::Loop => step(last),
             Ends::Parabolic => parabola(track, 0, 1),
             Ends::Natural => {
-                // The second derivatives of the first two basis functions cancel.
+                // The second derivatives of the first two factors cancel.
                 let second = bends(basis, 0.0);
                 step(0) * (-second[1] / second[0])
             }
@@ -51,8 +51,8 @@ pub(crate) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     }
 }
 
-/// The six knots about interval `i`; beyond the ends they go on in steps of the last
-/// interval, or across the seam.
+/// The six knots about interval `i`. Beyond the ends they go on in steps of the outermost interval
+/// or, for a loop, across the seam.
 fn knots(track: &Track, ends: Ends, i: usize) -> [f64; 6] {
     let last = track.last() as isize - 1;
     let step = |j: isize| {
@@ -71,8 +71,8 @@ fn knots(track: &Track, ends: Ends, i: usize) -> [f64; 6] {
     knots
 }
 
-/// The key after the end of the parabola through three keys, as far as the interval at
-/// the end is long.
+/// The step beyond an end, as long as the interval at that end, on the parabola through the three
+/// keys there.
 fn parabola(track: &Track, end: usize, next: usize) -> DVec3 {
     let rate = |i: usize| logarithm(track.difference(i)) / track.step(i);
     let (h, next_h) = (track.step(end), track.step(next));

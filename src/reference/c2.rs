@@ -17,8 +17,9 @@ pub(crate) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment 
     }
 }
 
-/// The angular velocities at the keys (rad/s, body frame) that make the angular
-/// acceleration continuous: each in turn is moved until it is so at its key.
+/// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
+/// continuous. Each in turn is changed so that it is continuous at its key, until nothing changes
+/// any more.
 pub(crate) fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
     let secant = |i: usize| 2.0 * logarithm(track.difference(i)) / track.step(i);
@@ -49,8 +50,8 @@ pub(crate) fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     }
     let intervals: Vec<Interval> = (0..last).map(|i| Interval::new(track, i)).collect();
     relax(&intervals, ends, &mut velocities, &vec![false; last + 1]);
-    // With the part that is not linear there need be no solution where the curve is
-    // faster than a turn an interval.
+    // The nonlinear part of the acceleration is left out at keys where the curve is faster than a
+    // full turn per interval: there the equations with it may have no solution.
     let bent: Vec<bool> = (0..=last)
         .map(|key| {
             let before = if key == 0 { last - 1 } else { key - 1 };
@@ -101,11 +102,11 @@ fn relax(intervals: &[Interval], ends: Ends, velocities: &mut [DVec3], bent: &[b
     }
 }
 
-/// What does not depend on the velocities.
+/// The constants of an interval, which do not depend on the velocities.
 struct Interval {
     /// Half of the rotation vector from its first key to its last.
     whole: DVec3,
-    /// From the angular velocity to that vector's rate of change.
+    /// From the angular velocity at the last key to that vector's rate of change.
     to_rate: DMat3,
     duration: f64,
 }
@@ -146,8 +147,8 @@ impl Cubic {
         2.0 * (a + b * (2.0 * t) + c * (3.0 * t * t))
     }
 
-    /// Twice `vec(e⁻¹ e'')` for the exponential `e` of it; with `bent` unset only what
-    /// is linear in the velocities.
+    /// Twice `vec(e⁻¹ e'')` for the exponential `e` of the cubic. If `bent` is false, only the part
+    /// that is linear in the velocities.
     fn acceleration(&self, t: f64, bent: bool) -> DVec3 {
         let [a, b, c] = self.powers;
         let v = a * t + b * (t * t) + c * (t * t * t);
@@ -167,7 +168,7 @@ impl Cubic {
     }
 }
 
-/// With `z = x²`: `S = sin(x)/x`, `k = (cos(x) - S)/z`, and `k'` by `z`.
+/// With `z = x²`: `S = sin(x)/x`, `k = (cos(x) - S)/z`, and the derivative of `k` by `z`.
 fn waves(z: f64) -> (f64, f64, f64) {
     let x = z.sqrt();
     if x < 0.1 {

@@ -13,7 +13,7 @@ use crate::reference::tangents::Track;
 use crate::tracks::key_data::Tcb;
 use crate::tracks::set as tracks;
 
-/// Which textbook curve.
+/// The kinds of textbook curves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Keys that are held.
@@ -52,7 +52,7 @@ pub enum Kind {
 pub struct Curve {
     track: Track,
     segments: Vec<Segment>,
-    /// Where it is run through at constant speed.
+    /// Its arc lengths, if it is run through at constant speed.
     pace: Option<Pace>,
 }
 
@@ -65,7 +65,8 @@ impl Curve {
         Self::build(kind, ends, Track::new(path, times, keys))
     }
 
-    /// The curve of a track with all that it carries; `tcb` where it has none of its own.
+    /// The curve of a track with all the data of its keys. `tcb` holds for every key if the track
+    /// has none of its own.
     pub(crate) fn of_track(
         kind: Kind,
         path: Path,
@@ -87,7 +88,7 @@ impl Curve {
         Self::build(kind, ends, own)
     }
 
-    /// The same curve, run through at one angular speed; keys that are held stay as they are.
+    /// The same curve, run through at one angular speed; a curve of held keys stays as it is.
     pub(crate) fn at_constant_speed(mut self) -> Self {
         let pace = Pace::new(&self.segments);
         self.pace = (pace.total() > 0.0).then_some(pace);
@@ -136,7 +137,8 @@ impl Curve {
         };
         match &self.pace {
             Some(pace) => {
-                // Next to where it may start from rest, without a direction.
+                // A segment may start or end at rest, without a direction: that next to it is
+                // taken.
                 let moving = t.clamp(1e-6, 1.0 - 1e-6);
                 let direction = self.segments[i].velocity(moving).normalize_or_zero();
                 direction * (pace.total() / self.duration())
@@ -155,7 +157,7 @@ impl Curve {
         let Some(pace) = &self.pace else {
             return self.segment_acceleration(i, t);
         };
-        // Only the direction changes.
+        // At constant speed only the direction of the velocity changes.
         let speed = pace.total() / self.duration();
         let (velocity, bend) = (
             self.segments[i].velocity(t),
@@ -240,7 +242,7 @@ fn by_handles(track: &Track, kind: Kind, ends: Ends, i: usize) -> Segment {
     let incoming = (closed || i < last).then(|| track.handles(kind, i + 1).0);
     let (q, r) = (track.keys[i], track.keys[i + 1]);
     let whole = logarithm(track.difference(i));
-    // Half of the angle that an end turns by in the whole interval.
+    // Half of the rotation vector that an end's angular velocity gives over the interval.
     let half_turn = |start: bool| match ends {
         Ends::Secant => Some(whole),
         Ends::Clamped { start: w, .. } if start => Some(w / 2.0 * track.step(i)),
@@ -285,8 +287,8 @@ fn by_handles(track: &Track, kind: Kind, ends: Ends, i: usize) -> Segment {
     }
 }
 
-/// The handle of the key at an end of the track, where `other` is that at the other end
-/// of its interval.
+/// The handle of the key at an end of the track; `other` is the handle at the other end of its
+/// interval.
 fn end_handle(
     kind: Kind,
     ends: Ends,

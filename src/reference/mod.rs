@@ -1,4 +1,4 @@
-//! The textbook in f64: what the engine's bits are measured against.
+//! The textbook in f64, against which the engine's results are measured.
 //!
 //! It shares no code and no trick with the engine: formulas as the papers have
 //! them, one rotation at a time, with the platform's own sine and cosine. Slow, and

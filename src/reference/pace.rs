@@ -1,8 +1,8 @@
-//! A curve at constant speed: how long it is, and where it is after a part of that.
+//! Arc lengths of a curve, by which it is run through at constant speed.
 
 use crate::reference::segment::Segment;
 
-/// Panels of each segment; each is integrated by three points of Gauss.
+/// Panels of each segment; each is integrated by Gauss quadrature with three points.
 const PANELS: usize = 256;
 
 /// Lengths of curves, radians.
@@ -28,8 +28,8 @@ impl Pace {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// The segment, and its parameter, where the curve has turned by that part of its
-    /// length, 0 to 1.
+    /// The segment and its parameter at which the curve has covered the given part, 0 to 1, of its
+    /// length.
     pub(crate) fn place(&self, segments: &[Segment], part: f64) -> (usize, f64) {
         let target = part * self.total();
         let panels = self.lengths.len() - 1;

@@ -22,8 +22,8 @@ pub(crate) enum Segment {
     Bezier([DQuat; 4]),
     /// `q0 s0 s1 q1` (Shoemake 1987).
     Squad([DQuat; 4]),
-    /// Keys and tangents of each component (glTF 2.0, appendix C.5): `p0 m0 m1 p1`, the
-    /// tangents times the interval's length.
+    /// Keys and tangents of each component (glTF 2.0, appendix C.5): `p0 m0 m1 p1`, the tangents
+    /// multiplied by the interval's length.
     Cubic([DQuat; 4]),
     /// `base exp(a t + b t² + c t³)`.
     RotationVector {
@@ -71,14 +71,14 @@ impl Basis {
     }
 }
 
-/// The four basis functions up to cubic that are not zero between `knots[2]` and
-/// `knots[3]`, by the recursion of Cox and de Boor; of those of lower degree the last.
+/// The `degree + 1` basis functions that are not zero between `knots[2]` and `knots[3]`, by the
+/// recursion of Cox and de Boor. For a degree below 3 they are the last of the four numbers.
 fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
     let mut n = [0.0, 0.0, 0.0, 1.0];
     for k in 1..=degree {
         let mut next = [0.0; 4];
         for j in 3 - k..4 {
-            // N_j of degree k starts at knot j - 1, seen from the first of the six.
+            // N_j of degree k starts at knot j - 1, counted from the first of the six.
             let knot = |place: usize| knots[(place + j).saturating_sub(1)];
             if n[j] != 0.0 {
                 next[j] += (u - knot(0)) / (knot(k) - knot(0)) * n[j];
@@ -123,7 +123,7 @@ impl Segment {
         }
     }
 
-    /// Twice the derivative of `t`, in the body frame.
+    /// The angular velocity per unit of `t`, in the body frame.
     pub(crate) fn velocity(self, t: f64) -> DVec3 {
         match self {
             Self::Hold(_) => DVec3::ZERO,
@@ -144,9 +144,9 @@ impl Segment {
         }
     }
 
-    /// Twice the second derivative of `t`, in the body frame.
+    /// The angular acceleration per unit of `t` squared, in the body frame.
     pub(crate) fn acceleration(self, t: f64) -> DVec3 {
-        // Central differences of the velocity: also of the formula beyond its interval.
+        // Central differences of the velocity, also of the formula beyond its interval.
         let velocity = |t: f64| self.velocity(t).extend(0.0);
         let slope = differences(|t| DQuat::from_vec4(velocity(t)), t, FIRST);
         vector(slope)
@@ -169,7 +169,7 @@ fn differences(of: impl Fn(f64) -> DQuat, t: f64, weights: [f64; 4]) -> DQuat {
 mod tests {
     use super::*;
 
-    /// Catches a knot too far to the left.
+    /// Catches an index of a knot that is off by one.
     #[test]
     fn even_knots_give_the_uniform_basis_and_any_knots_a_smooth_one() {
         let even = Basis::Knots([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
@@ -187,7 +187,7 @@ mod tests {
         let all = [0.0, 0.4, 1.0, 1.1, 2.0, 4.0, 4.5];
         let left = Basis::Knots(std::array::from_fn(|i| all[i]));
         let right = Basis::Knots(std::array::from_fn(|i| all[i + 1]));
-        // The last function of one interval is the one before it in the next.
+        // A basis function that is the last one in an interval is the last but one in the next.
         let (ends, starts) = (left.values(1.0), right.values(0.0));
         assert!((ends[1] - starts[0]).abs() < 1e-15 && (ends[2] - starts[1]).abs() < 1e-15);
         let (ends, starts) = (left.derivatives(1.0), right.derivatives(0.0));

@@ -9,7 +9,7 @@ use crate::reference::quaternion::{
 };
 use crate::tracks::key_data::Tcb;
 
-/// Below this, a dot product's sign is the rounding of f32 keys and says nothing.
+/// The sign of a dot product of smaller magnitude may be due to the rounding of f32 keys.
 const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
 
 /// One track in f64.
@@ -52,8 +52,8 @@ impl Track {
         self.times[i + 1] - self.times[i]
     }
 
-    /// The difference and the time step before key `i` (after it: the same at
-    /// `i`); a closed track continues across its seam.
+    /// The difference and the time step of the interval before key `i` or, if not `before`, after
+    /// it; at its ends a closed track continues across the seam.
     fn side(&self, i: usize, before: bool) -> (DQuat, f64) {
         let interval = match (i, before) {
             (0, true) => self.last() - 1,
@@ -101,7 +101,7 @@ impl Track {
                     bias,
                 } = self.tcb[i];
                 let tight = 1.0 - tension;
-                // The names are Geier's.
+                // The names are those of Geier's documentation of `splines`.
                 let a = tight * (1.0 + continuity) * (1.0 + bias);
                 let b = tight * (1.0 - continuity) * (1.0 - bias);
                 let c = tight * (1.0 - continuity) * (1.0 + bias);
@@ -126,7 +126,7 @@ fn double(p: DQuat, q: DQuat) -> DQuat {
     q * (2.0 * inner(p, q)) - p
 }
 
-/// `(p + q)/|p + q|`; `or` where there is none.
+/// `(p + q)/|p + q|`; `or` if the sum is almost zero.
 fn bisect(p: DQuat, q: DQuat, or: DQuat) -> DQuat {
     let sum = p + q;
     if inner(sum, sum).sqrt() > 1e-12 {

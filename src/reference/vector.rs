@@ -1,4 +1,4 @@
-//! Vectors between keys: Hermite cubics, as in the books.
+//! Curves of vectors between keys: Hermite cubics, as in the books.
 
 use glam::DVec3;
 
@@ -9,13 +9,14 @@ use crate::curve::options::Ends;
 pub struct VectorCurve {
     /// `step`, `linear`, `catmull-rom`, `bessel-overhauser` or `gltf-cubic`.
     pub method: &'static str,
-    /// What happens at the ends; clamped ones are at rest.
+    /// The curve at the ends; clamped ends are at rest.
     pub ends: Ends,
     /// Seconds.
     pub times: Vec<f64>,
     /// A vector for each time.
     pub keys: Vec<DVec3>,
-    /// With which the curve arrives and leaves, units a second; none for 0.
+    /// Tangents with which the curve arrives at each key and leaves it, units per second; 0 for a
+    /// key that has none.
     pub tangents: Vec<[DVec3; 2]>,
 }
 
@@ -57,7 +58,7 @@ impl VectorCurve {
             + m1 * (t3 - t2)
     }
 
-    /// At both keys of interval `i`, by its parameter.
+    /// The tangents at both keys of interval `i`, per unit of its parameter.
     fn tangents_of(&self, i: usize) -> (DVec3, DVec3) {
         let last = self.keys.len() - 1;
         let closed = self.ends == Ends::Loop;

@@ -31,9 +31,9 @@ pub(crate) type Code = (&'static str, &'static [u8]);
 
 /// A kernel as the build compiled it.
 pub(crate) struct KernelCode {
-    /// Reads storage buffers.
+    /// The code that reads storage buffers.
     storage: Code,
-    /// Reads texel buffers: all of its bindings but the last.
+    /// The code that reads texel buffers: all bindings but the last.
     texels: Option<Code>,
     /// How many buffers it binds.
     pub(crate) bindings: u32,
@@ -45,7 +45,8 @@ impl Kernel {
         &KERNELS[self as usize]
     }
 
-    /// Its code, and whether that reads texel buffers, as is asked for where it can.
+    /// Its code, and whether that reads texel buffers: it does if asked to and if the kernel has
+    /// such code.
     pub(crate) fn code(self, reads_texels: bool) -> (Code, bool) {
         let KernelCode {
             storage, texels, ..

@@ -63,8 +63,8 @@ pub enum SpirvError {
         /// Its width in bits.
         bits: u32,
     },
-    /// No place for the addition: the module has no types, memory model or entry
-    /// point.
+    /// The module has no types, memory model or entry point, so there is no place for the
+    /// additions.
     Incomplete,
 }
 
@@ -181,8 +181,8 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     Ok([&module[..place], &additions, &module[place..]].concat())
 }
 
-/// Turns the textures of one dimension of a module into texel buffers, which are read the
-/// same way and as long as a buffer may be. WGSL has none.
+/// Turns the one-dimensional textures of a module into texel buffers, which WGSL does not have.
+/// They are read in the same way, and may be as long as a buffer.
 ///
 /// # Errors
 /// A [`SpirvError`] for words that are no module.
@@ -190,10 +190,10 @@ pub fn texel_buffers(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     const SAMPLED_1D: u32 = 43;
     const SAMPLED_BUFFER: u32 = 46;
     const BUFFER: u32 = 5; // a dimension
-    const FETCH_WORDS: usize = 5; // without the level of detail, which a buffer has not
+    const FETCH_WORDS: usize = 5; // without the level of detail, which buffers do not have
     let code = instructions(module)?;
     let mut words = module[..HEADER_WORDS].to_vec();
-    // Types, and what was loaded of them.
+    // The ids of the types that were changed, and of values loaded of these types.
     let mut buffers = BTreeSet::new();
     for instruction in &code {
         let first = words.len();

@@ -2,9 +2,9 @@
 //! binary runs everywhere. Every choice gives the same bits; only addition,
 //! subtraction and multiplication are used, never a fused one.
 //!
-//! Work is compiled once for each width. Where nothing is optimised that would take two thirds of
-//! a build for no speed, so that such a build has the baseline alone (`wide_vectors`, set by the
-//! build script).
+//! Work is compiled once for each width. In a build without optimisation the wide vectors would
+//! take two thirds of the build time and bring no speed, so it has the baseline alone (the build
+//! script sets `wide_vectors` in the others).
 
 use std::str::FromStr;
 use std::sync::OnceLock;
@@ -39,8 +39,8 @@ impl VectorWidth {
             .collect()
     }
 
-    /// The widest that this process uses where nobody chooses: what the processor has,
-    /// or less where the environment's `TUMBLE_VECTOR_WIDTH` says so.
+    /// The width that is used unless a caller chooses one: the widest that the processor has, or a
+    /// narrower one that the environment variable `TUMBLE_VECTOR_WIDTH` names.
     pub fn widest() -> Self {
         static WIDEST: OnceLock<VectorWidth> = OnceLock::new();
         #[cfg(test)]
@@ -53,7 +53,7 @@ impl VectorWidth {
         })
     }
 
-    /// The limit that the environment sets.
+    /// The width that the environment variable names, if it is set.
     pub(crate) fn limit() -> Result<Option<Self>, UnknownWidth> {
         match std::env::var("TUMBLE_VECTOR_WIDTH") {
             Ok(name) if !name.is_empty() => name.parse().map(Some),
@@ -86,7 +86,7 @@ impl VectorWidth {
     }
 }
 
-/// A name that is no vector width's.
+/// The name is not that of a vector width.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no vector width `{name}`; there are baseline, avx2 and avx512")]
 pub struct UnknownWidth {
@@ -110,14 +110,14 @@ impl FromStr for VectorWidth {
 }
 
 /// Work over lanes: `run` is compiled for each vector width. Implementations are
-/// `#[inline(always)]`. Loops that are not written in vectors have no branches, calls or
-/// intrinsics, so that the compiler makes vectors of them.
+/// `#[inline(always)]`. Plain loops in them have no branches, calls or intrinsics, so that the
+/// compiler vectorises them.
 pub(crate) trait InLanes {
-    /// `L`: the vectors, for work that is written in them.
+    /// `L` is the type of vectors, for work that is written in them.
     fn run<L: Lanes>(&mut self);
 }
 
-/// Does work over lanes with the widest vectors there are.
+/// Does work over lanes with vectors of the width [`VectorWidth::widest`].
 pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
     in_lanes_of(VectorWidth::widest(), work);
 }
@@ -136,14 +136,14 @@ pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     }
 }
 
-/// As [`InLanes`], with the output apart: behind the one `&mut self` of [`InLanes`] the compiler
-/// cannot tell that what is written and what is read lie in different places, which costs a fifth
+/// As [`InLanes`], with the output as an argument of its own. Behind the one `&mut self` of
+/// [`InLanes`] the compiler cannot know that input and output do not overlap, which costs a fifth
 /// of the time of a row.
 pub(crate) trait InLanesInto<O: ?Sized> {
-    /// What comes of it beside the output.
+    /// What `run` returns beside the output.
     type Outcome;
 
-    /// `L`: the vectors, for work that is written in them.
+    /// `L` is the type of vectors, for work that is written in them.
     fn run<L: Lanes>(&self, output: &mut O) -> Self::Outcome;
 }
 
@@ -198,9 +198,9 @@ fn avx2_into<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outco
     work.run::<Eight>(output)
 }
 
-/// The narrowest vectors with which long results are better written past the caches on this
-/// processor, if any. A core of Intel's waits for each line that it overwrites, one of AMD's Zen 5
-/// often; Zen 3 writes as fast either way.
+/// The narrowest vectors with which streaming stores, past the caches, write long results faster on
+/// this processor, if any do. With ordinary stores Intel's cores wait for each cache line that they
+/// overwrite, and AMD's Zen 5 often does; Zen 3 is as fast either way.
 pub(crate) fn streaming_stores_from() -> Option<VectorWidth> {
     static FROM: OnceLock<Option<VectorWidth>> = OnceLock::new();
     *FROM.get_or_init(detect_streaming_stores)
@@ -212,7 +212,7 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     const ZEN_5: u32 = 26;
     let vendor = __cpuid(0);
     let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
-    // Above 15, it is told in two parts.
+    // The family is a sum of two fields, the second of which is 0 for families below 15.
     let signature = __cpuid(1).eax;
     let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
     match name.as_flattened() {
@@ -227,25 +227,25 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     None
 }
 
-/// Bytes that a cache brings at once, on most processors.
+/// Bytes of a cache line on most processors.
 pub(crate) const CACHE_LINE: usize = 64;
 
-/// Has memory brought into the cache, while what comes next is done.
+/// Prefetches memory into the second-level cache, while other work goes on.
 pub(crate) fn bring_near(memory: &[u8]) {
     #[cfg(target_arch = "x86_64")]
     for line in memory.chunks(CACHE_LINE) {
         use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        // SAFETY: SSE is always there; nothing is read that counts.
+        // SAFETY: SSE is part of x86-64, and a prefetch gives no value.
         unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = memory;
 }
 
-/// What this thread stored past the caches is seen before what it stores from here on.
+/// Orders this thread's streaming stores: others see them before anything it stores from here on.
 pub(crate) fn fence() {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: SSE is always there.
+    // SAFETY: SSE is part of x86-64.
     unsafe {
         std::arch::x86_64::_mm_sfence();
     }

@@ -4,12 +4,13 @@ use glam::Vec4;
 
 use pair::Pair;
 
-/// Makes two vectors of so many numbers by these functions of one, which `$run` calls.
+/// Defines a pair of vectors of `$count` f64 each, with the given functions of one vector, which
+/// the macro `$run` calls.
 macro_rules! doubles {
     ($name:ident: $vector:ident, $count:literal, $run:ident, $all:path, $add:path, $sub:path,
      $mul:path, $div:path, $negated:path, $root:path, $min:path, $max:path, $up_to:path,
      $are_at_most:path) => {
-        /// As many numbers as a vector of f32 has lanes.
+        /// As many f64 as the vector of f32 has lanes.
         #[derive(Clone, Copy)]
         pub(crate) struct $name(pub(crate) [$vector; 2]);
 
@@ -120,7 +121,7 @@ macro_rules! doubles {
 #[cfg(target_arch = "x86_64")]
 pub(crate) use doubles;
 
-/// What every processor of the target does.
+/// Calls instructions that every processor of the target has.
 #[cfg(target_arch = "x86_64")]
 macro_rules! baseline {
     ($($work:tt)*) => {
@@ -148,14 +149,14 @@ impl Four {
         pair::rounded(a, b)
     }
 
-    /// The same in f64.
+    /// The same numbers in f64.
     #[inline(always)]
     pub(crate) fn of(numbers: Vec4) -> Self {
         Self(pair::widened(numbers))
     }
 }
 
-/// Two numbers, by SSE2.
+/// Vectors of two f64, by the instructions of SSE2.
 #[cfg(target_arch = "x86_64")]
 mod pair {
     use std::arch::x86_64::{
@@ -203,7 +204,7 @@ mod pair {
     }
 }
 
-/// Two numbers, by what the compiler makes of them.
+/// Vectors of two f64 on other targets, by glam's portable type.
 #[cfg(not(target_arch = "x86_64"))]
 mod pair {
     pub(crate) use glam::DVec2 as Pair;

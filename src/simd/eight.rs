@@ -21,17 +21,16 @@ use crate::simd::doubles::doubles;
 use crate::simd::lanes::{Lanes, Number};
 use crate::simd::operators::operators;
 
-/// What only processors with AVX2 do.
+/// Calls instructions of AVX2.
 macro_rules! avx2 {
     ($($work:tt)*) => {
-        // SAFETY: functions that are compiled for AVX2 alone use `Eight`, and those run where
-        // the processor has it (`Kernels::new`, `lanes_of`).
+        // SAFETY: `dispatch`, like the tests, uses `Eight` only where the processor has AVX2.
         unsafe { $($work)* }
     };
 }
 
-/// Samples 0 2 4 6 in one half and 1 3 5 7 in the other: so two neighbours lie side by side
-/// when each half has been transposed, and the halves need not be exchanged.
+/// Eight samples: 0 2 4 6 in one half and 1 3 5 7 in the other. After a transposition of each half
+/// two neighbouring rotations lie side by side, without an exchange between the halves.
 #[derive(Clone, Copy)]
 pub(crate) struct Eight(__m256);
 
@@ -60,7 +59,7 @@ impl Number for Eight {
 }
 
 impl Eight {
-    /// A rotation in each half.
+    /// A vector with a rotation in each half.
     #[inline(always)]
     fn of_two(first: [f32; 4], second: [f32; 4]) -> Self {
         Self(avx2!(_mm256_set_m128(
@@ -169,7 +168,7 @@ impl Lanes for Eight {
         let to: [[f32; 4]; 8] = *to.first_chunk().expect("eight rotations");
         let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(from);
         let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(to);
-        // Multiplied before they are put side by side: half as much to put.
+        // Multiplied before the transposition, so that only the products are transposed.
         let [x, y, z, w] = Self::transposed([
             Self(a) * Self(e),
             Self(b) * Self(f),
@@ -186,7 +185,7 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn fourfold(self) -> [Self; 4] {
-        // Lanes are in the order for it.
+        // The order of lanes is such that nothing crosses between the halves.
         avx2! {
             [
                 Self(_mm256_permute_ps::<0b00_00_00_00>(self.0)),
@@ -237,7 +236,7 @@ impl Lanes for Eight {
         let places: [usize; 8] = *places.first_chunk().expect("eight places");
         let segments: &mut [[[f32; 4]; POWERS]] = bytemuck::cast_slice_mut(segments);
         let segments = Cell::from_mut(segments).as_slice_of_cells();
-        // Each is looked up once, not for every power.
+        // Each segment is looked up once, not for every power.
         let own = places.map(|place| segments[place].as_array_of_cells());
         for (power, &components) in powers.iter().enumerate() {
             let rotations = Self::rotations(components);
@@ -264,7 +263,7 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn store_past_caches(self, half: &mut HalfLine) {
-        // The place is aligned as half of a line is.
+        // `HalfLine` is aligned as this instruction demands.
         avx2!(_mm256_stream_ps(std::ptr::from_mut(half).cast(), self.0));
     }
 

@@ -1,4 +1,4 @@
-//! What the twins compute with: the number of one sample, or those of several in one vector.
+//! The numbers that the twins compute with: an f32 for one sample, or a vector for several.
 
 use crate::math::canonical;
 use std::ops::Neg;
@@ -11,7 +11,8 @@ use crate::shader::PolynomialSegment;
 use crate::shader::TINY_BITS;
 use crate::simd::doubles::Four;
 
-/// A number of one sample, or of several. Whatever it is of, an operation rounds alike.
+/// The number of one sample, or a vector with the numbers of several samples. An operation rounds
+/// alike for either.
 pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The same for every sample.
     fn all(value: f32) -> Self;
@@ -38,78 +39,79 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
     [x.canonical(), y.canonical(), z.canonical(), w.canonical()]
 }
 
-/// The numbers of several consecutive samples, in an order of their own.
+/// A vector with the numbers of several consecutive samples. Each width has an order of lanes of
+/// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
 pub(crate) trait Lanes: Number {
-    /// How many.
+    /// Number of samples.
     const COUNT: usize;
 
-    /// What evaluates runs of few: these, or vectors half as wide.
+    /// The vectors that evaluate short runs: these, or vectors half as wide.
     type Narrow: Lanes;
 
-    /// As many rotations.
+    /// An array of [`Lanes::COUNT`] rotations.
     type Rotations: AsRef<[[f32; 4]]>;
 
-    /// As many in f64.
+    /// The numbers of [`Lanes::COUNT`] samples in f64.
     type Doubles: Doubles;
 
-    /// A vector in memory, at a multiple of its size.
+    /// A vector in memory, aligned as [`Lanes::store_past_caches`] needs it.
     type Block: Pod;
 
     /// Rounded to f32.
     fn rounded(numbers: Self::Doubles) -> Self;
 
-    /// The same in f64.
+    /// The same numbers in f64.
     fn widened(self) -> Self::Doubles;
 
-    /// Of [`Lanes::COUNT`] samples.
+    /// Loads the first [`Lanes::COUNT`] of consecutive samples.
     fn load(samples: &[f32]) -> Self;
 
-    /// To [`Lanes::COUNT`] samples.
+    /// Stores to [`Lanes::COUNT`] consecutive samples.
     fn store(self, samples: &mut [f32]);
 
-    /// `x y z w` of [`Lanes::COUNT`] rotations.
+    /// Loads the first [`Lanes::COUNT`] rotations, a vector for each of `x y z w`.
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4];
 
-    /// The same of rotations that lie anywhere: the first [`Lanes::COUNT`] of the `places`.
+    /// The same for rotations that lie at the first [`Lanes::COUNT`] of the `places`.
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
 
-    /// The inner products of [`Lanes::COUNT`] pairs of rotations.
+    /// The inner products of the first [`Lanes::COUNT`] pairs of rotations.
     fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self;
 
-    /// A rotation again and again, `x y z w x y z w …`.
+    /// One rotation, repeated: `x y z w x y z w …`.
     fn repeated(rotation: [f32; 4]) -> Self;
 
-    /// Each number four times over, for the components of its sample's rotation: those of
-    /// the first quarter of the samples, and so on.
+    /// Repeats each number four times, for the four components of its sample's rotation: the first
+    /// vector has the numbers of the first quarter of the samples, and so on.
     fn fourfold(self) -> [Self; 4];
 
-    /// Each of a quarter of [`Lanes::COUNT`] numbers four times over.
+    /// Loads a quarter of [`Lanes::COUNT`] numbers and repeats each four times.
     fn fourfold_of(samples: &[f32]) -> Self;
 
-    /// To a quarter of [`Lanes::COUNT`] rotations, `x y z w x y z w …`.
+    /// Stores a vector of rotations, `x y z w x y z w …`, to a quarter of [`Lanes::COUNT`] places.
     fn store_side_by_side(self, rotations: &mut [[f32; 4]]);
 
-    /// From `x y z w`, the rotations of the first quarter of the samples side by side, and so
-    /// on.
+    /// From a vector for each of `x y z w` to vectors of whole rotations: the first has those of
+    /// the first quarter of the samples, and so on.
     fn transposed(components: [Self; 4]) -> [Self; 4];
 
-    /// The rotations of all samples, from those of each quarter side by side.
+    /// The rotations of all samples, from the vectors of whole rotations of each quarter.
     fn joined(quarters: [Self; 4]) -> Self::Rotations;
 
-    /// Puts `x y z w` together.
+    /// The rotations of all samples, from a vector for each of `x y z w`.
     #[inline(always)]
     fn rotations(components: [Self; 4]) -> Self::Rotations {
         Self::joined(Self::transposed(components))
     }
 
-    /// The same, to [`Lanes::COUNT`] places.
+    /// Stores the rotations of all samples, from a vector for each of `x y z w`.
     #[inline(always)]
     fn store_rotations(components: [Self; 4], rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(Self::rotations(components).as_ref());
     }
 
-    /// Stores the coefficients of all powers, `x y z w`, four or more: each lane's to the
-    /// segment at its place.
+    /// Stores coefficients of polynomials, each lane's to the segment at its place. There is a
+    /// vector for each of `x y z w` of every power, and at least four powers.
     #[inline(always)]
     fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
         for (power, &components) in powers.iter().enumerate() {
@@ -122,10 +124,10 @@ pub(crate) trait Lanes: Number {
 
     fn of_block(block: &Self::Block) -> Self;
 
-    /// With the first `count` of the rotations that lie side by side from a block.
+    /// This vector of whole rotations, the first `count` of them replaced by those of a block.
     fn behind(self, block: &Self::Block, count: usize) -> Self;
 
-    /// Stores past the caches, where there is such a thing; seen by other threads behind a
+    /// A streaming store, past the caches, if the target has one. Other threads see it after a
     /// [`fence`](super::dispatch::fence).
     fn store_past_caches(self, block: &mut Self::Block);
 
@@ -134,22 +136,22 @@ pub(crate) trait Lanes: Number {
 
     fn magnitude(self) -> Self;
 
-    /// The larger of two numbers; `other` where one of them is none.
+    /// The larger of two numbers; `other` if either is NaN.
     fn larger(self, other: Self) -> Self;
 
-    /// Whether any is at most `limit`.
+    /// Whether any number is at most `limit`.
     fn any_at_most(self, limit: f32) -> bool;
 }
 
 /// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
 pub(crate) trait Doubles: Real {
-    /// Of the first so many numbers.
+    /// Loads as many numbers as there are lanes.
     fn load(numbers: &[f64]) -> Self;
 
-    /// To the first so many numbers.
+    /// Stores to the first numbers, one for each lane.
     fn store(self, numbers: &mut [f64]);
 
-    /// Whether each is a number, and not more than `limit`.
+    /// Whether every number is at most `limit`, and none is NaN.
     fn are_at_most(self, limit: f64) -> bool;
 }
 
@@ -215,7 +217,7 @@ impl Lanes for Vec4 {
     fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
         let from: &[[f32; 4]; 4] = from.first_chunk().expect("four rotations");
         let to: &[[f32; 4]; 4] = to.first_chunk().expect("four rotations");
-        // Multiplied before they are put side by side: half as much to put.
+        // Multiplied before the transposition, so that only the products are transposed.
         let [x, y, z, w] = rows(Mat4::from_cols(
             Self::from(from[0]) * Self::from(to[0]),
             Self::from(from[1]) * Self::from(to[1]),
@@ -312,7 +314,8 @@ pub(crate) mod tests {
         numbers.iter().map(|number| number.to_bits()).collect()
     }
 
-    /// Of as many powers as gentle curves have: four, and four of which one is among them.
+    /// Seven powers, as small-angle cubics have: they may be stored as four, and four more of which
+    /// one is stored already.
     fn powers_come_to_their_places<L: Lanes>() {
         let number = |power: usize, lane: usize, c: usize| (100 * power + 10 * lane + c) as f32;
         let component = |power: usize, c: usize| {
@@ -336,8 +339,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Catches lanes that are put together in another order than they were loaded in, and a
-    /// comparison that is off by one bit.
+    /// Catches lanes that are stored in another order than they were loaded in, and a comparison
+    /// that is off by one bit.
     pub(crate) fn lanes_are_samples<L: Lanes>() {
         let tiny = f32::from_bits(TINY_BITS);
         let below = f32::from_bits(TINY_BITS - 1);

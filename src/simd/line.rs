@@ -1,4 +1,4 @@
-//! Cache lines, the unit of stores that go past the caches.
+//! Cache lines, the unit of streaming stores, which go past the caches.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -7,5 +7,5 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C, align(64))]
 pub(crate) struct Line(pub(crate) [[f32; 4]; EACH]);
 
-/// Rotations of a line.
+/// Number of rotations in a line.
 pub(crate) const EACH: usize = 4;

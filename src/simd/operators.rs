@@ -1,6 +1,7 @@
-//! The operators of vectors.
+//! The arithmetic operators of the vector types.
 
-/// Makes those of a struct of one vector by these functions, which `$run` calls.
+/// Implements the operators of a struct of one vector with the given functions, which the macro
+/// `$run` calls.
 macro_rules! operators {
     ($name:ident: $run:ident, $add:path, $sub:path, $mul:path, $xor:path) => {
         impl std::ops::Add for $name {

@@ -20,17 +20,16 @@ use crate::simd::lanes::{Lanes, Number};
 use crate::simd::line::Line;
 use crate::simd::operators::operators;
 
-/// What only processors with AVX-512 do.
+/// Calls instructions of AVX-512.
 macro_rules! avx512 {
     ($($work:tt)*) => {
-        // SAFETY: functions that are compiled for AVX-512 alone use `Sixteen`, and those run
-        // where the processor has it (`Kernels::new`, `lanes_of`).
+        // SAFETY: `dispatch`, like the tests, uses `Sixteen` only where the processor has AVX-512.
         unsafe { $($work)* }
     };
 }
 
-/// Samples 0 4 8 12 in the first quarter, 1 5 9 13 in the next, and so on: so four neighbours
-/// lie side by side when each quarter has been transposed.
+/// Sixteen samples: 0 4 8 12 in the first quarter, 1 5 9 13 in the next, and so on. After a
+/// transposition of each quarter four neighbouring rotations lie side by side.
 #[derive(Clone, Copy)]
 pub(crate) struct Sixteen(__m512);
 
@@ -52,14 +51,14 @@ impl Number for Sixteen {
     }
 }
 
-/// Two halves.
+/// A vector of two halves.
 #[inline(always)]
 fn joined(low: __m256, high: __m256) -> __m512 {
     avx512!(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
 }
 
 impl Sixteen {
-    /// From the order of lanes to that of samples, and back.
+    /// From the order of lanes to that of samples or back: the permutation is its own inverse.
     #[inline(always)]
     fn reordered(self) -> Self {
         Self(avx512! {
@@ -68,7 +67,7 @@ impl Sixteen {
         })
     }
 
-    /// The first quarters of four vectors side by side, and so on.
+    /// A vector of the first quarters of all four vectors, one of the second quarters, and so on.
     #[inline(always)]
     fn quarters_exchanged([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         avx512! {
@@ -85,7 +84,7 @@ impl Sixteen {
         }
     }
 
-    /// A rotation in each quarter.
+    /// A vector with a rotation in each quarter.
     #[inline(always)]
     fn of_four([a, b, c, d]: [[f32; 4]; 4]) -> Self {
         Self(avx512! {
@@ -190,7 +189,7 @@ impl Lanes for Sixteen {
         let to: [[f32; 4]; 16] = *to.first_chunk().expect("sixteen rotations");
         let [a, b, c, d] = bytemuck::cast::<_, [__m512; 4]>(from);
         let [e, f, g, h] = bytemuck::cast::<_, [__m512; 4]>(to);
-        // Multiplied before they are put side by side: half as much to put.
+        // Multiplied before the transposition, so that only the products are transposed.
         let [x, y, z, w] = Self::transposed([
             Self(a) * Self(e),
             Self(b) * Self(f),
@@ -207,7 +206,7 @@ impl Lanes for Sixteen {
 
     #[inline(always)]
     fn fourfold(self) -> [Self; 4] {
-        // Lanes are in the order for it.
+        // The order of lanes is such that nothing crosses between the quarters.
         avx512! {
             [
                 Self(_mm512_permute_ps::<0b00_00_00_00>(self.0)),
@@ -253,8 +252,8 @@ impl Lanes for Sixteen {
 
     #[inline(always)]
     fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
-        // A vector for each lane and four powers: a quarter as many stores. The last four
-        // begin with what is stored already.
+        // One store for four powers of a lane, a quarter as many. If the number of powers is not a
+        // multiple of four, the last store repeats some that are stored already.
         for i in 0..powers.len().div_ceil(4) {
             let first = (4 * i).min(powers.len() - 4);
             let a = Self::transposed(powers[first]);
@@ -287,7 +286,7 @@ impl Lanes for Sixteen {
 
     #[inline(always)]
     fn store_past_caches(self, line: &mut Line) {
-        // The place is aligned as a line is.
+        // `Line` is aligned as this instruction demands.
         avx512!(_mm512_stream_ps(std::ptr::from_mut(line).cast(), self.0));
     }
 

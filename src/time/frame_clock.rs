@@ -1,11 +1,11 @@
-//! Seconds to frames, in f64: where spans start and end, and how the parameter of their
-//! samples follows.
+//! From seconds to frames, in f64: where spans start and end among the frames, and how the
+//! parameter of a sample follows from its frame number.
 
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
 use crate::time::wrap::TrackCopy;
 
-/// How the parameter of a span's frames follows from their numbers.
+/// How the parameter of a frame within a span follows from the frame's number.
 pub(crate) struct InFrames {
     /// The whole frame nearest to the span's middle.
     pub(crate) whole: f64,
@@ -14,8 +14,8 @@ pub(crate) struct InFrames {
     pub(crate) offset: f32,
 }
 
-/// A span between two frame coordinates over which the parameter runs through
-/// `extent`.
+/// The constants of a span between two frame coordinates, over which the parameter grows by
+/// `extent`: 1, or -1 for a span that runs backwards.
 #[inline(always)]
 pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
     let middle = (from + to) * 0.5;
@@ -28,19 +28,20 @@ pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
     }
 }
 
-/// Finite: a segment far shorter than a frame holds at most the frame at distance 0.
+/// Rounds a scale to a finite f32. Only a segment far shorter than a frame exceeds f32; it holds at
+/// most the frame at distance 0, for which an infinite scale would give NaN.
 #[inline(always)]
 pub(crate) fn finite_scale(scale: f64) -> f32 {
     let largest = f64::from(f32::MAX);
     round_f32(if scale < largest { scale } else { largest })
 }
 
-/// Key times as frames: exact ratios in f64.
+/// Converts key times to frame coordinates, in f64 and by an exact frame rate.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct FrameClock {
     rate: FrameRate,
     start: f64,
-    /// Frames by which the rounding of a key's time may move it.
+    /// How far the rounding of a time to f64 may move a key, in frames.
     rounding: f64,
 }
 
@@ -54,7 +55,7 @@ pub(crate) struct Boundary {
 }
 
 impl FrameClock {
-    /// `latest`: the largest time that will be asked for.
+    /// `latest` is the largest time that will be converted, in seconds.
     pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
         let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
         Self {
@@ -64,8 +65,8 @@ impl FrameClock {
         }
     }
 
-    /// A time within its own rounding of a whole frame is that frame, so a sample on
-    /// a key returns the key at hour 24 too.
+    /// A time that is within its rounding of a whole frame counts as that frame, so that a sample
+    /// on a key returns the key even at hour 24.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
         settled(self.rate.frames_in(time - self.start), self.rounding)
@@ -83,7 +84,7 @@ impl FrameClock {
     }
 }
 
-/// Frame coordinates, a whole frame where they are one but for rounding.
+/// The boundary at a frame coordinate, moved to a whole frame that is within `rounding` of it.
 #[inline(always)]
 fn settled(exact: f64, rounding: f64) -> Boundary {
     let whole = nearest_whole(exact);
@@ -96,19 +97,19 @@ fn settled(exact: f64, rounding: f64) -> Boundary {
     Boundary { frame, first }
 }
 
-/// What tells where the intervals of a track lie among the frames.
+/// Converts the times of a track, or of a track copy, to frame coordinates.
 pub(crate) trait Clock: Copy {
     /// Whether frames run against the track's own time: intervals are met from the last to the
     /// first, and the parameter falls.
     const IS_REVERSED: bool = false;
 
-    /// Where a time lies.
+    /// Where a time of the track lies among the frames.
     fn boundary(self, time: f64) -> Boundary;
 
-    /// The track's own time at a frame, where the frames are the track's own.
+    /// The track's time at a frame; `None` in a track copy.
     fn own_time(self, frame: usize) -> Option<f64>;
 
-    /// Frames in a second.
+    /// Frames per second.
     fn rate(self) -> f64;
 }
 
@@ -129,7 +130,7 @@ impl Clock for FrameClock {
     }
 }
 
-/// The frames of a copy of a track.
+/// The clock of a track copy that runs forwards or, if `IS_REVERSED`, backwards.
 #[derive(Clone, Copy)]
 pub(crate) struct CopyClock<const IS_REVERSED: bool> {
     own: FrameClock,

@@ -40,7 +40,8 @@ impl FrameRate {
         Ok(rate)
     }
 
-    /// Whole frames per second; 0 is refused where it is used.
+    /// A whole number of frames per second. 0 is refused later, when frames are resolved against a
+    /// set.
     pub(crate) fn whole(frames: u32) -> Self {
         Self {
             frames: u64::from(frames),
@@ -111,7 +112,7 @@ impl FromStr for FrameRate {
     }
 }
 
-/// `12.5e1` as digits over a power of ten.
+/// A decimal such as `12.5e1` as the ratio of its digits to a power of ten.
 fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

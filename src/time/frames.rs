@@ -46,7 +46,7 @@ enum Request {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramesError {
-    /// No frame rate.
+    /// The frame rate is zero, too large, or not a number.
     #[error(
         "`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
     )]
@@ -85,7 +85,7 @@ pub enum FramesError {
     TooMany {
         /// Number of tracks.
         tracks: usize,
-        /// Samples of each.
+        /// Samples of each track.
         frames: f64,
         /// Bytes of the result.
         bytes: f64,
@@ -141,7 +141,8 @@ impl Frames {
         }
     }
 
-    /// Explicit times of each track's own, one track after another.
+    /// Explicit times, seconds, for each track its own: first those of the first track, then those
+    /// of the second, and so on, the same number for each.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self {
@@ -233,7 +234,7 @@ pub struct Timeline {
     count: usize,
 }
 
-/// What a sample index means.
+/// Which time belongs to a sample's index.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Ticks {
     /// Frame `k` lies at `start + k / rate`.
@@ -265,7 +266,7 @@ impl Timeline {
         own
     }
 
-    /// Explicit times, each made another, for every track its own.
+    /// A list of explicit times for every track, each time replaced by `map(track, time)`.
     pub(crate) fn map_times(&self, tracks: usize, map: impl Fn(usize, f64) -> f64) -> Self {
         let times =
             (0..tracks).flat_map(|track| (0..self.count).map(move |sample| (track, sample)));

@@ -1,5 +1,5 @@
-//! Where intervals lie among the samples, some of them at once, in vector lanes: spans of
-//! prepared tracks, or the intervals between keys.
+//! Finds which samples lie in which interval, for up to 32 intervals at once, in vector lanes. The
+//! intervals are the spans of a prepared track, or those between keys.
 
 use std::ops::Range;
 
@@ -9,24 +9,24 @@ use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::{Clock, in_frames};
 use crate::time::runs::{COUNTABLE, Parameter};
 
-/// The frame coordinates of intervals that follow one another, and what the parameters of
-/// their samples follow from.
+/// The frame coordinates of consecutive intervals, and the constants from which the parameters of
+/// their samples follow.
 pub(crate) struct IntervalBlock {
-    /// Where each starts, and at the end where the last one ends, in frames.
+    /// Where each interval starts and, as the last entry, where the last one ends, in frames.
     frame: [f64; Self::LEN + 1],
-    /// The first of the samples asked for that is not before `frame`, or their end.
+    /// The first requested sample that is not before `frame`, or the end of the requested ones.
     pub(crate) first: [usize; Self::LEN + 1],
-    /// Whether that is `frame` itself: 1 or 0.
+    /// 1 if that sample lies exactly at `frame`, else 0.
     pub(crate) is_held: [u64; Self::LEN],
     /// The whole frame nearest to the middle of each.
     pub(crate) whole: [f64; Self::LEN],
-    /// From there to `first`.
+    /// From `whole` to `first`, in frames.
     pub(crate) distance: [f32; Self::LEN],
     pub(crate) scale: [f32; Self::LEN],
     pub(crate) offset: [f32; Self::LEN],
-    /// Whether all distances of samples are whole numbers of f32.
+    /// Whether f32 holds the distances of all samples from `whole` exactly.
     pub(crate) are_near: bool,
-    /// Those that hold samples, by their places in the block.
+    /// The intervals that hold samples, by their places in the block.
     pub(crate) occupied: Occupied,
 }
 
@@ -48,7 +48,8 @@ impl IntervalBlock {
         }
     }
 
-    /// What a curve of the `j`th interval that is evaluated in f64 needs.
+    /// Where the `j`th interval starts and how long it is, for a curve evaluated in f64. The length
+    /// is negative if frames run backwards.
     pub(crate) fn parameter<C: Clock>(&self, j: usize) -> Parameter {
         let (mut start, mut end) = (self.frame[j], self.frame[j + 1]);
         if C::IS_REVERSED {
@@ -58,7 +59,7 @@ impl IntervalBlock {
         Parameter::Frames { start, frames }
     }
 
-    /// Frames of the `j`th interval.
+    /// The length of the `j`th interval in frames.
     pub(crate) fn frames(&self, j: usize) -> f64 {
         self.frame[j + 1] - self.frame[j]
     }
@@ -67,13 +68,13 @@ impl IntervalBlock {
     #[inline(always)]
     pub(crate) fn is_countable(&self, j: usize) -> bool {
         let distance = |sample: usize| (sample as f64 - self.whole[j]).abs();
-        // They do if those of the first and of the one behind the last do.
+        // It is enough to look at the first sample and at the one after the last.
         distance(self.first[j]) < COUNTABLE && distance(self.first[j + 1]) < COUNTABLE
     }
 }
 
-/// A bit for each interval that holds samples, and their places in order. Where keys are
-/// denser than samples no processor guesses which these are.
+/// A bit for each interval that holds samples; iterates over their places in order. Where keys are
+/// denser than samples, a branch for each interval would often be mispredicted.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Occupied(pub(crate) u64);
 
@@ -88,7 +89,7 @@ impl Iterator for Occupied {
     }
 }
 
-/// Intervals that follow one another, in blocks.
+/// Consecutive intervals, a block at a time.
 pub(crate) struct IntervalBlocks<'a, C> {
     clock: C,
     starts: &'a [f64],
@@ -102,13 +103,14 @@ pub(crate) struct IntervalBlocks<'a, C> {
 
 impl<'a, C: Clock> IntervalBlocks<'a, C> {
     pub(crate) fn new(starts: &'a [f64], end: f64, clock: C, samples: Range<usize>) -> Self {
-        // The interval that holds the first sample; a time's own rounding may put it one
-        // further.
+        // Intervals before that of the first sample are skipped. The one before it is kept, because
+        // rounding may put the sample there.
         let mut done = 0;
         if samples.start > 0
             && let Some(first_time) = clock.own_time(samples.start)
         {
-            // Mostly none of a long track's part is asked for: no search through cold memory.
+            // Most parts of a long track hold no requested sample. To compare with the last start
+            // avoids a search through memory that is not in the caches.
             let found = match starts.last() {
                 Some(&last) if last <= first_time => starts.len(),
                 _ => starts.partition_point(|&start| start <= first_time),
@@ -124,8 +126,8 @@ impl<'a, C: Clock> IntervalBlocks<'a, C> {
         }
     }
 
-    /// Fills a block with the next intervals in the order in which frames meet them, and tells
-    /// which these are by that order; nothing where none is left that holds samples.
+    /// Fills a block with the next intervals, in the order in which frames meet them. Returns their
+    /// numbers in that order, or `None` if no interval with samples is left.
     pub(crate) fn fill(&mut self, block: &mut IntervalBlock) -> Option<Range<usize>> {
         let (from, count) = (self.done, self.starts.len());
         if from == count {
@@ -171,7 +173,7 @@ impl<C: Clock> InLanes for Fill<'_, C> {
     fn run<L: Lanes>(&mut self) {
         let (clock, samples, starts) = (self.clock, self.samples, self.starts);
         let count = starts.len();
-        // Their own, and not borrowed: the compiler must see that nothing else is in them.
+        // Local arrays, because the compiler must know that no other reference overlaps them.
         let mut frames = [0.0; IntervalBlock::LEN + 1];
         let mut firsts = [0.0; IntervalBlock::LEN + 1];
         let (frame, first) = (&mut frames[..count], &mut firsts[..count]);
@@ -205,7 +207,7 @@ impl<C: Clock> InLanes for Fill<'_, C> {
             offset[j] = span.offset;
         }
         block.are_near = far == 0;
-        // No interval is behind the last one's end: there `first` is 0.
+        // Behind the end of the last interval `firsts` is 0, which sets no bit.
         let mut occupied = 0;
         for j in 0..IntervalBlock::LEN {
             occupied |= u64::from(firsts[j] < firsts[j + 1]) << j;
@@ -214,10 +216,11 @@ impl<C: Clock> InLanes for Fill<'_, C> {
     }
 }
 
-/// So many frames, and those that fill a vector behind them, are whole numbers of f32.
+/// f32 holds whole numbers exactly below 2^24. With distances below this limit, so are those of the
+/// samples that fill a run's last vector.
 const FAR: f64 = (1u64 << 23) as f64;
 
-/// The sample, or the nearer of the first one asked for and their end.
+/// Clamps a sample to the requested range.
 #[inline(always)]
 fn within(sample: f64, [start, end]: [f64; 2]) -> f64 {
     let from = if sample > start { sample } else { start };
@@ -230,8 +233,8 @@ mod tests {
     use crate::time::frame_clock::FrameClock;
     use crate::time::frame_rate::FrameRate;
 
-    /// Steps of one frame add up without rounding only while every distance, and those that
-    /// fill the last vector behind them, are whole numbers of f32.
+    /// Steps of one frame add up without rounding only while f32 exactly holds every distance, also
+    /// those that fill the last vector.
     #[test]
     fn distances_are_stepped_only_where_they_are_whole_numbers_of_f32() {
         let rate = FrameRate::new(1, 1).unwrap();

@@ -1,5 +1,5 @@
-//! Where frames lie among the keys of a track, for rotations that are worked out straight from
-//! the keys beside them. Tracks that share their times share it.
+//! Finds where frames lie among the keys of a track, for rotations that are computed from keys
+//! without segments. The result is kept for the following tracks that share their times.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::time::frames::FramesError;
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::tracks::track_keys::TrackKeys;
 
-/// Where the frames of a window lie; what it needs to find out is kept.
+/// The key and the parameter of every frame of a window, and what they were found for.
 pub(crate) struct FramePlan<'a> {
     times: &'a [f64],
     clock: Option<FrameClock>,
@@ -29,8 +29,8 @@ impl<'a> FramePlan<'a> {
         }
     }
 
-    /// The samples of a window, their keys counted from the first of those given; found out
-    /// unless that is known already.
+    /// The samples of a window; their keys count from the first of `of`. They are computed only if
+    /// times, clock or window are not those of the last call.
     pub(crate) fn samples(
         &mut self,
         of: TrackKeys<'a>,

@@ -1,4 +1,6 @@
-//! TODO-DOC
+//! From seconds to frames: frame rates, requested samples, wrap modes, and which span of a track or
+//! which interval between keys each sample falls into. Results do not depend on the window of
+//! samples that is asked for.
 
 pub(crate) mod frame_clock;
 pub(crate) mod frame_rate;

@@ -1,7 +1,6 @@
-//! Which segment gives which samples: the spans of a track, met with the samples asked for.
-//! What comes out are runs, the unit of work of every device. Only here and in the blocks of
-//! intervals do seconds turn into frames, in f64. A run's numbers do not depend on where a
-//! window of work starts, so results are the same however work is cut.
+//! Cuts the requested samples of a track into runs, consecutive samples with one source: the unit
+//! of work of every device. A run's numbers do not depend on where a window of work starts, so
+//! results are the same however work is cut.
 
 use std::ops::Range;
 
@@ -39,13 +38,13 @@ pub(crate) enum RunSource {
 /// A sample's distance from the middle of its segment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Distance {
-    /// Frames from the whole frame nearest to the middle, for the run's first
-    /// sample; one more for each sample after it. All are whole numbers of f32, and so are
-    /// those that fill a vector behind them.
+    /// Frames from the whole frame nearest to the middle, for the run's first sample; one more for
+    /// each sample after it. f32 holds all of them exactly, also those that fill the run's last
+    /// vector.
     Near { first: f32 },
-    /// The same, farther from the middle.
+    /// The same where f32 may not hold them exactly.
     Frames { first: i32 },
-    /// Seconds from the middle; the samples' times tell.
+    /// Seconds from the middle: a sample's explicit time minus `middle`.
     Seconds { middle: f64 },
 }
 
@@ -69,7 +68,7 @@ impl Emit for Vec<Run> {
 }
 
 impl Spans {
-    /// The runs of one part within the samples of a copy of its track, in order.
+    /// Emits the runs of one part among the samples of a track copy, in order.
     #[inline(always)]
     pub(crate) fn runs(
         &self,
@@ -95,7 +94,8 @@ impl Spans {
         }
     }
 
-    /// Apart from the rest, which stays small.
+    /// The runs in a copy other than the track itself. Not inlined, so that the usual path stays
+    /// small.
     #[inline(never)]
     fn runs_of_copy(
         &self,
@@ -112,7 +112,7 @@ impl Spans {
         self.runs_of_frames(part, clock, &copy.samples, emit)
     }
 
-    /// The runs of one part among frames, in order.
+    /// Emits the runs of one part among frames, in order.
     #[inline(always)]
     pub(crate) fn runs_of_frames<C: Clock>(
         &self,
@@ -124,7 +124,8 @@ impl Spans {
         let starts = &self.starts[part.spans.clone()];
         let begin = starts.first().copied().unwrap_or(part.end);
         if C::IS_REVERSED {
-            // The last key comes first. Curves that go on outside the keys are no copies.
+            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
+            // never a copy.
             let end = clock.boundary(part.end);
             emit_constant(0, end.first as usize, samples, part.after, emit);
         } else {
@@ -157,7 +158,7 @@ impl Spans {
                     count: last - first,
                     source,
                 };
-                // A call for each source: none is told apart twice.
+                // One call for each source, so that inlined code does not match on it again.
                 match self.sources[span] {
                     Source::Segment(index) => {
                         let distance = if block.are_near {
@@ -197,7 +198,7 @@ impl Spans {
     }
 }
 
-/// The runs before the first key, which a part begins with.
+/// Emits the runs before the first key, if the part is the track's first.
 #[inline(always)]
 pub(crate) fn runs_before(
     part: &Part,
@@ -219,7 +220,7 @@ pub(crate) fn runs_before(
     }
 }
 
-/// The runs from the last key on.
+/// Emits the runs from the last key on, if the part is the track's last.
 #[inline(always)]
 pub(crate) fn runs_after(
     part: &Part,
@@ -247,8 +248,8 @@ pub(crate) fn runs_after(
     }
 }
 
-/// Emits those of the samples `outside` the keys that are asked for, on a curve whose
-/// parameter is seconds from the frame coordinate `end`.
+/// Emits the requested samples among `outside`, on the extrapolating curve `index`, whose parameter
+/// is seconds from the frame coordinate `end`.
 #[inline(never)]
 fn extrapolate(
     outside: Range<usize>,
@@ -277,7 +278,7 @@ fn extrapolate(
     }
 }
 
-/// Emits those of a constant's samples that are asked for; nothing where there is none.
+/// Emits the requested samples from `from` to `to` with a constant; nothing if it is [`NONE`].
 #[inline(always)]
 fn emit_constant(
     from: usize,
@@ -296,5 +297,5 @@ fn emit_constant(
     }
 }
 
-/// Distances in frames are whole numbers of 32 bits.
+/// Distances in frames must be below this: they are kept in 32 bits.
 pub(crate) const COUNTABLE: f64 = (1u64 << 31) as f64;

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use crate::time::frames::FramesError;
 
-/// No constant.
+/// In the place of an index: there is nothing.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Stretches of tracks' time, each from its start to the start of the next one.
-/// Side by side, because the schedule is worked out for many at a time.
+/// Spans of tracks' time, each from its start to the start of the next one. Each field has a list
+/// of its own, because many spans are met with the samples at once, in vector lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spans {
     /// Seconds.
@@ -18,7 +18,7 @@ pub(crate) struct Spans {
     pub(crate) keys: Vec<u32>,
 }
 
-/// What gives the rotations of a span: places in the lists of [`Prepared`].
+/// What gives the rotations of a span: indices in the lists of `Prepared`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Source {
     Segment(u32),
@@ -32,7 +32,7 @@ pub(crate) enum Source {
 pub(crate) struct Part {
     /// The track's place in the set.
     pub(crate) track: u32,
-    /// The first of its keys, in the track.
+    /// The index of its first key in the track.
     pub(crate) first_key: u32,
     pub(crate) spans: Range<usize>,
     /// Where the last span ends, seconds.
@@ -41,18 +41,18 @@ pub(crate) struct Part {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// What else is at its ends, where that is more than two constants. Apart: a crowd has
-    /// a million parts.
+    /// What its ends need beyond these two constants, which is rare. Boxed, because a crowd has a
+    /// million parts.
     pub(crate) beyond: Option<Box<Beyond>>,
 }
 
 /// What lies at a track's ends and outside its keys.
 #[derive(Debug, Clone)]
 pub(crate) struct Beyond {
-    /// The constant at exactly the last key; [`NONE`] where it is what is held after it.
+    /// The constant at exactly the last key; [`NONE`] if the one held after it serves there too.
     pub(crate) at_end: u32,
-    /// The exact curves that go on before the first key and behind the last, their
-    /// parameter seconds from there; [`NONE`] where constants are held.
+    /// The curves, evaluated in f64, that extrapolate before the first key and after the last.
+    /// Their parameter is seconds from that key; [`NONE`] where constants are held.
     pub(crate) from_before: u32,
     pub(crate) from_after: u32,
     /// When the whole track starts and ends, seconds.
@@ -71,7 +71,8 @@ impl Beyond {
 }
 
 impl Part {
-    /// What is at its ends, to be filled in.
+    /// Its [`Beyond`], which is created if it has none. `times` are when the whole track starts and
+    /// ends, seconds.
     pub(crate) fn beyond(&mut self, times: (f64, f64)) -> &mut Beyond {
         let new = || Box::new(Beyond::new(&[times.0, times.1]));
         self.beyond.get_or_insert_with(new)
@@ -83,8 +84,8 @@ impl Spans {
         self.starts.len()
     }
 
-    /// Begins spans at these times, the first at this constant and the others at those behind
-    /// it; their sources are to come.
+    /// Adds spans that start at these times, with the constants `key`, `key + 1` and so on at their
+    /// starts, or with none. The caller adds their sources.
     #[inline]
     pub(crate) fn begin(&mut self, starts: &[f64], key: u32) {
         self.starts.extend_from_slice(starts);
@@ -94,7 +95,7 @@ impl Spans {
         }
     }
 
-    /// Adds some of other spans.
+    /// Appends a range of other spans.
     pub(crate) fn extend(&mut self, other: &Self, range: Range<usize>) {
         self.starts.extend_from_slice(&other.starts[range.clone()]);
         self.sources
@@ -113,7 +114,7 @@ impl Spans {
         self.sources.clear();
         self.keys.clear();
     }
-    /// Frames of one of a part's spans cannot be counted: between which keys.
+    /// The error for a part's span with too many frames to count, with the keys around it.
     #[cold]
     pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {
         let Self {
@@ -121,8 +122,8 @@ impl Spans {
             sources,
             keys,
         } = self;
-        // What was cut starts at a key only with its first span; where curves do not meet
-        // their keys that cannot be told.
+        // An interval may be cut into several spans, and only the first of them starts at a key.
+        // Curves that do not meet their keys do not show it: there each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
             let stands = matches!(sources[span], Source::Constant(_));

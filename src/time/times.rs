@@ -1,5 +1,5 @@
-//! Explicit times, which come in any order: what gives each, among the spans of prepared tracks
-//! or among keys.
+//! Finds the span of a prepared track, or the interval between keys, that holds an explicit time.
+//! Explicit times come in any order.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
 use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
 
 impl Spans {
-    /// The runs of one part among some samples, whose times are given.
+    /// Emits the runs of one part among samples with explicit times.
     #[inline(always)]
     pub(crate) fn runs_of_times(
         &self,
@@ -59,7 +59,7 @@ impl Spans {
         }
     }
 
-    /// What gives the rotation of one part at a time; nothing outside its keys.
+    /// The source of one part's rotation at a time; `None` outside its keys.
     #[inline(always)]
     pub(crate) fn source_at(&self, part: &Part, time: f64) -> Option<RunSource> {
         let (span, end) = self.span_at(part, time)?;
@@ -70,7 +70,7 @@ impl Spans {
         Some(self.time_source(span, end))
     }
 
-    /// The span of one part that holds a time, and where it ends; nothing outside its keys.
+    /// The span of one part that holds a time, and when it ends; `None` outside its keys.
     #[inline(always)]
     pub(crate) fn span_at(&self, part: &Part, time: f64) -> Option<(usize, f64)> {
         let starts = &self.starts[part.spans.clone()];
@@ -105,8 +105,8 @@ impl Spans {
     }
 }
 
-/// Emits the run that the first of some times, outside a part's keys, is in; how many of
-/// them that takes. Apart, so that what is usual stays small.
+/// Emits the run of the first of `times`, which lies outside a part's keys, and returns its number
+/// of samples. Not inlined, so that the usual path stays small.
 #[inline(never)]
 fn outside(
     part: &Part,
@@ -139,8 +139,8 @@ fn outside(
     count
 }
 
-/// What gives the samples outside the keys: a constant, or a curve from the end on, or
-/// another part.
+/// The source of samples outside the keys: a constant, or a curve whose parameter is seconds from
+/// `end`; `None` if another part has it.
 fn source_beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
     match (constant_source(constant), curve) {
         (None, NONE) => None,
@@ -159,8 +159,8 @@ fn constant_source(constant: u32) -> Option<RunSource> {
     (constant != NONE).then_some(RunSource::Constant(constant))
 }
 
-/// Where times lie among keys. What an interval makes of them is kept for the next time in
-/// it: many tracks share their times, and a division takes longer than to look.
+/// Finds where times lie among keys. The constants of the last interval are kept, because many
+/// tracks share their times, and a comparison is cheaper than a division.
 pub(crate) struct TimePlan {
     start: f64,
     end: f64,
@@ -178,7 +178,7 @@ impl TimePlan {
         }
     }
 
-    /// Where a time lies among keys; `near` is the key to look at first.
+    /// The key and the parameter of a time; `near` is the key to look at first.
     #[inline(always)]
     pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> KeySample {
         let key = key_before(starts, time, near);
@@ -211,8 +211,8 @@ impl TimePlan {
     }
 }
 
-/// The key before a time, which is the rotation itself where it carries `IS_KEY`; `near` is the
-/// one to look at first.
+/// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is
+/// set if the rotation is that key itself. `near` is the key to look at first.
 #[inline(always)]
 pub(crate) fn key_before(times: &[f64], time: f64, near: usize) -> u32 {
     let last = times.len() - 1;
@@ -225,15 +225,15 @@ pub(crate) fn key_before(times: &[f64], time: f64, near: usize) -> u32 {
     key as u32 | if time == times[key] { IS_KEY } else { 0 }
 }
 
-/// The interval that holds a time by the times at which intervals start, where it is not before
-/// the first; `near` is the one to look at first.
+/// The interval that holds a time, given when each interval starts; the first one for earlier
+/// times. `near` is the interval to look at first.
 #[inline(always)]
 pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     let holds = |i: usize| {
         starts.get(i).is_some_and(|&start| start <= time)
             && starts.get(i + 1).is_none_or(|&next| time < next)
     };
-    // Times mostly increase: there and next before searching.
+    // Times mostly increase: the same interval and the next one are tried before a search.
     if holds(near) {
         near
     } else if holds(near + 1) {
@@ -244,9 +244,10 @@ pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     }
 }
 
-/// Times that have been looked up, of which the parameters are worked out together.
+/// Explicit times whose intervals are known, and whose parameters are computed together in vector
+/// lanes.
 pub(crate) struct TimeLanes {
-    /// What gives each: of no concern here.
+    /// What gives each rotation, in the caller's own encoding.
     pub(crate) sources: [u32; Self::LEN],
     times: [f64; Self::LEN],
     starts: [f64; Self::LEN],
@@ -268,7 +269,7 @@ impl TimeLanes {
         }
     }
 
-    /// Adds a time between two others.
+    /// Adds a time in the interval from `start` to `end`.
     #[inline(always)]
     pub(crate) fn push(&mut self, source: u32, time: f64, start: f64, end: f64) {
         let lane = self.count % Self::LEN;
@@ -278,7 +279,7 @@ impl TimeLanes {
         self.count = lane + 1;
     }
 
-    /// Where between its two others each lies, as `TimePlan::parameter`.
+    /// The parameter of each time in its interval, by the operations of `TimePlan::parameter`.
     #[inline(always)]
     pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
         std::array::from_fn(|lane| {

@@ -1,5 +1,5 @@
-//! What lies outside a track's keys: end values, or copies of the time between the first key
-//! and the last, forwards or backwards.
+//! What a track does outside its keys: it holds its end value, goes on at the velocity of its end,
+//! or repeats in copies of the time between its first key and its last, forwards or backwards.
 
 use std::ops::Range;
 
@@ -18,9 +18,9 @@ pub enum WrapMode {
     Hold,
     /// The track starts again. A sample on the seam is the first key's.
     Loop,
-    /// The track runs back, and forth again.
+    /// The track runs backwards, then forwards again, and so on.
     Mirror,
-    /// It goes on at the angular velocity of its end.
+    /// The rotation goes on at the angular velocity that it has at that end.
     Extrapolate,
 }
 
@@ -34,7 +34,7 @@ impl WrapMode {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackCopy {
     pub(crate) samples: Range<usize>,
-    /// Frame coordinates of the copy: `sign` times the track's own, and this more.
+    /// A frame coordinate in the copy is `sign` × the track's own + `offset`.
     pub(crate) sign: f64,
     pub(crate) offset: f64,
 }
@@ -54,7 +54,7 @@ impl TrackCopy {
     }
 }
 
-/// What happens on both sides of a track.
+/// The wrap modes on both sides of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Wrap {
     pub(crate) before: WrapMode,
@@ -62,7 +62,7 @@ pub(crate) struct Wrap {
 }
 
 impl Wrap {
-    /// Whether end values are held on both wrap.
+    /// Whether end values are held on both sides.
     pub(crate) fn are_held(self) -> bool {
         self == Self::default()
     }
@@ -71,8 +71,9 @@ impl Wrap {
         self.before.repeats() || self.after.repeats()
     }
 
-    /// Which copy the part of a track at `place` is, counted in its lengths from its first
-    /// key, and whether it runs backwards. What is held belongs to the track itself.
+    /// The number of the copy at `place`, which is in lengths of the track from its first key, and
+    /// whether the copy runs backwards. Where end values are held or extrapolated it is copy 0, the
+    /// track itself.
     fn copy_at(self, place: f64) -> (f64, bool) {
         let number = place.floor();
         let mode = if place < 0.0 { self.before } else { self.after };
@@ -84,8 +85,9 @@ impl Wrap {
         }
     }
 
-    /// The samples of a track, cut where its copies meet; `span` is when its keys start and
-    /// end, seconds, or nothing where there are no copies. What copy a sample is in does not depend on the samples asked for.
+    /// The samples of a track, cut where its copies meet. `span` holds the times of its first and
+    /// last key, seconds; `None` if it has no copies. The copy of a sample does not depend on which
+    /// other samples are requested.
     #[inline]
     pub(crate) fn copies(
         self,
@@ -100,7 +102,7 @@ impl Wrap {
                 let copies = self.copies_of_frames((first, last), (rate, start), samples);
                 Either::Right(copies.into_iter())
             }
-            // Explicit times are folded.
+            // Explicit times are moved between the keys by `folded` instead.
             _ => Either::Left(std::iter::once(TrackCopy::own(samples))),
         }
     }
@@ -119,7 +121,7 @@ impl Wrap {
         let mut sample = samples.start;
         while sample < samples.end {
             let (number, backwards) = copy(sample);
-            // The first sample of another copy: near where this one ends.
+            // The next copy starts near here; the loops find its first sample by `copy` alone.
             let end = (from + (number + 1.0) * length).ceil();
             let mut next = (end.clamp(0.0, samples.end as f64) as usize).max(sample + 1);
             while next > sample + 1 && copy(next - 1).0 != number {
@@ -139,16 +141,17 @@ impl Wrap {
         copies
     }
 
-    /// A time as one within the keys from `first` to `last`, where it is repeated there.
+    /// The time between the keys, from `first` to `last`, that is repeated at `time`; `time` itself
+    /// if it lies in no other copy.
     pub(crate) fn folded(self, (first, last): (f64, f64), time: f64) -> f64 {
         let length = last - first;
         if length <= 0.0 {
             return time;
         }
-        // Copies of times beyond those that keys may have cannot be counted.
+        // Copies cannot be counted farther out than key times may be.
         let far = time.clamp(-LATEST, LATEST);
         let (number, backwards) = self.copy_at((far - first) / length);
-        // Far outside, the copies are narrower than the spaces between f64.
+        // Far outside, a copy may be shorter than the distance between neighbouring f64 numbers.
         let into = ((far - first) - number * length).clamp(0.0, length);
         match (number, backwards) {
             (0.0, _) => time,

@@ -1,16 +1,17 @@
-//! What a set trusts later, checked when keys come in.
+//! Checks of times and keys when they come into a set. Everything behind the set relies on them.
 
 use glam::{DQuat, Quat};
 
 use crate::math::canonical::{canonical, to_f64, unit_f32};
 use crate::tracks::error::TrackError;
 
-/// Norms further from 1 than this are refused by [`TrackSet::push`](crate::tracks::set::TrackSet::push): such a key
-/// is more likely a mistake than a rotation.
+/// A key whose norm differs from 1 by more than this is refused by
+/// [`TrackSet::push`](crate::tracks::set::TrackSet::push): it is more likely a mistake than a
+/// rotation.
 pub const NORM_TOLERANCE: f64 = 0.1;
 
-/// Seconds: later times are refused, as `.dat` files have it. The square of what two
-/// intervals have to each other must not overflow.
+/// The largest magnitude of a time, in seconds: the limit of `.dat` files. Products of intervals
+/// stay far from overflowing in f64.
 pub(crate) const LATEST: f64 = f32::MAX as f64;
 
 pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
@@ -49,8 +50,9 @@ pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
     }
 }
 
-/// A key whose norm is this near to 1 is kept bit for bit, so that loading what was written
-/// changes nothing: f32 rounding moves a unit quaternion's norm by at most 2 × 2^-24 or so.
+/// A key whose norm differs from 1 by at most this is kept bit for bit, so that results which are
+/// written and loaded again do not change. Rounding to f32 moves the norm of a unit quaternion by
+/// at most about 2 × 2^-24.
 pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
 pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {

@@ -73,17 +73,17 @@ pub enum TrackError {
     NoSuchTrack {
         /// The place asked for.
         track: usize,
-        /// How many there are.
+        /// Number of tracks in the set.
         tracks: usize,
     },
-    /// What keys carry beside their rotations, they all carry.
+    /// Data beside the rotations, such as velocities, must be given for every key of a track.
     #[error("track {track} has {keys} keys but {given} values of {what}; give one for each key")]
     DataLength {
         /// The track's place in the set.
         track: usize,
-        /// What was given.
+        /// What was given, such as `velocity`.
         what: &'static str,
-        /// Number of its keys.
+        /// Number of keys of the track.
         keys: usize,
         /// Number of values given.
         given: usize,
@@ -95,7 +95,7 @@ pub enum TrackError {
         track: usize,
         /// The key's place in the track.
         key: usize,
-        /// What was given.
+        /// What was given, such as `velocity`.
         what: &'static str,
     },
 }

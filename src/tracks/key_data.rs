@@ -1,4 +1,5 @@
-//! What keys may carry beside their rotations, for the methods that take it.
+//! Data that keys may carry beside their rotations, for the methods that use it: angular
+//! velocities, tangents, and tension, continuity and bias.
 
 use glam::{DVec3, Quat};
 
@@ -11,9 +12,9 @@ use crate::tracks::set::TrackSet;
 pub struct Tcb {
     /// 1 makes the curve stand still at the key, -1 doubles its speed there.
     pub tension: f64,
-    /// -1 makes a corner at the key, 1 one to the other side.
+    /// -1 makes a corner at the key, 1 a corner to the other side.
     pub continuity: f64,
-    /// 1 lets the curve follow the interval before the key, -1 that behind it.
+    /// 1 lets the curve follow the interval before the key, -1 the interval after it.
     pub bias: f64,
 }
 
@@ -25,15 +26,15 @@ impl Tcb {
     }
 }
 
-/// One value for each key of those tracks that have any.
+/// One kind of data for a set: a track has a value for each of its keys, or none at all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct KeyData<T> {
     values: Vec<T>,
-    /// Where each track's start.
+    /// For each track, where its values start; `None` if it has none.
     starts: Vec<Option<usize>>,
 }
 
-// Derived, it would ask that `T` has a default.
+// A derived `Default` would require `T: Default`.
 impl<T> Default for KeyData<T> {
     fn default() -> Self {
         Self {
@@ -44,7 +45,7 @@ impl<T> Default for KeyData<T> {
 }
 
 impl<T: Clone> KeyData<T> {
-    /// The values of a track with `keys` keys; nothing where it has none.
+    /// The values of a track with `keys` keys; empty if it has none.
     pub(crate) fn of(&self, track: usize, keys: usize) -> &[T] {
         match self.starts.get(track) {
             Some(&Some(start)) => &self.values[start..start + keys],

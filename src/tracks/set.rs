@@ -1,4 +1,4 @@
-//! What was loaded: tracks of unit quaternions with their key times.
+//! The set of keyframe tracks: unit quaternions with their key times.
 //!
 //! The first stop on the path of the data. A [`TrackSet`] knows no method, no
 //! frame rate and no device; it is checked once, when keys are pushed, and
@@ -41,13 +41,13 @@ pub struct TrackSet {
     pub(crate) scales: VectorTracks,
     /// First and last key time over all tracks.
     pub(crate) span: Option<(f64, f64)>,
-    /// Keys of the longest track.
+    /// Number of keys of the longest track.
     longest: usize,
     signs: SignBits,
 }
 
-/// Where a track's keys and times lie in the pools of its set; tracks whose
-/// times are equal share them.
+/// Where a track's keys and times lie in the lists of its set. Consecutive tracks with equal times
+/// share them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TrackRange {
     first_key: usize,
@@ -180,7 +180,7 @@ impl TrackSet {
         self.keys.len()
     }
 
-    /// Keys of the track that has most.
+    /// Number of keys of the longest track.
     pub(crate) fn longest(&self) -> usize {
         self.longest
     }
@@ -191,14 +191,13 @@ impl TrackSet {
         self.signs.arcs_are_short()
     }
 
-    /// The signs that the keys of tracks that follow one another count with by the shortest
-    /// path.
+    /// The signs of the keys of consecutive tracks along the shortest path.
     pub(crate) fn signs_of(&self, tracks: Range<usize>) -> Signs<'_> {
         let first = self.first_key(tracks.start);
         self.signs.of(first..self.first_key(tracks.end))
     }
 
-    /// The signs that a track's keys count with by the shortest path.
+    /// The signs of a track's keys along the shortest path.
     #[inline]
     pub(crate) fn signs(&self, index: usize) -> Signs<'_> {
         let TrackRange { first_key, len, .. } = self.tracks[index];
@@ -214,7 +213,7 @@ impl TrackSet {
     /// The track at `index`.
     ///
     /// # Panics
-    /// Never for `index < track_count()`; use [`TrackSet::tracks`] to walk them.
+    /// When `index` is not below [`TrackSet::track_count`].
     pub fn track(&self, index: usize) -> Track<'_> {
         let TrackRange {
             first_key,
@@ -235,8 +234,8 @@ impl TrackSet {
         }
     }
 
-    /// The times and keys of a track, and no more: where tracks are short, the rest costs
-    /// more than the work.
+    /// The times and keys of a track alone: for short tracks, to look up the other fields of
+    /// [`Track`] would take longer than to evaluate it.
     #[inline]
     pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
         let TrackRange {
@@ -248,19 +247,18 @@ impl TrackSet {
         (times, &self.keys[first_key..first_key + len])
     }
 
-    /// The keys of all tracks, one behind the other.
+    /// The keys of all tracks, one track after another.
     pub(crate) fn keys(&self) -> &[Quat] {
         &self.keys
     }
 
-    /// How many keys tracks that follow one another have: those of all lie one behind the
-    /// other.
+    /// Number of keys of consecutive tracks together.
     pub(crate) fn keys_of(&self, tracks: Range<usize>) -> usize {
         self.first_key(tracks.end) - self.first_key(tracks.start)
     }
 
-    /// The first of some tracks that is not among those which have at most so many keys
-    /// together.
+    /// The end of the longest range that starts with the first of `tracks` and has at most `keys`
+    /// keys.
     pub(crate) fn tracks_within(&self, tracks: Range<usize>, keys: usize) -> usize {
         let most = self.first_key(tracks.start).saturating_add(keys);
         let (mut low, mut high) = (tracks.start, tracks.end);
@@ -275,7 +273,7 @@ impl TrackSet {
         low
     }
 
-    /// The place of a track's first key among all; behind the last track, how many there are.
+    /// The index of a track's first key among all keys; the number of keys for `track_count()`.
     fn first_key(&self, track: usize) -> usize {
         let range = self.tracks.get(track);
         range.map_or(self.keys.len(), |range| range.first_key)
@@ -335,7 +333,8 @@ impl TrackSet {
         set
     }
 
-    /// Files hold many tracks with one list of times: keep it once.
+    /// Where a track's times start. They are shared with the track before if they are equal,
+    /// because in many files all tracks have the same times.
     fn share_or_append(&mut self, times: &[f64]) -> usize {
         let own = (times[0], times[times.len() - 1]);
         let (first, last) = self.span.unwrap_or(own);
@@ -351,7 +350,7 @@ impl TrackSet {
     }
 }
 
-/// Tracks for tests, which swing about axes of their own for 20 s.
+/// Tracks for tests: each swings for 20 s, at its own frequency.
 #[cfg(test)]
 pub(crate) fn swinging(tracks: usize, keys: usize, uneven: bool) -> TrackSet {
     let last = (keys - 1).max(1) as f64;

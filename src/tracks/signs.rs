@@ -8,14 +8,15 @@ use crate::math::quaternion::{dot, unit};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
-/// Two keys whose inner product is nearer to zero than this are half a turn apart but for the
-/// rounding of f32: the signs given decide, never the rounding.
+/// If the inner product of two keys is within this of zero, they may be exactly half a turn apart,
+/// and its sign may be due to the rounding of f32. Such keys keep the signs given.
 const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// In f32 an inner product is within 1e-6 of its value: beyond this its sign is not in doubt.
+/// An inner product in f32 is within 1e-6 of the exact one, so that its sign is certain if its
+/// magnitude exceeds this.
 const IN_DOUBT: f32 = 1e-5;
 
-/// Pairs of keys up to which a loop over them is faster than vectors.
+/// For this number of keys or fewer, a plain loop is faster than vectors.
 const FEW: usize = 4;
 
 const BITS: usize = u64::BITS as usize;
@@ -25,12 +26,12 @@ const BITS: usize = u64::BITS as usize;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SignBits {
     bits: Vec<u64>,
-    /// Whether two neighbouring keys are about half a turn apart or more as they were given.
+    /// Whether any two neighbouring keys are about half a turn apart or more as they were given.
     any_long: bool,
 }
 
 impl SignBits {
-    /// Adds a track, the first of whose keys has that place among all keys of the set.
+    /// Adds a track whose first key has the index `first` among all keys of the set.
     pub(crate) fn push_track(&mut self, first: usize, keys: &[[f32; 4]]) {
         if !any_is_long(keys) {
             return;
@@ -53,7 +54,7 @@ impl SignBits {
         !self.any_long
     }
 
-    /// The signs of some keys that follow one another.
+    /// The signs of consecutive keys, by their indices in the set.
     #[inline]
     pub(crate) fn of(&self, keys: Range<usize>) -> Signs<'_> {
         Signs {
@@ -64,7 +65,7 @@ impl SignBits {
     }
 }
 
-/// The signs of some keys that follow one another.
+/// The signs of consecutive keys.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Signs<'a> {
     bits: &'a [u64],
@@ -80,7 +81,7 @@ impl Signs<'_> {
         count: usize::MAX,
     };
 
-    /// Those of some of the keys.
+    /// The signs of a part of these keys.
     #[inline]
     pub(crate) fn between(self, keys: Range<usize>) -> Self {
         Self {
@@ -97,7 +98,7 @@ impl Signs<'_> {
         (self.bits.get(key / BITS)).is_some_and(|word| word >> (key % BITS) & 1 == 1)
     }
 
-    /// -1 where it does, else 1.
+    /// -1 if the `i`th key counts with the other sign than it was given, else 1.
     #[inline]
     pub(crate) fn sign(self, i: usize) -> f32 {
         if self.is_turned(i) { -1.0 } else { 1.0 }
@@ -109,7 +110,7 @@ impl Signs<'_> {
         !self.bits.is_empty() && self.bits_of(|word, mask| word & mask != 0).any(|any| any)
     }
 
-    /// The sign that all keys share, where they do.
+    /// The sign of all keys, or `None` if they differ.
     pub(crate) fn shared(self) -> Option<f32> {
         if !self.any() {
             return Some(1.0);
@@ -122,7 +123,8 @@ impl Signs<'_> {
         all.then_some(-1.0)
     }
 
-    /// Each word of bits that are kept of the keys, with the mask of those that are theirs.
+    /// Calls `look` for each stored word that has bits of these keys, with the word and the mask of
+    /// these bits.
     #[inline]
     fn bits_of<R>(self, look: impl Fn(u64, u64) -> R) -> impl Iterator<Item = R> {
         let end = (self.first.saturating_add(self.count)).min(self.bits.len() * BITS);
@@ -136,7 +138,7 @@ impl Signs<'_> {
         })
     }
 
-    /// Copies the keys, each with the sign that it counts with.
+    /// Copies the keys, each multiplied by its sign.
     #[inline]
     pub(crate) fn copy(self, keys: &[[f32; 4]], to: &mut [[f32; 4]]) {
         if !self.any() {
@@ -150,7 +152,7 @@ impl Signs<'_> {
     }
 }
 
-/// Whether the second key turns its sign to be the nearer one to the first.
+/// Whether the second key is nearer to the first with the opposite sign.
 fn turns(from: [f32; 4], to: [f32; 4]) -> bool {
     let inner = dot(from, to);
     if inner.abs() <= IN_DOUBT {
@@ -160,7 +162,8 @@ fn turns(from: [f32; 4], to: [f32; 4]) -> bool {
     }
 }
 
-/// Whether any two neighbouring keys are half a turn apart or more, or f32 cannot tell.
+/// Whether any two neighbouring keys are half a turn apart or more, or so close to it that f32
+/// cannot tell.
 fn any_is_long(keys: &[[f32; 4]]) -> bool {
     if keys.len() <= FEW {
         return keys.windows(2).any(is_long);

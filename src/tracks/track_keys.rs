@@ -1,22 +1,22 @@
-//! Keys of a track that follow one another.
+//! Consecutive keys of a track, borrowed with their times and signs.
 
 use glam::Quat;
 
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 
-/// Keys of a track that follow one another.
+/// Consecutive keys of a track.
 #[derive(Clone, Copy)]
 pub(crate) struct TrackKeys<'a> {
     pub(crate) times: &'a [f64],
     pub(crate) keys: &'a [Quat],
-    /// The signs that they count with by the shortest path.
+    /// Their signs along the shortest path.
     pub(crate) signs: Signs<'a>,
     /// The track's place in the set.
     pub(crate) index: usize,
-    /// The place of the first of them among the track's keys.
+    /// The index of the first of them in the track.
     pub(crate) first_key: usize,
-    /// How many keys the whole track has.
+    /// Number of keys of the whole track.
     pub(crate) all: usize,
 }
 
@@ -35,7 +35,7 @@ impl<'a> TrackKeys<'a> {
         }
     }
 
-    /// Those of a whole track from one key to another.
+    /// The keys of a whole track from `first_key` to `last_key`, both included.
     pub(crate) fn between(self, first_key: usize, last_key: usize) -> Self {
         Self {
             times: &self.times[first_key..=last_key],

@@ -14,15 +14,15 @@ use crate::tracks::set::TrackSet;
 pub(crate) struct VectorTrack {
     pub(crate) times: Vec<f64>,
     pub(crate) keys: Vec<Vec3>,
-    /// With which the curve arrives at each key and leaves it, units a second; none where
+    /// Tangents with which the curve arrives at each key and leaves it, units per second; empty if
     /// none were given.
     pub(crate) tangents: Vec<[Vec3; 2]>,
 }
 
-/// The vectors of a set's tracks, where they have any.
+/// The vectors of a set's tracks, `None` for a track without. The list may be shorter than the set.
 pub(crate) type VectorTracks = Vec<Option<Arc<VectorTrack>>>;
 
-/// Which vectors.
+/// Which of a track's vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Channel {
     Translation,
@@ -30,9 +30,10 @@ pub(crate) enum Channel {
 }
 
 impl TrackSet {
-    /// Gives a track translation keys, at seconds of their own, strictly increasing; with
-    /// tangents (arriving, leaving; units a second) for
-    /// [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic), or none.
+    /// Gives a track translation keys. Their `times` are seconds, strictly increasing, and may
+    /// differ from the rotations' times. `tangents` (arriving, leaving; units per second) are used
+    /// by [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic) and
+    /// may be empty.
     ///
     /// # Errors
     /// When there is no such track, the lengths differ, or a number is not finite.
@@ -109,7 +110,7 @@ impl TrackSet {
         Ok(())
     }
 
-    /// The keys of a track's vectors, where it has any.
+    /// A track's translations or scales, if it has any.
     pub(crate) fn vectors(&self, channel: Channel, track: usize) -> Option<&VectorTrack> {
         let vectors = match channel {
             Channel::Translation => &self.translations,

@@ -7,8 +7,8 @@ use crate::shader::{
 use crate::simd::lanes::{Number, canonical};
 use crate::twin::evaluate_arc::square;
 
-/// The middle and the tangent there of the arc between two unit quaternions that are at most
-/// pi/2 apart in R⁴.
+/// The middle of the arc between two unit quaternions, and its tangent there. They are at most pi/2
+/// apart in R⁴.
 #[inline(always)]
 pub(crate) fn arc_between<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 4], [N; 4]) {
     let [ax, ay, az, aw] = start;

@@ -75,7 +75,7 @@ pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Catches a wrong digit, and a quadrant.
+    /// Catches a wrong digit, and a wrong quadrant.
     #[test]
     fn arc_tangents_and_roots_are_within_two_roundings() {
         let mut worst = 0.0f64;

@@ -1,43 +1,46 @@
-//! How a form's formula is evaluated in vector lanes: what the twins of the shaders in
-//! `shaders/forms/` provide, and what the loops over a run's samples ask of them.
+//! The trait by which a segment's form is evaluated in vector lanes. The twins of the shaders in
+//! `shaders/forms/` implement it; the loops over a run's samples call it.
 
 use glam::Vec4;
 
 use crate::simd::lanes::Lanes;
 
-/// One form's formula.
+/// The formula of one form. A run is evaluated in turns, each of as many samples as are computed at
+/// once.
 pub(crate) trait Evaluate: Copy {
-    /// What is the same for all samples.
+    /// A number that is the same for all samples of a run.
     #[inline(always)]
     fn constant(&self) -> f32 {
         0.0
     }
 
-    /// How many samples are worked out at once.
+    /// Number of samples of a turn.
     fn samples<L: Lanes>() -> usize;
 
-    /// Their distances, as [`Evaluate::evaluate`] takes their parameters.
+    /// Loads the distances of a turn's samples, in the lanes in which [`Evaluate::evaluate`] takes
+    /// their parameters.
     fn load<L: Lanes>(distances: &[f32]) -> L;
 
-    /// The fewest turns in which it pays to begin samples several turns before their own.
-    /// Their operations are long chains, and a processor looks ahead no farther than a turn or
-    /// two.
+    /// The smallest number of turns in a run for which it pays to begin samples several turns
+    /// ahead, if it ever pays. A sample takes a long chain of dependent operations, and a processor
+    /// looks ahead no farther than a turn or two.
     const FAR_FROM: Option<usize> = None;
 
-    /// What is known of samples before it is their turn.
+    /// Intermediate results of samples before it is their turn.
     type Begun<L: Lanes>: Copy;
 
-    /// The rotations of a turn's samples, side by side: in so many vectors.
+    /// An array of vectors with the rotations of a turn's samples, side by side.
     type Vectors<L: Lanes>: AsRef<[L]>;
 
-    /// Begins with the first samples; and, where that is `FAR`, with those of later turns.
+    /// Begins the samples of the first turn and, if `FAR`, those of later turns.
     fn begin<L: Lanes, const FAR: bool>(
         constant: L,
         parameters: &mut impl Parameters<L>,
     ) -> Self::Begun<L>;
 
-    /// What is known of the samples behind those that are next, and the rotations of these.
-    /// Where there may be tiny components, `FILTER` makes them [`canonical`](crate::math::canonical::canonical).
+    /// Finishes the samples of a turn. Returns the intermediate results for the turns after it, and
+    /// the turn's rotations. With `FILTER` all components are made
+    /// [`canonical`](crate::math::canonical::canonical).
     fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
         &self,
         constant: L,
@@ -48,14 +51,15 @@ pub(crate) trait Evaluate: Copy {
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
 
-    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample. Each is a sum `m + r`
-    /// with the segment's middle `m`. Where |m| >= 2^-40, either |r| < |m|/2, and the sum is
-    /// more than 2^-41; or both are multiples of 2^-64, and so is the sum, which is +0 where
-    /// they cancel. Where all of the component's constants are +0, it is +0.
+    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any
+    /// sample, so that no filter is needed. Each component is a sum `m + r` with that of the
+    /// segment's middle, `m`. If |m| >= 2^-40, either |r| < |m|/2, and the sum is more than 2^-41;
+    /// or both are multiples of 2^-64, and so is the sum, which is +0 if they cancel. If all
+    /// constants of the component are +0, it is +0.
     fn is_canonical(&self) -> bool;
 }
 
-/// See [`Evaluate::is_canonical`].
+/// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] holds for it.
 pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// Whether no component of a segment's middle is smaller than [`COARSE`].
@@ -65,8 +69,8 @@ pub(crate) fn is_coarse(middle: [f32; 4]) -> bool {
     magnitudes.cmpge(Vec4::splat(COARSE)).all()
 }
 
-/// The parameters of a run's samples, a vector at a time. Behind the last there are more, which
-/// mean nothing.
+/// The parameters of a run's samples, a turn at a time. After the last sample it gives more
+/// numbers, of which nothing is used.
 pub(crate) trait Parameters<L> {
     fn next(&mut self) -> L;
 }

@@ -42,7 +42,8 @@ impl Evaluate for ArcSegment {
             z,
         };
         if FAR {
-            // What lies before the first sample means nothing.
+            // After two steps `turn` belongs to the first turn, `halves` to the second and
+            // `parameter` to the third; the values before were placeholders.
             begun = begun.next(square, parameters).next(square, parameters);
         }
         begun
@@ -70,7 +71,7 @@ impl Evaluate for ArcSegment {
             turned(middle, tangent, s[3], f[3]),
         ];
         if FILTER {
-            // Written out: `lanes::canonical` here costs SSE2 half as much again.
+            // Written out: with a call of `lanes::canonical` SSE2 takes half as long again.
             quarters = [
                 quarters[0].canonical(),
                 quarters[1].canonical(),
@@ -96,7 +97,8 @@ impl Evaluate for ArcSegment {
 }
 
 impl ArcSegment {
-    /// As [`Evaluate::is_canonical`], where some middle is small.
+    /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is
+    /// not inlined.
     #[inline(never)]
     fn is_coarse_or_zero(&self) -> bool {
         let is_zero = |c: usize| self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
@@ -104,21 +106,21 @@ impl ArcSegment {
     }
 }
 
-/// The samples of the next three turns, each as far as they have come; or, where none are begun
-/// far before their own, the parameters of the next turn's.
+/// Intermediate results of the samples of the next three turns. Without `FAR` only `parameter` and
+/// `z` are used, and belong to the next turn.
 #[derive(Clone, Copy)]
 pub(crate) struct Begun<L> {
-    /// Sine and fall of those of the next turn.
+    /// Sine and cosine minus one, for the next turn.
     turn: (L, L),
-    /// Of those behind them.
+    /// The half-finished sine and cosine of the turn after it.
     halves: QuarterHalves<L>,
-    /// Of those behind these, and the angle's square.
+    /// The parameter and the angle's square of the third turn.
     parameter: L,
     z: L,
 }
 
 impl<L: Lanes> Begun<L> {
-    /// A turn later.
+    /// The intermediate results one turn later.
     #[inline(always)]
     fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
         let (parameter, z) = parameter_and_square(square, parameters);

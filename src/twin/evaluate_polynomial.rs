@@ -1,5 +1,5 @@
-//! Twin of `shaders/forms/evaluate_polynomial.wgsl` and `shaders/math/polynomial.wgsl`: the same names,
-//! the same order.
+//! Twin of `shaders/forms/evaluate_polynomial.wgsl` and `shaders/math/polynomial.wgsl`: the same
+//! names, the same order.
 
 use glam::Vec4;
 
@@ -9,7 +9,7 @@ use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
 
 impl Evaluate for PolynomialSegment {
     /// A quarter of the lanes: with all four components of a rotation side by side, the
-    /// coefficients of a run nearly fit into the registers there are.
+    /// coefficients of a run nearly fit into the registers.
     #[inline(always)]
     fn samples<L: Lanes>() -> usize {
         L::COUNT / 4
@@ -62,7 +62,8 @@ impl Evaluate for PolynomialSegment {
 }
 
 impl PolynomialSegment {
-    /// As [`Evaluate::is_canonical`], where some middle is small.
+    /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is
+    /// not inlined.
     #[inline(never)]
     fn is_coarse_or_zero(&self) -> bool {
         let is_zero = |c: usize| {
@@ -74,7 +75,7 @@ impl PolynomialSegment {
     }
 }
 
-/// By the coefficients of 1, s, s², … s¹⁰.
+/// The polynomial with the coefficients `c` of 1, s, s², … s¹⁰.
 #[inline(always)]
 pub(crate) fn polynomial<N: Number>(c: [N; 11], s: N) -> N {
     by_powers(c, powers(s))

@@ -1,4 +1,5 @@
-//! TODO-DOC
+//! Twins: the functions of the shaders once more in Rust, with the same names and the same order of
+//! operations, so that the CPU gives the bits of an exact Vulkan device.
 
 pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;

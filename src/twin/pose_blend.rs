@@ -4,7 +4,8 @@ use crate::math::canonical::canonical;
 use crate::shader::LEAST_SQUARED_SUM;
 use crate::twin::quaternion::{dot4, normalised};
 
-/// Its layers, one behind the other, `count` values each.
+/// The blended rotation at `place`. `layers` holds one layer after another, each of `count`
+/// rotations.
 #[inline(always)]
 pub(crate) fn pose(layers: &[[f32; 4]], weights: &[f32], count: usize, place: usize) -> [f32; 4] {
     let first = layers[place];

@@ -5,7 +5,8 @@ use crate::shader::Link;
 use crate::shader::ROOT;
 use crate::twin::quaternion::{normalised, product, rotated};
 
-/// One frame: a rotation for each track, to a rotation and a position for each.
+/// One frame: from each track's rotation in its parent's frame to its rotation and its position in
+/// the world. `links` lists parents before their children.
 #[inline(always)]
 pub(crate) fn pose(local: &[[f32; 4]], links: &[Link], world: &mut [[f32; 4]]) {
     for link in links {

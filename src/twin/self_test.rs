@@ -4,7 +4,7 @@ use crate::shader::{Probe, Reply};
 use crate::twin::arc_tangent::{arc_tangent, root};
 use crate::twin::sine_cosine::sine_cosine;
 
-/// What an exact device replies.
+/// The reply of a device that is exact.
 pub(crate) fn reply(probe: Probe) -> Reply {
     let Probe { a, b, c, n } = probe;
     let turn = sine_cosine(c);

@@ -14,8 +14,8 @@ pub(crate) fn sine_cosine(angle: f32) -> (f32, f32) {
     (sine, fall + 1.0)
 }
 
-/// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2, given by its square `z`:
-/// the sine, for `x = a`.
+/// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2 that is given by its square `z`. With
+/// `x = a` the first is the sine.
 #[inline(always)]
 pub(crate) fn sine_cosm1<N: Number>(x: N, z: N) -> (N, N) {
     let sine_high = (N::all(SINE_9) * z + N::all(SINE_7)) * z + N::all(SINE_5);
@@ -31,7 +31,7 @@ pub(crate) fn sine_cosm1_quarter<N: Number>(x: N, z: N) -> (N, N) {
     quarter_halves(x, z).sine_cosm1()
 }
 
-/// Half of the way to [`sine_cosm1_quarter`].
+/// Intermediate results, half of the way to [`sine_cosm1_quarter`].
 #[derive(Clone, Copy)]
 pub(crate) struct QuarterHalves<N> {
     x: N,
@@ -41,7 +41,7 @@ pub(crate) struct QuarterHalves<N> {
     cosine_tail: N,
 }
 
-/// Of the same `x` and `z`.
+/// The first half of [`sine_cosm1_quarter`], for the same `x` and `z`.
 #[inline(always)]
 pub(crate) fn quarter_halves<N: Number>(x: N, z: N) -> QuarterHalves<N> {
     let zz = z * z;

@@ -15,19 +15,19 @@ use crate::twin::evaluate_arc::square;
 type Vector = [f32; 3];
 type Quaternion = [f32; 4];
 
-/// A rotation as what it is more than none.
+/// A rotation as its difference from the identity, which keeps the digits of a small rotation.
 #[derive(Clone, Copy)]
 pub(crate) struct FromIdentity<N> {
     pub(crate) vector: [N; 3],
-    /// The cosine - 1.
+    /// Cosine minus one.
     pub(crate) cosm1: N,
 }
 
-/// A cubic that turns little.
+/// A cubic through small angles, as a polynomial about its middle.
 pub(crate) struct SmallAngleCubic {
     /// The coefficients of 1, s, s², … s⁶.
     pub(crate) powers: [Quaternion; 7],
-    /// Whether they are those of the curve.
+    /// Whether the curve is within the limits of small angles; if not, `powers` mean nothing.
     pub(crate) holds: bool,
 }
 
@@ -109,7 +109,8 @@ fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
     ]
 }
 
-/// Between `start` and `end`, four keys each in the sign nearer to its predecessor's.
+/// The cubic between the second and the third of four keys, each of which has the sign nearer to
+/// its predecessor.
 #[inline(always)]
 pub(crate) fn small_angle_cubic(
     keys: [Quaternion; 4],
@@ -198,7 +199,7 @@ pub(crate) fn small_angle_cubic(
     let difference = n1 - n3;
     let volume = dot3(v1, x23);
 
-    // Odd powers, and even ones.
+    // The terms of third order in the coefficients of odd powers, and in those of even powers.
     macro_rules! odd_power {
         ($b111:ident, $b122:ident, $b133:ident, $b123:ident, $b211:ident, $b222:ident) => {{
             let by_first = n1 * $b111 + n2 * $b122 + n3 * $b133 - d23 * $b123;

@@ -57,11 +57,11 @@ pub struct Verification {
     pub worst: Option<Place>,
     /// Largest | |q| - 1 |.
     pub max_norm_error: f64,
-    /// What `max_error` may be, radians.
+    /// The largest `max_error` allowed, radians.
     pub error_bound: f64,
-    /// What `max_norm_error` may be.
+    /// The largest `max_norm_error` allowed.
     pub norm_bound: f64,
-    /// What follows from the rotations.
+    /// One report for each output that follows from the rotations.
     pub outputs: Vec<OutputVerification>,
 }
 

@@ -1,4 +1,5 @@
-//! What follows from a rotation, verified: velocities, accelerations, and every encoding.
+//! Verifies what follows from rotations: velocities, accelerations, poses in the world, and every
+//! encoding.
 
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
@@ -27,10 +28,10 @@ pub struct OutputVerification {
     pub values: u64,
     /// Values whose bits differ.
     pub differing: u64,
-    /// Largest error against the reference: radians for rotations, parts of the track's
+    /// Largest error against the reference: in radians for rotations, relative to the track's
     /// largest value for velocities and accelerations.
     pub max_error: f64,
-    /// What that may be.
+    /// The largest error allowed.
     pub error_bound: f64,
 }
 
@@ -52,7 +53,7 @@ const QUANTITIES: [(&str, Quantity); 4] = [
 /// Samples of a method's derivatives that are compared with the reference, which is slow.
 const RATES_CHECKED: usize = 4096;
 
-/// Every output of one method.
+/// Verifies every output of one method.
 pub(crate) fn verify(
     engine: &Engine,
     set: &TrackSet,
@@ -77,7 +78,7 @@ pub(crate) fn verify(
             max_error: rate_error(set, interpolation, timeline, &found),
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => 1e-6,
-                // Where a curve had been slow it turns aside fast.
+                // At constant speed a curve changes direction fast where it was slow as keyed.
                 (Speed::Constant, Quantity::Velocity(_)) => 1e-5,
                 (Speed::Constant, _) => 1e-3,
             },
@@ -112,7 +113,7 @@ pub(crate) fn verify(
                 Encoding::F32 => 0.0,
                 Encoding::F16 => 2e-3,
                 Encoding::Snorm16 => 1.5e-4,
-                // Of which the larger part is the way back.
+                // Most of this is the error of decoding.
                 _ => 4e-6,
             },
         });
@@ -120,7 +121,7 @@ pub(crate) fn verify(
     Ok(outputs)
 }
 
-/// The tracks as a chain, walked down.
+/// Verifies rotations in the world, with the tracks as a chain.
 fn world(
     engine: &Engine,
     cpu: &Engine,
@@ -139,7 +140,7 @@ fn world(
         values: found.as_slice().len() as u64,
         differing: differing.count() as u64,
         max_error: 0.0,
-        // Each box adds its own rounding.
+        // Each track of the chain adds its own rounding.
         error_bound: 1e-6 + 4e-7 * tracks as f64,
     };
     for sample in 0..samples {

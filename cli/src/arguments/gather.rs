@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use tumble_formats::Format;
 use walkdir::WalkDir;
 
 use crate::arguments::input::{self, is_standard};
@@ -79,7 +80,7 @@ impl Gathered {
     }
 }
 
-/// Every `.dat` file below a directory, by name. What cannot be looked into is an input
+/// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
 /// too, which fails when it is opened.
 fn below(directory: &Path) -> Vec<Found> {
     let walk = WalkDir::new(directory).follow_links(true);
@@ -87,7 +88,7 @@ fn below(directory: &Path) -> Vec<Found> {
     for entry in walk.sort_by_file_name() {
         let path = match entry {
             Ok(entry) if entry.file_type().is_dir() => continue,
-            Ok(entry) if is_dat(entry.path()) => entry.into_path(),
+            Ok(entry) if is_readable(entry.path()) => entry.into_path(),
             Ok(_) => continue,
             Err(error) => match error.path() {
                 Some(path) => path.to_owned(),
@@ -100,9 +101,8 @@ fn below(directory: &Path) -> Vec<Found> {
     found
 }
 
-fn is_dat(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("dat"))
+fn is_readable(path: &Path) -> bool {
+    Format::of(path).is_some_and(|format| format.read.is_some())
 }
 
 /// The files that a pattern matches: shells expand patterns, but not in lists, not in

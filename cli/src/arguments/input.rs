@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble_formats::Code;
-use tumble_formats::Limits;
-use tumble_formats::dat::{DatOptions, Loaded, open_dat};
 use tumble_formats::times::open_times;
+use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::gather::Gathered;
 use crate::messages::exit::Failure;
@@ -109,11 +108,12 @@ impl Inputs {
             file: self.max_size,
             ..Limits::default()
         };
-        let options = DatOptions {
+        let options = ReadOptions {
             limits,
             pipes: self.pipes,
         };
-        open_dat(path, &options).map_err(|diagnostic| {
+        let read = Format::reader(path).expect("the table has a format that can be read");
+        read(path, &options).map_err(|diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",
                 Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",

@@ -3,14 +3,13 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
-use tumble::{Chunk, Encoding, Error, Layout, Timeline, TrackSet};
-use tumble_formats::csv::CsvWriter;
-use tumble_formats::npy::{ComponentOrder, NpyWriter};
+use tumble::{Chunk, Encoding, Error};
+use tumble_formats::format::{Format, ResultShape, ResultWriter, WriteResults};
 use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::gather::{Found, Gathered};
@@ -23,23 +22,10 @@ use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::signals;
 
-/// What is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    /// `NumPy`'s, float32
-    Npy,
-    /// text, a row for each frame
-    Csv,
-}
-
-/// Rotations handed to a writer at once: 4 MB.
-const PIECE: usize = 1 << 18;
-
 /// Where one result goes.
-#[derive(Debug)]
 pub(crate) struct Target {
     place: Place,
-    format: Format,
+    write: &'static WriteResults,
     /// Below the directory of results.
     name: String,
 }
@@ -54,7 +40,7 @@ pub(crate) struct Plan {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wish<'a> {
     pub(crate) out: Option<&'a Path>,
-    pub(crate) format: Option<Format>,
+    pub(crate) format: Option<&'static Format>,
     pub(crate) overwrite: bool,
     pub(crate) resume: bool,
 }
@@ -63,14 +49,15 @@ pub(crate) struct Wish<'a> {
 /// that two inputs share.
 pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
     if wish.out.is_none() && io::stdout().is_terminal() {
-        return Err(Failure::usage(
-            "where should the result go? give -o OUT.npy, -o OUT.csv, or -o - for standard output",
-        ));
+        return Err(Failure::usage(format!(
+            "where should the result go? give {}, or -o - for standard output",
+            extensions(|name| format!("-o OUT.{name}")).join(", ")
+        )));
     }
     let out = wish.out.unwrap_or(Path::new("-"));
     let paths = inputs.paths();
     // One file goes into one file, however it was found.
-    let is_file = out.is_file() || Format::of(out).is_some() || input::is_standard(out);
+    let is_file = out.is_file() || of(out).is_some() || input::is_standard(out);
     let plan = match &*paths {
         [_] if !inputs.many || is_file => {
             if wish.resume {
@@ -79,12 +66,7 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
             }
             let format = choose(out, wish.format)?;
             let place = Place::new(out, wish.overwrite, &paths)?;
-            let name = String::new();
-            let targets = vec![Target {
-                place,
-                format,
-                name,
-            }];
+            let targets = vec![Target::new(place, format, String::new())];
             let manifest = None;
             Plan { targets, manifest }
         }
@@ -103,37 +85,72 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
 }
 
 /// The format asked for, else the one that the name says.
-fn choose(path: &Path, format: Option<Format>) -> Result<Format, Failure> {
+fn choose(path: &Path, format: Option<&'static Format>) -> Result<Writable, Failure> {
     let named = if input::is_standard(path) || path.is_dir() {
-        Some(Format::Npy) // a directory is refused later, for what it is
+        Format::writable().next() // a directory is refused later, for what it is
     } else {
-        Format::of(path)
+        of(path)
     };
-    format.or(named).ok_or_else(|| {
-        let path = path.display();
+    format.and_then(writable).or(named).ok_or_else(|| {
+        let (path, extensions) = (path.display(), extensions(|name| format!(".{name}")));
+        let extensions = extensions.join(" or ");
         Failure::usage(format!(
-            "{path}: end the output in .npy or .csv, or give --format"
+            "{path}: end the output in {extensions}, or give --format"
         ))
     })
+}
+
+/// A format, and how results are written in it.
+type Writable = (&'static Format, &'static WriteResults);
+
+fn writable(format: &'static Format) -> Option<Writable> {
+    Some((format, format.write.as_ref()?))
+}
+
+/// The format of results that a file's name tells.
+fn of(path: &Path) -> Option<Writable> {
+    Format::of(path).and_then(writable)
+}
+
+/// The extensions of results, each as `show` has it.
+fn extensions(show: impl Fn(&str) -> String) -> Vec<String> {
+    let names = Format::writable().map(|(format, _)| format.name);
+    names.map(show).collect()
+}
+
+/// Reads the name of a format of results, for clap.
+pub(crate) fn format() -> impl TypedValueParser<Value = &'static Format> {
+    let values =
+        Format::writable().map(|(format, _)| PossibleValue::new(format.name).help(format.summary));
+    PossibleValuesParser::new(values)
+        .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
+}
+
+/// Where a result may go, for help.
+pub(crate) fn out_help() -> String {
+    format!(
+        "Where to write: {}, `-` (standard output), or a directory for several inputs",
+        extensions(|name| format!("OUT.{name}")).join(", ")
+    )
 }
 
 /// A file in `folder` for each input, named after it; below it, where the input lay below
 /// a directory.
 fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, Failure> {
     let shown = folder.display();
-    if !folder.is_dir() && (folder.exists() || Format::of(folder).is_some()) {
+    if !folder.is_dir() && (folder.exists() || of(folder).is_some()) {
         return Err(Failure::usage(format!(
             "{shown}: several inputs need a directory for their results, not one file"
         )));
     }
-    let format = wish.format.unwrap_or(Format::Npy);
+    let format = choose(Path::new("-"), wish.format)?;
     let sources: HashSet<PathBuf> = (inputs.files.iter())
         .filter_map(|found| found.path.canonicalize().ok())
         .collect();
     let mut owners: HashMap<PathBuf, &Path> = HashMap::new();
     let mut names = Vec::new();
     for Found { path, below } in &inputs.files {
-        let name = format.name_for(path, below);
+        let name = name_for(format.0, path, below);
         let target = folder.join(&name);
         if let Some(other) = owners.insert(target.clone(), path) {
             return Err(Failure::usage(format!(
@@ -181,52 +198,31 @@ fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, F
                 failure
             }
         })?;
-        let place = place.hashed();
-        Ok(Target {
-            place,
-            format,
-            name,
-        })
+        Ok(Target::new(place.hashed(), format, name))
     };
     let targets = names.into_iter().map(target).collect::<Result<_, _>>()?;
     let manifest = Some(manifest);
     Ok(Plan { targets, manifest })
 }
 
-impl Format {
-    fn of(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_lowercase().as_str() {
-            "npy" => Some(Self::Npy),
-            "csv" => Some(Self::Csv),
-            _ => None,
-        }
-    }
-
-    /// `walk.dat` becomes `walk.npy`, where it lies.
-    fn name_for(self, input: &Path, below: &Path) -> PathBuf {
-        let below = if input::is_standard(input) {
-            Path::new("stdin")
-        } else {
-            below
-        };
-        below.with_extension(match self {
-            Self::Npy => "npy",
-            Self::Csv => "csv",
-        })
-    }
-
-    /// The least that a rotation takes.
-    fn rotation_bytes(self, encoding: Encoding) -> f64 {
-        match self {
-            Self::Npy => encoding.bytes() as f64,
-            Self::Csv => 8.0, // four times a digit and a comma
-        }
-    }
+/// `walk.dat` becomes `walk.npy`, where it lies.
+fn name_for(format: &Format, input: &Path, below: &Path) -> PathBuf {
+    let below = if input::is_standard(input) {
+        Path::new("stdin")
+    } else {
+        below
+    };
+    below.with_extension(format.name)
 }
 
 impl Target {
-    pub(crate) fn format(&self) -> Format {
-        self.format
+    fn new(place: Place, (_, write): Writable, name: String) -> Self {
+        Self { place, write, name }
+    }
+
+    /// How its format holds results.
+    pub(crate) fn results(&self) -> &'static WriteResults {
+        self.write
     }
 
     /// Refuses a result for which the disk has no room.
@@ -240,7 +236,7 @@ impl Target {
         if self.place.is_standard() {
             return Ok(());
         }
-        let bytes = tracks as f64 * samples as f64 * self.format.rotation_bytes(encoding);
+        let bytes = tracks as f64 * samples as f64 * (self.write.rotation_bytes)(encoding);
         let folder = match self.place.path().parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -268,22 +264,23 @@ impl Target {
         evaluate: impl FnOnce(&mut Sink<'_>) -> Result<(), Ended>,
     ) -> Result<Written, Failure> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
-        let (progress, measure): (_, fn(&[u8]) -> u64) = match self.format {
-            Format::Csv => (Progress::new("writing", samples as u64 + 1), lines),
-            Format::Npy => {
-                let total = (tracks * samples * result.encoding.bytes()) as u64;
-                (Progress::new("writing", total), length)
-            }
+        let (progress, measure): (_, fn(&[u8]) -> u64) = if self.write.is_text {
+            (Progress::new("writing", samples as u64 + 1), lines)
+        } else {
+            let total = (tracks * samples * result.encoding.bytes()) as u64;
+            (Progress::new("writing", total), length)
         };
         let mut unevaluated = None;
         let written = self.place.prepare(Some((progress, measure)), |out| {
-            let mut writer = ResultWriter::Waiting(out);
-            let evaluated = evaluate(&mut |chunk| {
-                let taken = writer.write(self.format, result, chunk.rotations);
-                taken.map_err(Ended::Writing)
-            });
+            let mut writer = LateWriter {
+                rotations: self.write.rotations,
+                result: *result,
+                state: State::Waiting(out),
+            };
+            let evaluated =
+                evaluate(&mut |chunk| writer.write(chunk.rotations).map_err(Ended::Writing));
             match evaluated {
-                Ok(()) => writer.finish(self.format, result),
+                Ok(()) => writer.finish(),
                 Err(Ended::Writing(error)) => Err(error),
                 Err(Ended::Evaluating(error)) => {
                     unevaluated = Some(error);
@@ -308,17 +305,6 @@ fn length(bytes: &[u8]) -> u64 {
     bytes.len() as u64
 }
 
-/// What is written: a set's rotations at the samples of a timeline.
-pub(crate) struct ResultShape<'a> {
-    /// The input's, for messages.
-    pub(crate) name: &'a str,
-    pub(crate) set: &'a TrackSet,
-    pub(crate) timeline: &'a Timeline,
-    pub(crate) layout: Layout,
-    pub(crate) order: ComponentOrder,
-    pub(crate) encoding: Encoding,
-}
-
 /// What takes the chunks of a result.
 pub(crate) type Sink<'a> = dyn FnMut(Chunk<'_>) -> Result<(), Ended> + 'a;
 
@@ -337,63 +323,43 @@ impl From<Error> for Ended {
 
 /// A writer of one format. Nothing is written before there is a first chunk: what
 /// cannot be evaluated leaves nothing behind, in a pipe neither.
-enum ResultWriter<'a, 'o> {
-    Waiting(&'o mut Stream),
-    Npy(NpyWriter<&'o mut Stream>),
-    Csv(Box<CsvWriter<'a, &'o mut Stream>>),
+struct LateWriter<'a> {
+    rotations: RotationsWriter,
+    result: ResultShape<'a>,
+    state: State<'a>,
+}
+
+type RotationsWriter =
+    for<'a> fn(&'a mut dyn Write, &ResultShape<'a>) -> io::Result<Box<dyn ResultWriter + 'a>>;
+
+enum State<'a> {
+    Waiting(&'a mut Stream),
+    Writing(Box<dyn ResultWriter + 'a>),
     Failed,
 }
 
-impl<'a> ResultWriter<'a, '_> {
-    /// Writes the header if that is yet to be done.
-    fn start(&mut self, format: Format, result: &ResultShape<'a>) -> io::Result<()> {
-        let (tracks, samples) = (result.set.track_count(), result.timeline.len());
-        *self = match std::mem::replace(self, Self::Failed) {
-            Self::Waiting(out) if format == Format::Csv => {
-                let (set, timeline) = (result.set, result.timeline);
-                Self::Csv(Box::new(CsvWriter::new(
-                    out,
-                    set,
-                    timeline,
-                    result.encoding,
-                )?))
-            }
-            Self::Waiting(out) => {
-                let (rows, columns) = match result.layout {
-                    Layout::TrackMajor => (tracks, samples),
-                    Layout::FrameMajor => (samples, tracks),
-                };
-                let (order, encoding) = (result.order, result.encoding);
-                Self::Npy(NpyWriter::new(out, rows, columns, order, encoding)?)
-            }
+impl<'a> LateWriter<'a> {
+    /// What writes, after the header.
+    fn started(&mut self) -> io::Result<&mut Box<dyn ResultWriter + 'a>> {
+        self.state = match std::mem::replace(&mut self.state, State::Failed) {
+            State::Waiting(out) => State::Writing((self.rotations)(out, &self.result)?),
             started => started,
         };
-        Ok(())
-    }
-
-    fn write(
-        &mut self,
-        format: Format,
-        result: &ResultShape<'a>,
-        rotations: &[Quat],
-    ) -> io::Result<()> {
-        self.start(format, result)?;
-        match self {
-            Self::Csv(writer) => writer.write(rotations),
-            // In pieces, so that a signal is noticed soon.
-            Self::Npy(writer) => rotations
-                .chunks(PIECE)
-                .try_for_each(|piece| writer.write(piece)),
-            Self::Waiting(_) | Self::Failed => Err(io::Error::other("an earlier error")),
+        match &mut self.state {
+            State::Writing(writer) => Ok(writer),
+            State::Waiting(_) | State::Failed => Err(io::Error::other("an earlier error")),
         }
     }
 
-    fn finish(mut self, format: Format, result: &ResultShape<'a>) -> io::Result<()> {
-        self.start(format, result)?;
-        match self {
-            Self::Csv(writer) => writer.finish(),
-            Self::Npy(writer) => writer.finish().map(drop),
-            Self::Waiting(_) | Self::Failed => Err(io::Error::other("an earlier error")),
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        self.started()?.write(rotations)
+    }
+
+    fn finish(mut self) -> io::Result<()> {
+        self.started()?;
+        match self.state {
+            State::Writing(writer) => writer.finish(),
+            State::Waiting(_) | State::Failed => Ok(()),
         }
     }
 }

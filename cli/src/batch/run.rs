@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use tumble_formats::dat::Loaded;
+use tumble_formats::Loaded;
 
 use crate::arguments::input;
 use crate::arguments::input::Inputs;

@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method};
-use tumble_formats::dat::Loaded;
+use tumble_formats::Loaded;
+use tumble_formats::format::{Format, ResultShape};
 use tumble_formats::npy::ComponentOrder;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 
@@ -15,7 +16,7 @@ use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, method};
 use crate::arguments::time::{Samples, Sampling};
 use crate::arguments::what::{PoseKind, What};
-use crate::batch::output::{Format, Plan, ResultShape, Target, Wish};
+use crate::batch::output::{Plan, Target, Wish};
 use crate::batch::place::Written;
 use crate::batch::run::{Batch, Evaluated};
 use crate::batch::{digest, output, room};
@@ -41,8 +42,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
-    /// Where to write: OUT.npy, OUT.csv, `-` (standard output), or a directory for several inputs
-    #[arg(short, long = "out", value_name = "OUT")]
+    #[arg(short, long = "out", value_name = "OUT", help = output::out_help())]
     out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
@@ -77,9 +77,12 @@ pub(crate) struct Arguments {
     encoding: EncodingArgument,
     #[command(flatten)]
     what: What,
-    /// npy or csv [default: by the name of the output, else npy]
-    #[arg(long, value_enum)]
-    format: Option<Format>,
+    /// Also say which way each input takes to its rotations; all ways give the same bits
+    #[arg(long)]
+    explain_route: bool,
+    /// The format of the result [default: by the name of the output, else npy]
+    #[arg(long, value_parser = output::format())]
+    format: Option<&'static Format>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -138,11 +141,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         resume: arguments.resume,
     };
     let Plan { targets, manifest } = output::plan(&inputs, wish)?;
-    let is_text = |target: &Target| target.format() == Format::Csv;
+    let is_text = |target: &Target| target.results().is_text;
     let short = arguments.encoding != EncodingArgument::F32;
     if short && targets.iter().any(is_text) {
         return Err(Failure::usage(
-            "--encoding is for NPY results; CSV holds every digit",
+            "--encoding is for binary results (NPY); text holds every digit",
         ));
     }
     let encoding = arguments.what.encoding(arguments.encoding.into());
@@ -213,11 +216,11 @@ impl Arguments {
             timeline.len(),
             self.what.encoding(self.encoding.into()),
         )?;
-        let layout = match (self.layout, target.format()) {
-            (LayoutArgument::Track, Format::Npy) => Layout::TrackMajor,
-            // A row of CSV holds one frame.
-            (LayoutArgument::Frame, _) | (_, Format::Csv) => Layout::FrameMajor,
+        let wished = match self.layout {
+            LayoutArgument::Track => Layout::TrackMajor,
+            LayoutArgument::Frame => Layout::FrameMajor,
         };
+        let layout = target.results().layout.unwrap_or(wished);
         let result = ResultShape {
             name: &name,
             set,
@@ -234,6 +237,15 @@ impl Arguments {
             quantity: self.what.quantity(),
             ..self.manner.with(self.method)
         };
+        if self.explain_route {
+            let route = device
+                .choose(set.track_count() * timeline.len())
+                .and_then(|()| {
+                    device.work(|engine| engine.explain_route(set, interpolation, &frames, layout))
+                })
+                .map_err(|error| Failure::evaluating(&name, &error))?;
+            words::note(&format!("{name}: {route}"));
+        }
         let written = target.write_rotations(&result, |sink| {
             device.stream(set, interpolation, &frames, layout, sink)
         })?;
@@ -305,10 +317,7 @@ impl Arguments {
             components,
             numbers: &numbers,
         };
-        let written = target.prepare(|out| match target.format() {
-            Format::Csv => poses.write_csv(out),
-            Format::Npy => poses.write_npy(out),
-        })?;
+        let written = target.prepare(|out| (target.results().poses)(&poses, out))?;
         Ok(self.evaluated(written, device, result, target, started))
     }
 

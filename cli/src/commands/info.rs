@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 use tumble::TrackSet;
 use tumble::reference::angle_between;
-use tumble_formats::dat::Loaded;
+use tumble_formats::Loaded;
 
 use crate::arguments::input;
 use crate::arguments::input::Inputs;

@@ -1,8 +1,8 @@
 //! Bézier curves of rotations (Shoemake 1985): de Casteljau's construction with slerps.
 //!
-//! Numbers: the four control rotations. The arcs between them are those that their
-//! signs give. Cutting such a curve by the construction does not reproduce it, as it
-//! does in flat space.
+//! Numbers: the four control rotations. The arcs between them are those that their signs give.
+//! Unlike in flat space, the two halves into which the construction cuts such a curve are not parts
+//! of it.
 
 use crate::curve::formula::{Formula, NUMBERS, quaternion, slerp};
 use crate::math::dual::Scalar;

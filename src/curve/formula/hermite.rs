@@ -3,7 +3,7 @@
 use crate::curve::formula::{Formula, NUMBERS, normalised, quaternion, weighted};
 use crate::math::dual::Scalar;
 
-/// `((1-t) q0 + t q1) / |…|`. Numbers: `q0`, two that are not used, `q1`.
+/// `((1-t) q0 + t q1) / |…|`. Numbers: `q0`, two quaternions that are not used, `q1`.
 pub(crate) struct Linear;
 
 impl Formula for Linear {
@@ -21,7 +21,7 @@ impl Formula for Linear {
 
 /// `((2t³-3t²+1) q0 + (t³-2t²+t) m0 + (3t²-2t³) q1 + (t³-t²) m1) / |…|`.
 ///
-/// Numbers: `q0`, `m0`, `m1`, `q1`; the tangents are times the interval's length.
+/// Numbers: `q0`, `m0`, `m1`, `q1`; the tangents are multiplied by the interval's length.
 pub(crate) struct Hermite;
 
 impl Formula for Hermite {

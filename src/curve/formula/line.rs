@@ -1,4 +1,4 @@
-//! A straight line in the four components. Numbers: where it is at 0, and its slope.
+//! A straight line in the four components, not normalised. Numbers: its value at 0, and its slope.
 
 use crate::curve::formula::{Formula, NUMBERS, quaternion, weighted};
 use crate::math::dual::Scalar;

@@ -1,5 +1,5 @@
-//! Formulas: what lies between two keys, in f64, as a function of the parameter from 0
-//! to 1. A formula takes [`NUMBERS`] of its own making; methods say what they are.
+//! Formulas: the curve between two keys, in f64, as a function of the parameter from 0 to 1. A
+//! formula takes up to [`NUMBERS`] numbers; its file says what they are.
 //!
 //! Kernels do not evaluate formulas: they evaluate the polynomials that are fitted to
 //! them, the same form for all.
@@ -19,10 +19,10 @@ pub(crate) const NUMBERS: usize = 25;
 /// The numbers of one curve.
 pub(crate) type Numbers = [f64; NUMBERS];
 
-/// A curve in the rotations.
+/// A curve of rotations.
 pub(crate) trait Formula: 'static {
-    /// The rotation at `t`; `#[inline(always)]` and without branches. A vector of times takes
-    /// vectors of numbers.
+    /// The rotation at `t`. Implementations are `#[inline(always)]` and without branches. If `t` is
+    /// a vector, the numbers are vectors too.
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4];
 }
 
@@ -83,11 +83,11 @@ fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
     ]
 }
 
-/// Slerp, the arc that the signs give: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`
-/// (Shoemake 1985), but for a factor; its ends may depend on time too.
+/// Slerp on the arc that the signs give: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b` (Shoemake 1985),
+/// up to a factor that normalising removes. Its ends may depend on time too.
 ///
-/// The sines are written `x sinc(x²)` and the angle by its square, which is smooth in
-/// the chord between the ends: there is no special case for a small angle.
+/// The sines are written `x sinc(x²)`, and the square of the angle is a smooth function of the
+/// chord between the ends, so that small angles are no special case.
 #[inline(always)]
 fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
     let minus = S::all(-1.0);

@@ -13,8 +13,8 @@ impl Product {
     pub(crate) const VECTORS: usize = 4;
     pub(crate) const BASIS: usize = 13;
 
-    /// The numbers of cumulative Bernstein, `1-(1-t)³`, `t²(3-2t)`, `t³`, before any
-    /// base or vector.
+    /// The numbers of a curve with the cumulative Bernstein basis, `1-(1-t)³`, `t²(3-2t)`, `t³`;
+    /// base and vectors are still 0.
     pub(crate) const BERNSTEIN: Numbers = {
         let mut numbers = [0.0; NUMBERS];
         let basis = [

@@ -1,4 +1,4 @@
-//! A curve in f64, and the part of it that is fitted.
+//! A curve in f64 by its formula, and the piece of it that one polynomial fits.
 
 use std::sync::Arc;
 
@@ -10,21 +10,21 @@ use crate::fit::motion::derivatives as motion;
 use crate::math::dual::Jet;
 use crate::math::quaternion::{Quaternion, dot};
 
-/// What lies between two keys, or a part of it.
+/// The curve of one key interval, or a piece of it.
 #[derive(Clone)]
 pub(crate) struct Curve {
     pub(crate) shape: &'static Shape,
     pub(crate) numbers: Numbers,
     pub(crate) piece: Piece,
     pub(crate) quantity: Quantity,
-    /// Of the parameter, per second.
+    /// The change of the parameter per second.
     pub(crate) rate: f64,
-    /// Where it is run through at constant speed.
+    /// The curve's arc lengths if it is traversed at constant speed.
     pub(crate) pace: Option<Arc<Pace>>,
 }
 
-/// The part of an interval that is fitted: where it starts, and its length, in
-/// sixteenths.
+/// The part of an interval that one polynomial fits: its start and its length in sixteenths of the
+/// interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
     pub(crate) from: u8,
@@ -37,8 +37,8 @@ impl Piece {
         length: 16,
     };
 
-    /// Whether it is cut no further: what turns by dozens of radians within one
-    /// interval is computed on the host in f64, for every device.
+    /// Whether the piece is cut no further. A curve that no polynomial fits even then turns by
+    /// dozens of radians within one interval; the host evaluates it in f64 for every device.
     pub(crate) fn is_finest(self) -> bool {
         self.length == 1
     }
@@ -48,7 +48,7 @@ impl Piece {
         [self.from, self.from + length].map(|from| Self { from, length })
     }
 
-    /// Where it starts, and its width, as parts of the whole.
+    /// Its start and its width as fractions of the interval.
     pub(crate) fn extent(self) -> (f64, f64) {
         let part = |of: u8| f64::from(of) / f64::from(Self::WHOLE.length);
         (part(self.from), part(self.length))
@@ -56,13 +56,13 @@ impl Piece {
 }
 
 impl Curve {
-    /// What is asked for at `t`, 0 to 1 over its piece, in f64.
+    /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its piece.
     pub(crate) fn value(&self, t: f64) -> Quaternion {
         let (start, width) = self.piece.extent();
         self.value_at(start + width * t)
     }
 
-    /// What is asked for at `t`, 0 to 1 over its interval.
+    /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its interval.
     pub(crate) fn value_at(&self, t: f64) -> Quaternion {
         if self.quantity != Quantity::Rotation || self.pace.is_some() {
             let parameter = match &self.pace {
@@ -76,11 +76,13 @@ impl Curve {
         if dot(rotation, rotation) > 0.5 || !self.shape.is_unit {
             return rotation;
         }
-        // Straight through the middle, where there is no rotation: that just behind it.
+        // A normalised polynomial may pass through 0, where it is no rotation: the rotation just
+        // after that is taken.
         (self.shape.rotation)(&self.numbers, t + 1e-9)
     }
 
-    /// What goes on from `t` at the velocity there; its parameter is seconds.
+    /// The curve that continues from `t` at the constant angular velocity that this one has there;
+    /// its parameter is in seconds.
     pub(crate) fn beyond(&self, t: f64) -> Self {
         let rotation = self.moving(Jet::parameter(t));
         let [x, y, z, _] = motion::value(Quantity::Velocity(Axes::Body), rotation, self.rate);
@@ -99,7 +101,7 @@ impl Curve {
         }
     }
 
-    /// The rotation and its derivatives.
+    /// The rotation and its derivatives, as dual numbers.
     pub(crate) fn moving(&self, parameter: Jet) -> [Jet; 4] {
         (self.shape.moving)(&self.numbers, parameter)
     }

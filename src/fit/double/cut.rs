@@ -1,4 +1,4 @@
-//! Curves that one polynomial does not fit, cut in two until every part fits.
+//! Cuts curves that one polynomial does not fit in two, until every part fits.
 
 use bytemuck::Zeroable;
 
@@ -9,13 +9,13 @@ use crate::fit::double::intervals::LANES;
 use crate::fit::double::shape::Shape;
 use crate::shader::PolynomialSegment;
 
-/// Cuts curves; what it needs for that is kept.
+/// Cuts curves; its memory is kept for the next ones.
 pub(crate) struct Cutter {
     shape: &'static Shape,
     quantity: Quantity,
-    /// Made when there is something to cut.
+    /// Made for the first curve to cut.
     block: Option<Box<FitBlock>>,
-    /// The curves given since the last were taken.
+    /// The curves added since the last [`Cutter::clear`].
     curves: Vec<Curve>,
     waiting: Vec<Part>,
     parts: Vec<Part>,
@@ -24,19 +24,19 @@ pub(crate) struct Cutter {
 /// A part of a curve.
 #[derive(Clone, Copy)]
 pub(crate) struct Part {
-    /// The span that the curve is of.
+    /// The span to which the curve belongs.
     pub(crate) span: usize,
-    /// Its place among the curves given.
+    /// The curve's place in [`Cutter::curves`].
     curve: usize,
     pub(crate) piece: Piece,
-    /// Its place among the segments, given when it is fitted; nothing where even the finest
-    /// does not fit.
+    /// Its place among the segments, chosen when it is fitted; `None` after that if it is one of
+    /// the finest pieces and does not fit.
     pub(crate) segment: Option<usize>,
 }
 
 impl Part {
-    /// The first takes its segment: so those that are evaluated one after the other lie one
-    /// after the other, or nearly.
+    /// Both halves. The first keeps the segment of the whole, so that segments lie nearly in the
+    /// order in which they are evaluated.
     fn halves(self) -> [Self; 2] {
         let [first, second] = self.piece.halves();
         let second = Self {
@@ -66,20 +66,20 @@ impl Cutter {
         }
     }
 
-    /// Adds the curve of a span that has a segment: at least two parts will come of it.
+    /// Adds the curve of a span that has a segment. It is cut into at least two parts.
     pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: usize) {
         let whole = self.part(span, &curve, Some(segment));
         self.waiting.extend(whole.halves());
         self.curves.push(curve);
     }
 
-    /// Adds the curve of a span, to be cut where it does not fit whole.
+    /// Adds the curve of a span, which is cut only if it does not fit as a whole.
     pub(crate) fn push_whole(&mut self, span: usize, curve: Curve) {
         self.waiting.push(self.part(span, &curve, None));
         self.curves.push(curve);
     }
 
-    /// All of the curve that is given next.
+    /// The part that is the whole of the curve added next.
     fn part(&self, span: usize, curve: &Curve, segment: Option<usize>) -> Part {
         Part {
             span,
@@ -89,7 +89,7 @@ impl Cutter {
         }
     }
 
-    /// Cuts the curves given.
+    /// Cuts and fits the curves that were added.
     pub(crate) fn cut(&mut self, segments: &mut Vec<PolynomialSegment>) {
         let mut done = 0;
         while done < self.waiting.len() {
@@ -123,11 +123,11 @@ impl Cutter {
             done = some.end;
         }
         self.waiting.clear();
-        // Most are in order.
+        // Most parts are in order already.
         self.parts.sort_by_key(|part| (part.span, part.piece.from));
     }
 
-    /// The parts of every curve given, in order of spans and time.
+    /// The parts of every curve, in order of spans and time.
     pub(crate) fn parts(&self) -> &[Part] {
         &self.parts
     }
@@ -140,7 +140,7 @@ impl Cutter {
         }
     }
 
-    /// Forgets the curves given, and their parts.
+    /// Forgets the curves and their parts.
     pub(crate) fn clear(&mut self) {
         self.curves.clear();
         self.parts.clear();

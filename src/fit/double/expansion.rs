@@ -1,4 +1,4 @@
-//! Samples of cubics, in vector lanes: the first half of a fit.
+//! Samples cubics in cumulative form at the nodes, in vector lanes: the first half of a fit.
 
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
@@ -14,7 +14,8 @@ use crate::simd::lanes::{Doubles, Lanes, Number};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{FromIdentity, cross3, dot3, inverse_rotated};
 
-/// By the expanded cubic, in f32; with a basis of each curve's own, or one for all.
+/// Samples a cubic by its expansion about the middle, in f32. With `OWN_BASIS` each curve has basis
+/// functions of its own; without it all share those of their shape.
 pub(crate) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
@@ -39,7 +40,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
     nodes: &Nodes<PAIRS>,
     segments: &mut [PolynomialSegment],
 ) {
-    // A copy: what is written below could be what a reference shows.
+    // A copy, as the compiler could not rule out that the writes below change a referenced value.
     let shared = block.shape.shared;
     for lane in (0..block.whole()).step_by(L::COUNT) {
         let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
@@ -56,12 +57,12 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
 /// One of the three rotations of a cubic about the middle of its piece,
 /// `q = q_0 exp(v_1 B_1) exp(v_2 B_2) exp(v_3 B_3)`, a lane to each cubic.
 struct Factor<L: Lanes> {
-    /// The rotation at the middle.
+    /// This rotation at the middle.
     turn: [L::Doubles; 4],
     vector: [L; 3],
     /// The square of the vector's length.
     square: L,
-    /// Coefficients of s, s² and s³ in what the basis function has more than at the middle.
+    /// Coefficients of s, s² and s³ in the basis function's difference from the middle.
     powers: [L; 3],
     /// The square of the farthest angle from the middle.
     reach: L::Doubles,
@@ -104,7 +105,7 @@ impl<L: Lanes> Factor<L> {
         let linear = ((three * c3 * middle + two * c2) * middle + c1) * width;
         let quadratic = (three * c3 * middle + c2) * width * width;
         let cubic = c3 * width * width * width;
-        // At s = 1/2 and at -1/2, the farther.
+        // The square of the larger difference of those at s = -1/2 and at s = 1/2.
         let odd = (linear + all::<L>(0.25) * cubic) * all::<L>(0.5);
         let even = quadratic * all::<L>(0.25);
         let (before, after) = (odd - even, odd + even);
@@ -123,7 +124,8 @@ impl<L: Lanes> Factor<L> {
     }
 }
 
-/// The exponentials of half-rotation vectors; fastest where all are short.
+/// The exponentials of half-rotation vectors by polynomials; lanes whose vector is too long for
+/// them are computed over the full range.
 #[inline(always)]
 fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     let squared = square(vector);
@@ -153,7 +155,7 @@ struct Turns {
 }
 
 impl Turns {
-    /// Those of squares that are not within `limit`, by what holds anywhere.
+    /// Computes the exponentials of vectors whose squares exceed `limit`, over the full range.
     #[inline(never)]
     fn beyond(&mut self, limit: f64) {
         for lane in 0..MOST {
@@ -179,7 +181,7 @@ fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
     lanes
 }
 
-/// `a v`, `v` a vector.
+/// The product `a v` of a quaternion and a vector.
 #[inline(always)]
 pub(crate) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     [
@@ -190,11 +192,12 @@ pub(crate) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
     ]
 }
 
-/// The sine of an angle divided by the length of its vector, and its cosine less 1.
+/// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.
 pub(crate) type SineCosm1<L> = (L, L);
 
-/// Cubics about the middle of their pieces, `m exp(v₁ b₁) exp(v₂ b₂) exp(v₃ b₃)`, a lane to
-/// each: half-rotation vectors are brought behind what follows them there.
+/// Cubics about the middle of their pieces, `m exp(v₁ b₁) exp(v₂ b₂) exp(v₃ b₃)`, a lane to each.
+/// Each half-rotation vector is rotated back by the factors that follow it at the middle, and each
+/// `bᵢ` is 0 there.
 pub(crate) struct AboutMiddle<L> {
     middle: [L; 4],
     /// `m v₁`.
@@ -206,7 +209,7 @@ pub(crate) struct AboutMiddle<L> {
 }
 
 impl<L: Lanes> AboutMiddle<L> {
-    /// Of the rotation of the middle, and such vectors.
+    /// Takes the rotation at the middle and the vectors `vᵢ`.
     #[inline(always)]
     pub(crate) fn new(middle: [L; 4], [v1, v2, v3]: [[L; 3]; 3]) -> Self {
         let [x, y, z] = cross3(v2, v3);
@@ -219,7 +222,7 @@ impl<L: Lanes> AboutMiddle<L> {
         }
     }
 
-    /// What the rotations before and after the middle are more than it.
+    /// The differences of the rotations before and after the middle from the one at the middle.
     #[inline(always)]
     pub(crate) fn differences(
         &self,
@@ -232,7 +235,7 @@ impl<L: Lanes> AboutMiddle<L> {
         ];
         let [second, third] = [self.second, self.third];
         let same = Sides::same;
-        // With cosines as 1 + fall, nothing is lost where the angles are small.
+        // With cosines minus one, no digits cancel where the angles are small.
         let cs = s3 + f2 * s3;
         let sc = s2 + s2 * f3;
         let ss = s2 * s3;
@@ -264,7 +267,7 @@ fn on_both_sides<L: Lanes>([x, y, z, w]: [L; 4]) -> [Sides<L>; 4] {
     ]
 }
 
-/// The same with what the angles are made of.
+/// [`AboutMiddle`] with the polynomials of its three angles.
 struct Expanded<L> {
     curve: AboutMiddle<L>,
     squares: [L; 3],
@@ -285,7 +288,7 @@ impl<L: Lanes> Expanded<L> {
         }
     }
 
-    /// Samples them at every node.
+    /// Samples the cubics at every node.
     #[inline(always)]
     fn sample<const PAIRS: usize, const SHORT: bool>(
         &self,
@@ -305,13 +308,13 @@ impl<L: Lanes> Expanded<L> {
         samples
     }
 
-    /// Of the j-th angle, at `-s` and at `s`.
+    /// The sine and cosine of the `j`th angle, at `-s` and at `s`.
     #[inline(always)]
     fn turns<const SHORT: bool>(&self, j: usize, s: L) -> SineCosm1<Sides<L>> {
         let [linear, quadratic, cubic] = self.powers[j];
         let rise = cubic * s;
         let angle = Sides {
-            // The same as with -s, to the bit.
+            // This gives the same bits as the formula below does for -s.
             before: -((linear - (quadratic - rise) * s) * s),
             after: ((rise + quadratic) * s + linear) * s,
         };
@@ -324,7 +327,7 @@ impl<L: Lanes> Expanded<L> {
     }
 }
 
-/// In f32, by what its cosine is less than 1.
+/// The rotation in f32, with its cosine minus one.
 #[inline(always)]
 fn turn<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> FromIdentity<L> {
     FromIdentity {
@@ -338,7 +341,7 @@ fn all<L: Lanes>(value: f64) -> L::Doubles {
     L::Doubles::all(value)
 }
 
-/// So many numbers from a place on.
+/// The `N` numbers from `place` on.
 #[inline(always)]
 fn from<const N: usize>(numbers: &[Lane64], place: usize) -> &[Lane64; N] {
     numbers[place..].first_chunk().expect("a product's numbers")

@@ -1,9 +1,9 @@
-//! Cubics fitted by polynomials, in vector lanes: what the kernels evaluate.
+//! Fits curves by the polynomials that the kernels evaluate, in vector lanes.
 //!
-//! A curve is sampled at Chebyshev nodes, and each component of the rotation becomes
-//! the polynomial through the samples. One node is the middle, which the polynomial
-//! meets exactly; the others enter as differences from it, so that f32 serves for
-//! them. Powers come last: divided differences keep what f32 rounds small.
+//! A curve is sampled at Chebyshev nodes, and each component of the rotation becomes the polynomial
+//! through the samples. One node is the middle, which the polynomial meets exactly; the others
+//! enter as differences from it, for which f32 is precise enough. Divided differences come first
+//! and powers last, which keeps the rounding errors of f32 small.
 
 use std::array;
 use std::sync::Arc;
@@ -24,77 +24,78 @@ use crate::shader::POWERS;
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, canonical};
 
-/// The most lanes that a vector has.
+/// The number of lanes in the widest vector.
 pub(crate) const MOST: usize = 16;
 
-/// How many powers a curve needs.
+/// How a curve is fitted, by how far it turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tier {
-    /// Degree 6, for curves that turn little: keys as dense as motion capture has
-    /// them. Such a fit is always good enough.
+    /// Degree 6, for curves that turn through small angles, such as between the dense keys of
+    /// motion capture.
     Gentle,
     /// Degree 10.
     Full,
-    /// The same, for pieces of curves that may turn any distance.
+    /// Degree 10 for a piece of a curve, which may turn any distance.
     Piece,
 }
 
-/// Sums of the three half-rotation vectors' squares below this are fitted within 2e-8
-/// by degree 6.
+/// The squared extent (the sum of the three half-rotation vectors' squares) up to which degree 6
+/// fits a curve within 2e-8.
 pub(crate) const GENTLE: f64 = 0.002;
 
-/// Above this hardly any curve is fitted whole.
+/// The squared extent above which curves are cut without trying to fit them whole: hardly any
+/// would fit.
 pub(crate) const LONGEST_WHOLE: f64 = 0.2;
 
-/// An estimate of twice what a fit leaves out may be this much: from the last two
-/// Chebyshev coefficients.
+/// The largest accepted estimate of twice a fit's truncation error; see [`tail`].
 pub(crate) const TOLERANCE: f32 = 1.5e-7;
 
-/// How far the angles may go from the middle of a piece, and of a whole curve: the
-/// polynomials of sine and cosine hold to pi/2 and to pi/4.
+/// The largest angles from the middle of a piece, and of a whole curve: the polynomials of sine and
+/// cosine hold up to pi/2 and up to pi/4.
 const REACH: f64 = 1.57;
 const SHORT_REACH: f64 = 0.785;
 
 pub(crate) type Lane64 = [f64; LANES];
 pub(crate) type Lane32 = [f32; LANES];
 
-/// How to fit a curve with that sum of squares; pieces of it where it is to be cut untried.
+/// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be cut without a try.
 pub(crate) fn tier(energy: f64) -> Tier {
     if energy <= GENTLE {
         Tier::Gentle
     } else if energy <= LONGEST_WHOLE {
         Tier::Full
     } else {
-        // Also NaN, which is cut until nothing is left of it.
+        // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.
         Tier::Piece
     }
 }
 
-/// Curves that wait, and their polynomials.
+/// Up to [`LANES`] curves that wait to be fitted, all of one shape and tier.
 pub(crate) struct FitBlock {
     pub(crate) shape: &'static Shape,
     tier: Tier,
     /// Each curve's own numbers.
     pub(crate) numbers: Vec<Lane64>,
-    /// The middle of the piece to fit, and its width.
+    /// The middle of the piece to fit and its width, as fractions of the interval.
     pub(crate) middles: Lane64,
     pub(crate) widths: Lane64,
-    /// Of the parameter, per second.
+    /// The change of the parameter per second.
     rates: Lane64,
-    /// Of curves that are run through at constant speed; for all of a block's, or none.
+    /// The arc lengths of curves traversed at constant speed; either every curve of a block has
+    /// them or none.
     paces: Vec<Option<Arc<Pace>>>,
     pub(crate) quantity: Quantity,
     count: usize,
     /// The segments that they become.
     places: [usize; LANES],
-    /// What the fit leaves out, twice, about; the largest of any component.
+    /// Estimates of twice the truncation error, the largest of each curve's components.
     tails: Lane32,
     /// The squares of the farthest angles from the middle.
     pub(crate) reaches: Lane64,
 }
 
-/// The rotations at the nodes of curves: those of the middle, and differences from it at
-/// each pair of nodes, their sum and what they differ by.
+/// Samples of curves: the rotations at the middle, and for each pair of nodes `-s` and `s` the
+/// differences from the middle, as their sum (`even`) and their difference (`odd`).
 pub(crate) struct Samples<N, const PAIRS: usize> {
     pub(crate) middle: [N; 4],
     pub(crate) even: [[N; 4]; PAIRS],
@@ -102,7 +103,7 @@ pub(crate) struct Samples<N, const PAIRS: usize> {
 }
 
 impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
-    /// All the same.
+    /// Samples that all have the same value.
     #[inline(always)]
     pub(crate) fn all(number: N) -> Self {
         Self {
@@ -114,7 +115,7 @@ impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
 }
 
 impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
-    /// Those of the lanes from `lane` on.
+    /// The samples of one vector's lanes, from `lane` on.
     #[inline(always)]
     pub(crate) fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
         let mut own = Samples::all(L::all(0.0));
@@ -130,8 +131,8 @@ impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
 }
 
 impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
-    /// Sets what the rotations before and after the middle are more than it, at the `k`th
-    /// pair of nodes.
+    /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
+    /// and after the middle from the one at the middle.
     #[inline(always)]
     pub(crate) fn set_differences(&mut self, k: usize, differences: [Sides<L>; 4]) {
         for (c, &Sides { before, after }) in differences.iter().enumerate() {
@@ -140,7 +141,7 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Makes them those of the curves from their other end.
+    /// Reverses the direction of the parameter.
     #[inline(always)]
     pub(crate) fn turn_round(&mut self) {
         for odd in self.odd.as_flattened_mut() {
@@ -148,21 +149,21 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Sets the derivative by s at the middle, which is the first of the nodes too, and half of
-    /// the second.
+    /// Sets the first derivative by s at the middle, and half of the second. The first node of
+    /// these fits is s = 0.
     #[inline(always)]
     pub(crate) fn set_middle(&mut self, derivative: [L; 4], half_second: [L; 4]) {
         self.odd[0] = derivative;
         self.even[0] = half_second;
     }
 
-    /// Sets the derivatives by s at the ends: the last pair of nodes, which comes twice. They
-    /// take the form of one more sample there, so that [`Nodes::powers`] finds, as what it has
-    /// more than the sample itself, the derivatives of its polynomials by s².
+    /// Sets the derivatives by s at the ends, which are the last pair of nodes and are there twice.
+    /// Each is stored as a second sample, whose difference from the first is the derivative by s²
+    /// that the divided differences of [`Nodes::powers`] need there.
     #[inline(always)]
     pub(crate) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
-        // By s², even / 2s² rises there by 2 (after - before) - 8 even, and odd / 2s by after +
-        // before - 2 odd; the samples there stand for 2 even, and for odd.
+        // At s = 1/2 the polynomials even / 2s² and odd / 2s have the values 2 even and odd, and
+        // the derivatives by s² 2 (after - before) - 8 even and after + before - 2 odd.
         for (c, &Sides { before, after }) in slopes.iter().enumerate() {
             let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
             self.even[PAIRS - 1][c] = (after - before) - L::all(3.0) * even;
@@ -170,7 +171,7 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Every lane's.
+    /// The samples with each vector's lanes in an array.
     #[inline(always)]
     pub(crate) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {
         let mut lanes = Samples::all([0.0; MOST]);
@@ -208,7 +209,7 @@ impl FitBlock {
         self.tier
     }
 
-    /// The segment that the curve in a lane has become.
+    /// The place of the segment for the curve in a lane.
     pub(crate) fn place(&self, lane: usize) -> usize {
         self.places[lane]
     }
@@ -228,13 +229,13 @@ impl FitBlock {
         self.paces.clear();
     }
 
-    /// Lanes to work out: whole vectors, or those left over would be done one by one.
+    /// The number of lanes to compute, rounded up to whole vectors of eight.
     #[inline(always)]
     pub(crate) fn whole(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
     }
 
-    /// Adds a piece of a curve; the block is not full.
+    /// Adds a piece of a curve; the block must not be full.
     pub(crate) fn push(&mut self, curve: &Curve, piece: Piece) {
         let lane = self.count;
         for (lanes, &number) in self.numbers.iter_mut().zip(&curve.numbers) {
@@ -250,11 +251,12 @@ impl FitBlock {
         self.count += 1;
     }
 
-    /// Adds the curves in some lanes of `intervals`; the block has room for them.
+    /// Adds the curves in some lanes of `intervals`; the block must have room for them.
     pub(crate) fn push_from(&mut self, intervals: &Intervals, lanes: &[u8]) {
         let own = self.count..self.count + lanes.len();
         let (to, from) = (&mut self.numbers[..], &intervals.numbers[..]);
-        // All numbers of a lane at once, where it is known how many: half the instructions.
+        // With a count known at compile time all numbers of a lane are copied at once, which takes
+        // half the instructions.
         if let (Ok(to), Ok(from)) = (to.try_into(), from.try_into()) {
             copy::<{ Product::BASIS }>(to, own.start, from, lanes);
         } else {
@@ -276,7 +278,7 @@ impl FitBlock {
         self.count = own.end;
     }
 
-    /// A curve's own numbers; 0 behind them.
+    /// The own numbers of the curve in a lane, followed by zeros.
     pub(crate) fn numbers_of(&self, lane: usize) -> Numbers {
         let own = &self.numbers[..];
         array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
@@ -294,14 +296,14 @@ impl FitBlock {
         }
     }
 
-    /// Fits the curves that wait, to segments at these places; powers above the tier's stay
-    /// what they are.
+    /// Fits the curves that wait, into the segments at these places. Coefficients of powers above
+    /// the tier's degree are not written.
     pub(crate) fn run(
         &mut self,
         segments: &mut Vec<PolynomialSegment>,
         places: impl Iterator<Item = usize>,
     ) {
-        // One for the last vector's lanes that have no curve.
+        // The lanes of the last vector that have no curve write to one extra segment.
         self.places.fill(segments.len());
         segments.push(PolynomialSegment::zeroed());
         for (own, place) in self.places[..self.count].iter_mut().zip(places) {
@@ -315,7 +317,8 @@ impl FitBlock {
         segments.pop();
     }
 
-    /// Whether all that a gentle tier holds is fitted, unchecked.
+    /// Whether every fit of this block is good enough without a check: curves of small angle whose
+    /// shape is [entire](Shape::entire).
     pub(crate) fn is_trusted(&self) -> bool {
         self.tier == Tier::Gentle && self.is_entire()
     }
@@ -325,7 +328,7 @@ impl FitBlock {
         self.shape.entire && of_rotations
     }
 
-    /// Multiplies every lane's polynomial.
+    /// Multiplies the polynomial of each lane by its scale.
     pub(crate) fn scale(&self, scales: &Lane32, segments: &mut [PolynomialSegment]) {
         for (&place, &scale) in self.places[..self.count].iter().zip(scales) {
             for own in &mut segments[place].coefficients {
@@ -345,7 +348,8 @@ impl FitBlock {
         is_near && middle.iter().all(|c| c.is_finite())
     }
 
-    /// From the differences at the nodes of the curves from `lane` on to the coefficients.
+    /// Interpolates the samples of the curves from `lane` on, and keeps the estimates of their
+    /// truncation errors.
     #[inline(always)]
     pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
         &mut self,
@@ -361,8 +365,8 @@ impl FitBlock {
     }
 }
 
-/// From the differences at the nodes to the coefficients, in each lane's segment; and what
-/// the fits leave out, twice, about. Curves are [entire](crate::fit::double::shape::Shape::entire), or not.
+/// Interpolates samples and writes the coefficients to each lane's segment. Returns estimates of
+/// twice the truncation error, which depend on whether the curves are [entire](Shape::entire).
 #[allow(clippy::needless_range_loop)]
 #[inline(always)]
 pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
@@ -387,7 +391,7 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
     tails
 }
 
-/// Copies numbers of some lanes to consecutive ones, from `start` on.
+/// Copies the numbers of some lanes to consecutive lanes from `start` on.
 #[inline(always)]
 fn copy<const N: usize>(to: &mut [Lane64; N], start: usize, from: &[Lane; N], lanes: &[u8]) {
     for (place, &lane) in (start..).zip(lanes) {

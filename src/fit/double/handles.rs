@@ -1,4 +1,4 @@
-//! Passes over the lanes of a block, in vectors.
+//! Passes over the lanes of a block in vectors of f64: steps, handles, and the curves between them.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::time::frame_clock::FrameClock;
 
-/// Steps between keys, and their logarithms.
+/// Computes the steps between keys, and their logarithms.
 pub(crate) struct Steps<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for Steps<'_> {
@@ -43,7 +43,7 @@ impl<D: Doubles> Near<D> {
         !self.doubt.are_at_most(0.0)
     }
 
-    /// The lanes where it does not hold, of those from `lane` on and before `end`.
+    /// The lanes outside the principal range, among those from `lane` on and before `end`.
     #[inline(never)]
     fn lanes(&self, lane: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
         let mut doubts = [0.0; MOST];
@@ -60,7 +60,7 @@ fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
     normalised([x.widened(), y.widened(), z.widened(), w.widened()])
 }
 
-/// Whether intervals hold a frame.
+/// Finds for each interval of some lanes whether a frame lies in it.
 pub(crate) struct FramesHeld<'a> {
     pub(crate) clock: FrameClock,
     pub(crate) intervals: &'a Intervals,
@@ -69,7 +69,7 @@ pub(crate) struct FramesHeld<'a> {
 }
 
 impl InLanes for FramesHeld<'_> {
-    // A loop that the compiler makes vectors of.
+    // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let Intervals { starts, ends, .. } = self.intervals;
@@ -81,7 +81,7 @@ impl InLanes for FramesHeld<'_> {
     }
 }
 
-/// A key interval as the rules for handles see it; or those of some lanes.
+/// What a [`HandleRule`] knows of a key interval, or of the intervals in a vector's lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct Interval<R> {
     /// Seconds.
@@ -90,7 +90,7 @@ pub(crate) struct Interval<R> {
     pub(crate) step: [R; 4],
     /// Its logarithm, within 1e-12.
     pub(crate) log: [R; 3],
-    /// Numbers that the method has for its first key.
+    /// The method's own numbers for its first key.
     pub(crate) key: [R; 4],
 }
 
@@ -104,7 +104,8 @@ pub(crate) struct Handles<R> {
 
 /// A rule that gives the handles of a key from the intervals on both sides of it.
 pub(crate) trait HandleRule {
-    /// `#[inline(always)]`, and without branches.
+    /// The handles of the key between two intervals. Implementations are `#[inline(always)]` and
+    /// have no branches, so that they run in vector lanes.
     fn handles<A: Algebra>(
         algebra: &mut A,
         before: Interval<A::Number>,
@@ -115,7 +116,7 @@ pub(crate) trait HandleRule {
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // The tangents of a parabola change evenly.
+            // The tangent of a parabola changes at a constant rate.
             EndHandle::Parabolic => sum(scaled(log, 2.0 / 3.0), scaled(other, -1.0)),
             // No acceleration: the control rotation lies half way to the other one.
             EndHandle::Natural(rest) => scaled(rest, 0.5),
@@ -132,18 +133,18 @@ pub(crate) struct EndInterval {
     pub(crate) other: Vector,
 }
 
-/// What the handle of an end's key shall do.
+/// The condition for the handle of a track's first or last key.
 #[derive(Clone, Copy)]
 pub(crate) enum EndHandle {
-    /// Give the velocity that makes this half-rotation vector within the interval.
+    /// The velocity is that which turns by this half-rotation vector within the interval.
     Turn(Vector),
-    /// Continue the parabola through the last three keys.
+    /// The curve continues the parabola through the last three keys.
     Parabolic,
-    /// Give no acceleration; the logarithm of the step without the inner key's handle.
+    /// The acceleration is 0. Holds the logarithm of the step without the inner key's handle.
     Natural(Vector),
 }
 
-/// The handles of every key that an interval starts with, or ends with.
+/// Computes the handles of every key at the start or the end of an interval.
 pub(crate) struct KeyHandles<'a, R> {
     pub(crate) intervals: &'a mut Intervals,
     pub(crate) stretches: &'a [Stretch],
@@ -161,7 +162,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
             store(&mut own.incoming, lane + 1, handles.incoming);
             store(&mut own.outgoing, lane + 1, handles.outgoing);
             if near.is_in_doubt() {
-                // Between the context of one stretch and that of the next is no key.
+                // The context lanes of two neighbouring stretches do not share a key.
                 let is_key = |j: &usize| {
                     let mut stretches = self.stretches.iter().map(Stretch::lanes);
                     stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
@@ -185,7 +186,7 @@ impl Intervals {
         }
     }
 
-    /// The handles of the key that an interval starts with, by what holds anywhere.
+    /// Computes the handles of the key at the start of an interval, over the full range.
     #[inline(never)]
     fn handles_anywhere<R: HandleRule>(&mut self, lane: usize) {
         let interval = |lane: usize| Interval {
@@ -228,7 +229,7 @@ impl InLanes for BetweenHandles<'_> {
 }
 
 impl Intervals {
-    /// The curve of a lane between its handles, by what holds anywhere.
+    /// Computes the curve of a lane between its handles, over the full range.
     #[inline(never)]
     fn between_anywhere(&mut self, lane: usize) {
         let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
@@ -239,7 +240,7 @@ impl Intervals {
     }
 }
 
-/// Bases and vectors of [`Product`].
+/// The bases and the vectors among the numbers of [`Product`].
 #[inline(always)]
 fn product_numbers(numbers: &mut [Lane]) -> (&mut [Lane; 4], &mut [Lane; 9]) {
     let (bases, others) = numbers.split_at_mut(Product::VECTORS);
@@ -320,8 +321,8 @@ fn control_lanes(
     }
 }
 
-/// Curves near keys: each interval's own logarithm between its neighbours', from the
-/// key before it.
+/// Curves that pass near their keys: the logarithms of the interval before, of the interval itself
+/// and of the one after it are the vectors, and the key before the interval is the base.
 pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
 
 impl InLanes for BetweenNeighbours<'_> {

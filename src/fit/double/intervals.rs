@@ -1,10 +1,10 @@
-//! Key intervals side by side, and what the methods make of them: each pass goes over
-//! the lanes in vectors, compiled for every width.
+//! Blocks of key intervals, and the numbers that methods compute for them. Each pass goes over the
+//! lanes in vectors and is compiled for every width.
 //!
-//! A lane is one key interval. Intervals of one track that follow one another are a
-//! stretch; on either side of it a lane of context holds the neighbouring interval,
-//! so that no pass asks where a track ends. Where there is no neighbour, the method's
-//! ends put into the context, or into the handles, what the curve shall do there.
+//! A lane is one key interval. Consecutive intervals of one track are a stretch; the lane on either
+//! side of it is context and holds the neighbouring interval, so that no pass asks where a track
+//! ends. At the end of a track the context is empty; the method then sets the context or the
+//! handles by the `Ends` asked for.
 
 use std::ops::Range;
 
@@ -17,13 +17,13 @@ use crate::time::spans::NONE;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
-/// Lanes worked out together.
+/// The number of lanes in a block.
 pub(crate) const LANES: usize = 128;
 
-/// Room for the lanes, and for passes that look one further and end on whole vectors.
+/// The length of a block's arrays: passes read one lane further and end on whole vectors.
 pub(crate) const ROOM: usize = LANES + 8;
 
-/// A number of each interval.
+/// One number for each interval.
 pub(crate) type Lane = [f64; ROOM];
 
 /// Some consecutive intervals of a track in a block.
@@ -31,18 +31,19 @@ pub(crate) type Lane = [f64; ROOM];
 pub(crate) struct Stretch {
     /// The lane of its first interval; the lane before it is context.
     pub(crate) lane: usize,
-    /// Which intervals of the track.
+    /// The intervals' places in the track.
     pub(crate) intervals: Range<usize>,
-    /// Intervals of the whole track.
+    /// The number of intervals of the whole track.
     pub(crate) all: usize,
     /// When the whole track starts and ends, seconds.
     pub(crate) span: (f64, f64),
     /// Its place in the prepared parts.
     pub(crate) part: usize,
-    /// The constant of its first key; [`NONE`] where the curve does not
-    /// meet its keys.
+    /// The place of its first key among the constants; [`NONE`] if the curve does not pass through
+    /// its keys.
     pub(crate) key: u32,
-    /// The same where curves stand still at their ends, whether they meet their keys or not.
+    /// The place of its first key among the constants if the track's first and last interval stand
+    /// still, else [`NONE`]; set even if the curve does not pass through its keys.
     pub(crate) still: u32,
 }
 
@@ -52,7 +53,7 @@ impl Stretch {
         self.lane..self.lane + self.intervals.len()
     }
 
-    /// The constant at the start of its `i`th interval.
+    /// The place of the constant at the start of its `i`th interval.
     pub(crate) fn key_at(&self, i: usize) -> u32 {
         match self.key {
             NONE => NONE,
@@ -60,12 +61,12 @@ impl Stretch {
         }
     }
 
-    /// The lane of the track's first interval, where it is among these.
+    /// The lane of the track's first interval, if the stretch contains it.
     pub(crate) fn first(&self) -> Option<usize> {
         (self.intervals.start == 0).then_some(self.lane)
     }
 
-    /// The lane of the track's last interval, where it is among these.
+    /// The lane of the track's last interval, if the stretch contains it.
     pub(crate) fn last(&self) -> Option<usize> {
         (self.intervals.end == self.all).then_some(self.lane + self.intervals.len() - 1)
     }
@@ -73,10 +74,10 @@ impl Stretch {
 
 /// A block of intervals.
 pub(crate) struct Intervals {
-    /// Keys at both ends, in the signs that they count with.
+    /// The keys at both ends, after sign continuation.
     pub(crate) from: [[f32; 4]; ROOM],
     pub(crate) to: [[f32; 4]; ROOM],
-    /// Where it starts and ends, and how long it is; seconds.
+    /// Start, end and duration of each interval, in seconds.
     pub(crate) starts: Lane,
     pub(crate) ends: Lane,
     pub(crate) durations: Lane,
@@ -89,18 +90,18 @@ pub(crate) struct Intervals {
     /// it and towards this one.
     pub(crate) incoming: [Lane; 3],
     pub(crate) outgoing: [Lane; 3],
-    /// Numbers that the method has for the interval: of the key that it starts with, and
-    /// one lane further of the key that it ends with.
+    /// The method's own numbers for the key at the interval's start, and (one lane further) for the
+    /// key at its end.
     pub(crate) outward: [Lane; 4],
     pub(crate) inward: [Lane; 4],
-    /// What the formula takes.
+    /// The numbers that the curve's formula takes.
     pub(crate) numbers: Vec<Lane>,
-    /// How far the curve goes: the sum of the squares of its half-rotation vectors.
+    /// The squared extent of each curve: the sum of the squares of its half-rotation vectors.
     pub(crate) energies: Lane,
 }
 
 impl Intervals {
-    /// For curves that take so many numbers of their own.
+    /// An empty block, for curves whose formula takes this many numbers of each curve's own.
     pub(crate) fn new(numbers: usize) -> Self {
         let lane = [0.0; ROOM];
         let identity = [0.0, 0.0, 0.0, 1.0];
@@ -122,8 +123,8 @@ impl Intervals {
         }
     }
 
-    /// Adds some intervals of a track, whose keys count with these signs; the block has room for
-    /// them.
+    /// Adds some intervals of a track, whose keys count with these signs; the block must have room
+    /// for them.
     pub(crate) fn push(&mut self, track: Track, signs: Signs<'_>, intervals: Range<usize>) {
         let lanes = self.count..self.count + intervals.len();
         let Range { start, end } = intervals;
@@ -142,7 +143,8 @@ impl Intervals {
         self.count = lanes.end;
     }
 
-    /// Adds some lanes of other intervals, as they were pushed; there is room for them.
+    /// Adds the keys and durations in some lanes of another block; this one must have room for
+    /// them.
     pub(crate) fn push_from(&mut self, other: &Self, lanes: Range<usize>) {
         let own = self.count..self.count + lanes.len();
         self.from[own.clone()].copy_from_slice(&other.from[lanes.clone()]);
@@ -151,7 +153,7 @@ impl Intervals {
         self.count = own.end;
     }
 
-    /// Gives a lane's keys the other sign where `sign` is -1.
+    /// Multiplies both keys of a lane by `sign`, which is 1 or -1.
     pub(crate) fn turn(&mut self, lane: usize, sign: f32) {
         for key in [&mut self.from[lane], &mut self.to[lane]] {
             *key = key.map(|component| component * sign);
@@ -164,7 +166,7 @@ impl Intervals {
         put(&mut self.inward, lane + 1, inward);
     }
 
-    /// Adds a lane for a neighbour that there is not.
+    /// Adds an empty lane of context, where a track ends and has no neighbour.
     pub(crate) fn push_nothing(&mut self) {
         let lane = self.count;
         let identity = [0.0, 0.0, 0.0, 1.0];
@@ -173,7 +175,7 @@ impl Intervals {
         self.count += 1;
     }
 
-    /// Forgets them.
+    /// Forgets all intervals.
     pub(crate) fn clear(&mut self) {
         self.count = 0;
     }
@@ -182,7 +184,7 @@ impl Intervals {
         self.durations[lane]
     }
 
-    /// How fast the parameter runs, per second.
+    /// The change of the parameter per second.
     pub(crate) fn rate(&self, lane: usize) -> f64 {
         quaternion::ratio(1.0, self.durations[lane])
     }
@@ -215,12 +217,12 @@ impl Intervals {
         put(&mut self.outgoing, lane, handle);
     }
 
-    /// Numbers of the key that the interval starts with.
+    /// The method's own numbers for the key that the interval starts with.
     pub(crate) fn outward(&self, lane: usize) -> [f64; 4] {
         at(&self.outward, lane)
     }
 
-    /// Numbers of the key that the interval before `lane` ends with.
+    /// The method's own numbers for the key that the interval before `lane` ends with.
     pub(crate) fn inward(&self, lane: usize) -> [f64; 4] {
         at(&self.inward, lane)
     }
@@ -231,19 +233,19 @@ impl Intervals {
         quaternion::unit(self.from[lane])
     }
 
-    /// The key that the interval ends with, by the step to it.
+    /// The key that the interval ends with: the first key times the step.
     pub(crate) fn end_key(&self, lane: usize) -> Quaternion {
         quaternion::product(self.key(lane), self.step(lane))
     }
 
-    /// Gives the interval numbers of its curve, from a place on.
+    /// Sets numbers of the interval's curve, from `place` on.
     pub(crate) fn set_numbers(&mut self, lane: usize, place: usize, numbers: &[f64]) {
         for (lanes, &number) in self.numbers[place..].iter_mut().zip(numbers) {
             lanes[lane] = number;
         }
     }
 
-    /// How far the curve goes.
+    /// Sets the squared extent of the interval's curve.
     pub(crate) fn set_energy(&mut self, lane: usize, vectors: [Vector; 3]) {
         self.energies[lane] = energy(vectors);
     }
@@ -265,14 +267,14 @@ impl Intervals {
         [self.from[lane], self.to[lane]]
     }
 
-    /// Lanes to work out: whole vectors of eight. Wider ones go on behind them, where there
-    /// is [`ROOM`].
+    /// The number of lanes to compute, rounded up to vectors of eight. A wider vector writes beyond
+    /// them, for which there is [`ROOM`].
     #[inline(always)]
     pub(crate) fn whole(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
     }
 
-    /// As [`Intervals::whole`], in f32.
+    /// As [`Intervals::whole`], for vectors of up to 16 f32.
     #[inline(always)]
     pub(crate) fn whole32(&self) -> usize {
         self.count.next_multiple_of(16).min(LANES)
@@ -291,13 +293,13 @@ pub(crate) fn put<const N: usize>(lanes: &mut [Lane; N], lane: usize, value: [f6
     }
 }
 
-/// The sum of the vectors' squares.
+/// The squared extent: the sum of the vectors' squares.
 #[inline(always)]
 pub(crate) fn energy<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
     square(a) + square(b) + square(c)
 }
 
-/// Numbers of the lanes from `lane` on.
+/// The numbers of a vector's lanes from `lane` on.
 #[inline(always)]
 pub(crate) fn load<L: Lanes>(numbers: &[f64], lane: usize) -> L::Doubles {
     L::Doubles::load(&numbers[lane..])

@@ -1,4 +1,4 @@
-//! Curves in f64: their handles, their formulas and the polynomials that are fitted to them.
+//! Curves in f64: their handles, their formulas and the polynomials fitted to them.
 
 pub(crate) mod curve;
 pub(crate) mod cut;

@@ -1,4 +1,5 @@
-//! Formulas as values: what the preparation does with a curve, whatever its formula.
+//! Formulas as values: a [`Shape`] holds the functions that evaluate and fit the curves of one
+//! formula, so that the preparation need not know which it is.
 
 use std::marker::PhantomData;
 
@@ -21,14 +22,14 @@ use crate::simd::lanes::{Doubles as _, Lanes};
 
 /// A formula, and how its curves are sampled.
 pub(crate) struct Shape {
-    /// How many of the numbers are each curve's own.
+    /// The count of numbers that differ from curve to curve.
     pub(crate) own: usize,
-    /// The others, the same for all.
+    /// The numbers after them, which all curves share.
     pub(crate) shared: Numbers,
-    /// Whether it is made of exponentials alone, whose Chebyshev coefficients fall ever
-    /// faster: a gentle curve's fit then needs no check.
+    /// Whether the formula is entire, a product of exponentials: its Chebyshev coefficients then
+    /// decrease faster and faster, and the fit of a curve of small angle needs no check.
     pub(crate) entire: bool,
-    /// Whether it gives rotations.
+    /// Whether its values are unit quaternions.
     pub(crate) is_unit: bool,
     pub(crate) rotation: fn(&Numbers, f64) -> Quaternion,
     pub(crate) moving: fn(&Numbers, Jet) -> [Jet; 4],
@@ -49,7 +50,7 @@ impl Shape {
         }
     }
 
-    /// A curve's numbers: its own, and what it shares with all.
+    /// All numbers of a curve: its own, and the shared ones after them.
     pub(crate) fn with(&self, own: impl Fn(usize) -> f64) -> Numbers {
         let mut numbers = self.shared;
         for (i, number) in numbers[..self.own].iter_mut().enumerate() {
@@ -68,7 +69,7 @@ impl Shape {
         fit: fit::<Expansion<false>>,
         ..Self::of::<Product>(NUMBERS)
     };
-    /// [`Product`] with a basis of each curve's own.
+    /// [`Product`] with basis functions of each curve's own.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
         fit: fit::<Expansion<true>>,
@@ -93,7 +94,7 @@ impl Shape {
 
 /// A way to sample the curves of a block.
 pub(crate) trait Sampling: 'static {
-    /// Samples and interpolates them, to segments.
+    /// Samples the curves and writes the interpolating polynomials to their segments.
     fn fit<L: Lanes, const PAIRS: usize>(
         block: &mut FitBlock,
         nodes: &Nodes<PAIRS>,
@@ -123,7 +124,7 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     }
 }
 
-/// By the formula itself, in f64.
+/// Samples curves by the formula itself, in f64.
 struct Directly<F>(PhantomData<F>);
 
 impl<F: Formula> Sampling for Directly<F> {
@@ -175,13 +176,14 @@ fn rotation<F: Formula, R: Real>(numbers: &[R; NUMBERS], t: R) -> [R; 4] {
     [x.0, y.0, z.0, w.0]
 }
 
-/// NaN where any of a rotation's components is none, or not finite; else 0.
+/// NaN if any of a rotation's components is NaN or infinite, else 0.
 #[inline(always)]
 fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
     (x + y + z + w) * R::all(0.0)
 }
 
-/// Samples the curve in a lane, whose angles are too long for [`Near`], to the `j`th of some.
+/// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
+/// into the `j`th place of the sample arrays.
 #[inline(never)]
 fn sample_anywhere<F: Formula, const PAIRS: usize>(
     block: &FitBlock,

@@ -1,4 +1,4 @@
-//! Exponentials and logarithms of f32, and rows of such numbers.
+//! Exponentials and logarithms in f32 vector lanes, and rows of f32 numbers.
 
 use crate::fit::double::intervals::ROOM;
 use crate::math::quaternion::{Real as _, scaled, square, sum};
@@ -7,11 +7,11 @@ use crate::simd::lanes::{Lanes, Number};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::FromIdentity;
 
-/// Numbers of the lanes, in f32.
+/// One f32 for each lane of a block.
 pub(crate) type Row = [f32; ROOM];
 
-/// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to 1/2 and up
-/// to 1; from Chebyshev nodes, within 3.5e-8.
+/// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x): [`LOG`] for u up to
+/// 1/2, [`LONG_LOG`] up to 1. From Chebyshev nodes, within 3.5e-8.
 pub(crate) const LOG: [f32; 6] = [
     0.333_333_28,
     0.133_339_27,
@@ -53,8 +53,8 @@ pub(crate) fn long_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
     }
 }
 
-/// The exponential of so many times a vector, in f64; of squares up to
-/// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE) within 7e-9.
+/// The exponential of `times` a vector, in f64: within 7e-9 for squared lengths up to
+/// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE).
 #[inline(always)]
 pub(crate) fn exact_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
     let times = L::Doubles::all(f64::from(times));
@@ -73,7 +73,7 @@ pub(crate) fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
     [x.widened(), y.widened(), z.widened(), w.widened()]
 }
 
-/// The logarithm, by coefficients that hold so far.
+/// The logarithm, by [`LOG`] or [`LONG_LOG`], each within its range.
 #[inline(always)]
 pub(crate) fn log<N: Number, const COUNT: usize>(
     turn: FromIdentity<N>,
@@ -115,7 +115,7 @@ pub(crate) mod tests {
         angle / libm::sin(angle)
     }
 
-    /// That `1 + x (c₀ + c₁ x + …)` is `exact` up to an end.
+    /// Asserts that `1 + x (c₀ + c₁ x + …)` is within `bound` of `exact` for x up to `end`.
     pub(crate) fn assert_near(coefficients: &[f64], end: f64, exact: fn(f64) -> f64, bound: f64) {
         for i in 1..=10_000 {
             let x = f64::from(i) * end / 10_000.0;

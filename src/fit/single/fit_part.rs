@@ -1,44 +1,47 @@
-//! Parts of curves that are fitted by one polynomial each, and what their basis functions do
-//! there.
+//! The parts of a curve that one polynomial fits, and constants of the basis functions there:
+//! values and derivatives at the middle, and their gains from the middle to each node.
 
 use crate::fit::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
 
-/// Sums of the three half-rotation vectors' squares up to which curves are fitted within 7e-8
-/// of a component by [`FEW_POWERS`], and by [`WHOLE`]. Two halves leave out less of any longer
-/// one that comes straight from keys.
+/// The squared extents (sums of the three half-rotation vectors' squares) up to which
+/// [`FEW_POWERS`] and [`WHOLE`] fit curves with a truncation error of at most 7e-8 in a component.
+/// A fit in two halves has a smaller one for every longer curve that comes straight from keys.
 pub(crate) const LONGEST_OF_FEW: f64 = 0.01;
 pub(crate) const LONGEST_WHOLE: f64 = 0.16;
 
-/// A part of curves' parameter, from their start on or back from their end, and the nodes at
-/// which they are sampled there. What they do at its ends is known, and at its middle.
+/// A part of the parameter's range, counted from the start of the curve or back from its end, and
+/// the nodes at which curves are sampled there. Values and derivatives at the part's ends and at
+/// its middle need no sampling.
 pub(crate) struct Part<const SAMPLED: usize, const PAIRS: usize> {
     pub(crate) nodes: &'static Nodes<PAIRS>,
     pub(crate) middle: Place,
-    /// Half of the basis functions' second derivatives there.
+    /// Half of the basis functions' second derivatives at the middle.
     pub(crate) bends: [f32; 3],
-    /// What they gain from there on, up to `-s` and to `s` at each node `s` that is sampled.
+    /// The differences of the basis functions at `-s` and at `s` from the middle, for each node
+    /// `s` that is sampled.
     pub(crate) gains: [[[Gain; 2]; 3]; SAMPLED],
-    /// From vectors at keys to derivatives there.
+    /// The factor from a half-rotation vector at a key to the derivative there, by the part's
+    /// parameter.
     pub(crate) slope: f32,
 }
 
-/// Degree 8.
+/// The whole curve by degree 8; the others use degree 10.
 pub(crate) const FEW_POWERS: Part<1, 4> = Part::new(&FEW_END_NODES, 0.5, 1.0);
 pub(crate) const WHOLE: Part<2, 5> = Part::new(&END_NODES, 0.5, 1.0);
 pub(crate) const HALF: Part<2, 5> = Part::new(&HALF_END_NODES, 0.25, 0.5);
-/// From the end on: there the last of the vectors is the first that turns.
+/// The second half, sampled backwards from the end of the curve.
 pub(crate) const LAST_HALF: Part<2, 5> = HALF.backward();
-/// Where both meet.
+/// The place where both halves meet.
 pub(crate) const SEAM: Place = Place::new(0.5, 0.5);
 
-/// The basis functions at some place, and their derivatives by a part's parameter.
+/// The basis functions at one value of the parameter, and their derivatives by a part's parameter.
 pub(crate) struct Place {
     pub(crate) weights: [f32; 3],
     pub(crate) rates: [f32; 3],
 }
 
 impl Place {
-    /// For a part of that width.
+    /// The place `m` of the whole parameter, for a part that is `width` of the whole.
     const fn new(m: f64, width: f64) -> Self {
         let n = 1.0 - m;
         Self {
@@ -72,7 +75,7 @@ impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
         };
         let mut k = 0;
         while k < SAMPLED {
-            // The first is the middle.
+            // The first node is the middle, which is not sampled.
             let s = nodes.at[k + 1] as f64 * width;
             let (before, after) = (gains(m, -s), gains(m, s));
             let mut j = 0;
@@ -87,7 +90,8 @@ impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
 }
 
 impl Part<2, 5> {
-    /// The basis functions, each 1 less itself, of the parameter that goes the other way.
+    /// The part for a parameter that runs backwards. The three basis functions change places, as
+    /// `1 - Bᵢ(1 - t) = B₄₋ᵢ(t)`.
     const fn backward(mut self) -> Self {
         self.middle.weights = backward(self.middle.weights);
         self.middle.rates = backward(self.middle.rates);
@@ -102,7 +106,7 @@ const fn backward<N: Copy>([first, second, third]: [N; 3]) -> [N; 3] {
     [third, second, first]
 }
 
-/// What the basis functions have at `m + d` more than at `m`.
+/// The differences `Bᵢ(m + d) - Bᵢ(m)` of the three basis functions.
 const fn gains(m: f64, d: f64) -> [Gain; 3] {
     let n = 1.0 - m;
     [
@@ -112,7 +116,7 @@ const fn gains(m: f64, d: f64) -> [Gain; 3] {
     ]
 }
 
-/// What a basis function gains.
+/// The difference of a basis function from its value at the middle, and the square of it.
 #[derive(Clone, Copy)]
 pub(crate) struct Gain {
     pub(crate) gain: f32,

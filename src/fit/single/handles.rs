@@ -1,10 +1,10 @@
-//! Curves that are fitted whole or in parts, in vector lanes of f32 straight from their four
-//! keys.
+//! Handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then fits
+//! them whole or in two halves.
 //!
-//! Steps come from the differences of neighbouring keys, which f32 knows as exactly as the
-//! keys, and rotations are what they are more than none: so that what f32 rounds is small
-//! where the curve turns little. One number is found in f64: the vector between the handles,
-//! in which all of the others' roundings would come together.
+//! Steps come from the differences of neighbouring keys, which are as exact in f32 as the keys,
+//! and rotations are stored as their difference from the identity: rounding errors are then small
+//! where the curve turns little. Only the vector between the handles is computed in f64, because
+//! the rounding errors of all others would add up in it.
 
 use crate::fit::double::intervals::{Intervals, ROOM, energy};
 use crate::fit::single::exp_log::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
@@ -31,17 +31,18 @@ const MEDIUM_LOG: [f64; 8] = [
     0.003_890_906_082_331,
 ];
 
-/// More than 1 - cos(x) of any vector of such a curve.
+/// An upper bound of 1 - cos(x), where x is the length of any half-rotation vector of a curve with
+/// a squared extent of at most [`LONGEST_DIRECT`].
 const LONGEST_FALL: f32 = 0.5645;
 
-/// The squares of half-rotation vectors that a tangent is made of, and of their sum: no
-/// other branch of its logarithm is nearer.
+/// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
+/// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
 const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 
 /// The first key of each curve, its three half-rotation vectors, and its last key.
 pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
-/// Such curves of a block's intervals.
+/// The handles and curves of a block's intervals, in f32.
 pub(crate) struct WholeLanes {
     /// The lanes whose curves are asked for.
     pub(crate) wanted: [bool; ROOM],
@@ -49,11 +50,11 @@ pub(crate) struct WholeLanes {
     /// and towards this one.
     pub(crate) incoming: [Row; 3],
     pub(crate) outgoing: [Row; 3],
-    /// How far what they are made of goes; up to 1 where that holds.
+    /// The largest ratio of a quantity in the tangent to its limit. Up to 1 the f32 handles hold.
     pub(crate) far: Row,
     pub(crate) numbers: CurveNumbers,
-    /// The sum of the vectors' squares; far more where they do not hold, and of the lane
-    /// behind which none is.
+    /// The squared extent of each curve. It is above [`LONGEST_DIRECT`] where the f32 numbers do
+    /// not hold, and -1 where the small-angle cubic is taken instead.
     pub(crate) energies: Row,
 }
 
@@ -76,7 +77,7 @@ pub(crate) struct FindHandles<'a> {
     pub(crate) steps: &'a KeySteps,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
-    /// Finds those that f32 does not.
+    /// Finds the handles for which the range of f32's formulas is too short, in f64.
     pub(crate) find_far: fn(&mut FarKeys),
 }
 
@@ -101,7 +102,7 @@ impl InLanes for FindHandles<'_> {
             let to_start = L::all(THIRD) - to_end;
             store(&mut own.incoming, key, scaled(tangent, to_start));
             store(&mut own.outgoing, key, scaled(tangent, to_end));
-            // What is not known becomes 4/3: too far.
+            // `KEY_UNKNOWN` becomes 4/3, which is beyond the limit of 1.
             let kind = L::load(&weights.kinds[key..]) * L::all(2.0 / 3.0);
             let parts = square(left).larger(square(right).larger(square(sum(left, right))));
             let far = parts * L::all(1.0 / LONGEST_TANGENT_PART);
@@ -121,10 +122,10 @@ impl InLanes for FindHandles<'_> {
     }
 }
 
-/// The numbers of curves whose vectors' squares come to more than this do not hold.
+/// The largest squared extent of a curve whose f32 numbers hold.
 pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
 
-/// Added to the squares of a curve whose numbers are in doubt.
+/// Added to the squared extent of a curve whose numbers may not hold.
 const IN_DOUBT: f64 = 2.0;
 const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
 
@@ -152,7 +153,7 @@ impl InLanes for FindCurves<'_> {
             let log = load3::<L>(&steps.logs, own);
             let outgoing = load3::<L>(&whole.outgoing, own);
             let incoming = load3::<L>(&whole.incoming, next);
-            // The handles of ends are 0 so far.
+            // At a track's ends the handle is 0 so far; there it becomes the parabola's.
             let parabola = scaled(log, L::all(TWO_THIRDS));
             let at_first = at_end(L::load(&kinds[own..]));
             let at_last = at_end(L::load(&kinds[next..]));
@@ -169,7 +170,7 @@ impl InLanes for FindCurves<'_> {
             let far = far
                 .larger(chords)
                 .larger(fall * L::all(-1.0 / LONGEST_FALL));
-            // Nothing where all holds, else `IN_DOUBT`. A sign of NaN is 1.
+            // 0 where everything holds, else `IN_DOUBT`; `sign` is 1 for NaN.
             let half = L::all(0.5 * IN_DOUBT as f32);
             let doubt = (far - L::all(1.0)).sign() * half + half;
             let energy = energy([w1, w2, w3]) + doubt;
@@ -189,13 +190,13 @@ impl InLanes for FindCurves<'_> {
     }
 }
 
-/// `log(exp(-w₁) q₀⁻¹ q₁ exp(-w₃))`, and its cosine less 1.
+/// `w₂ = log(exp(-w₁) q₀⁻¹ q₁ exp(-w₃))`, and the cosine of its angle minus one.
 #[inline(always)]
 fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 3], L) {
     let all = L::Doubles::all;
     let (start, end) = (widened(start), widened(end));
     let [x, y, z, w] = quaternion::step(start, end);
-    // Keys are unit to f32: one step of Newton's.
+    // Keys have norm 1 to f32's precision: one step of Newton's method normalises both.
     let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
     let step = [x * scale, y * scale, z * scale, w * scale];
     let [x, y, z, w] = product(product(exact_exp(w1, -1.0), step), exact_exp(w3, -1.0));
@@ -214,7 +215,7 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 
     (vector, L::rounded(-u))
 }
 
-/// 1 at the end of a track, 0 at an inner key and at what is not known.
+/// 1 for `KEY_AT_END`, 0 for `KEY_INNER` and `KEY_UNKNOWN`.
 #[inline(always)]
 fn at_end<L: Lanes>(kind: L) -> L {
     kind * (L::all(2.0) - kind)

@@ -1,6 +1,6 @@
-//! Fits of curves between two keys, in vector lanes of f32: they pass through the keys with
-//! the handles' slopes, and what they do at their middle is known, so that few nodes between
-//! are sampled.
+//! The Hermite fit: polynomials for curves between two keys, in vector lanes of f32. The values and
+//! slopes at the keys and the value and two derivatives at the middle are given in closed form, so
+//! that only one or two pairs of nodes are sampled.
 
 use crate::fit::both_sides::Sides;
 use crate::fit::double::expansion::{AboutMiddle, SineCosm1, about};
@@ -21,10 +21,10 @@ pub(crate) struct BetweenKeys<L> {
     pub(crate) end: [L; 4],
 }
 
-/// How such curves are fitted, by so many pairs of nodes.
+/// A way to fit such curves by `PAIRS` pairs of nodes.
 pub(crate) trait KeyFit<const PAIRS: usize> {
-    /// Fits them: to segments at these places, and behind each where they are cut. Whatever
-    /// the samples were.
+    /// Fits the curves into the segments at these places; a fit in two halves also fills the
+    /// segment after each place. `samples` is overwritten, whatever it holds.
     fn fit<L: Lanes>(
         &self,
         samples: &mut Samples<L, PAIRS>,
@@ -34,7 +34,7 @@ pub(crate) trait KeyFit<const PAIRS: usize> {
     );
 }
 
-/// The whole.
+/// Fits the whole curve by one polynomial.
 impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes>(
@@ -60,7 +60,7 @@ impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, P
     }
 }
 
-/// In two.
+/// Fits a curve by two polynomials, which meet at its middle.
 pub(crate) struct Halves;
 
 impl KeyFit<5> for Halves {
@@ -95,7 +95,7 @@ impl KeyFit<5> for Halves {
     }
 }
 
-/// Where a part ends: the rotation, and its derivative by the part's parameter.
+/// The end of a part: the rotation there, and its derivative by the part's parameter.
 #[derive(Clone, Copy)]
 struct End<L> {
     rotation: [L; 4],
@@ -103,7 +103,7 @@ struct End<L> {
 }
 
 impl<L: Lanes> End<L> {
-    /// Turning by so many times a half-rotation vector.
+    /// A rotation that turns at `times` a half-rotation vector per unit of the parameter.
     #[inline(always)]
     fn new(rotation: [L; 4], vector: [L; 3], times: f32) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl<L: Lanes> End<L> {
         }
     }
 
-    /// The same of a parameter that goes the other way.
+    /// The same end for a parameter that runs backwards.
     #[inline(always)]
     fn negated(self) -> Self {
         let [x, y, z, w] = self.slope;
@@ -123,8 +123,8 @@ impl<L: Lanes> End<L> {
     }
 }
 
-/// Curves at some place of their parameter: the rotation, and the half-rotation vectors brought
-/// behind what follows them there.
+/// Curves at one value of their parameter: the rotation, and the half-rotation vectors, each
+/// rotated back by the factors that follow it. The derivative is then `m Σ vᵢ bᵢ'`.
 struct Moment<L> {
     rotation: [L; 4],
     vectors: [[L; 3]; 3],
@@ -137,7 +137,7 @@ impl<L: Lanes> Moment<L> {
         let third_turn = exp(w3, b3);
         let second_turn = composed(exp(w2, b2), third_turn);
         let rotation = if EXACT {
-            // Where the turns are longer, f32 would round more than that.
+            // Curves that are halved turn farther; f32 would round too much in this product.
             let turn = product(exact_exp(w1, b1), exact_exp(w2, b2));
             let turn = product(turn, exact_exp(w3, b3));
             rounded::<L>(product(normalised(widened(start)), turn))
@@ -155,7 +155,7 @@ impl<L: Lanes> Moment<L> {
         }
     }
 
-    /// What each vector turns by there, per unit of a part's parameter.
+    /// The contribution of each vector to the rotation's rate, per unit of a part's parameter.
     #[inline(always)]
     fn rates(&self, place: &Place) -> [[L; 3]; 3] {
         let ([v1, v2, v3], [r1, r2, r3]) = (self.vectors, place.rates);
@@ -167,15 +167,15 @@ impl<L: Lanes> Moment<L> {
     }
 }
 
-/// The exponential of so many times a vector.
+/// The exponential of `times` a vector.
 #[inline(always)]
 fn exp<L: Lanes>(vector: [L; 3], times: f32) -> FromIdentity<L> {
     short_exp(scaled(vector, L::all(times)))
 }
 
-/// The vectors of the same curves from their ends: with `Bᵢ' = 1 - Bᵢ` they are
-/// `q₁ exp(w₁' B₁') exp(w₂' B₂') exp(w₃' B₃')`, where `wᵢ'` is `-wᵢ` brought behind what
-/// follows it in q₁.
+/// The vectors of the same curves from their ends. With `Bᵢ' = 1 - Bᵢ` the curves are
+/// `q₁ exp(w₁' B₁') exp(w₂' B₂') exp(w₃' B₃')`, where `wᵢ'` is `-wᵢ` rotated back by the factors
+/// that follow it in q₁.
 #[inline(always)]
 fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     let third_turn = long_exp(w3);
@@ -207,7 +207,7 @@ fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bo
     let squares = [square(v1), square(v2), square(v3)];
     for (k, gains) in (1..).zip(&part.gains) {
         let second = if IS_WHOLE {
-            // It gains as much after the middle as before.
+            // About the middle of the whole curve the second basis function is odd.
             let [_, after] = gains[1];
             let (sine, fall) = turned(L::all(after.gain), L::all(after.squared), squares[1]);
             let sine = Sides {
@@ -250,7 +250,7 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, part.bends);
     let ends = sum(scaled(v1, L::all(b1)), scaled(v3, L::all(b3)));
     let bend = sum(ends, scaled(v2, L::all(b2)));
-    // A vector has no part across itself.
+    // u₁ × rate is u₁ × u₂ + u₁ × u₃, as u₁ × u₁ is 0.
     let turning = sum(cross3(u1, rate), cross3(u2, u3));
     let [x, y, z, w] = about(m, sum(bend, turning));
     let half = square(rate) * L::all(0.5);
@@ -281,7 +281,8 @@ fn on_both_sides<L: Lanes>([before, after]: [Gain; 2], square: L) -> SineCosm1<S
 const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
 const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
-/// Of a vector with that square, times a gain with the square `squared`.
+/// The sine over the length and the cosine minus one for `gain` times a vector; `squared` is the
+/// square of `gain`, `square` that of the vector.
 #[inline(always)]
 fn turned<N: Number>(gain: N, squared: N, square: N) -> SineCosm1<N> {
     let z = square * squared;
@@ -333,14 +334,14 @@ mod tests {
         })
     }
 
-    /// A curve whose vectors' squares come to so much.
+    /// A random curve with the squared extent `square`.
     fn curve(random: &mut Rng, square: f64, goes_back: bool) -> (Quat, [Vec3; 3]) {
         let mut number = || random.f64() - 0.5;
         let start = DQuat::from_xyzw(number(), number(), number(), number());
         let mut three = || DVec3::new(number(), number(), number());
         let mut vectors = [three(), three(), three()];
         if goes_back {
-            // The highest powers.
+            // A curve that turns back has the largest coefficients of the highest powers.
             vectors[1] = vectors[0] * -1.5;
             vectors[2] = vectors[0] * 0.9;
         }
@@ -367,7 +368,7 @@ mod tests {
         segments
     }
 
-    /// The largest error of a component, of curves in so many parts.
+    /// The largest error of a component over random curves, each fitted in `parts` parts.
     fn largest_error<const PAIRS: usize>(
         how: &impl KeyFit<PAIRS>,
         parts: usize,
@@ -393,7 +394,7 @@ mod tests {
         largest
     }
 
-    /// Catches a wrong derivative, last halves that go another way, and limits that are too
+    /// Catches a wrong derivative, a second half that leaves the curve, and limits that are too
     /// high.
     #[test]
     fn the_longest_curves_are_fitted_closely() {

@@ -1,5 +1,5 @@
-//! Steps between the keys of a block's intervals, in vector lanes of f32: from the
-//! differences of neighbouring keys, which f32 knows as exactly as the keys.
+//! Steps between the keys of a block's intervals, in vector lanes of f32. They come from the
+//! differences of neighbouring keys, which are as exact in f32 as the keys.
 
 use crate::fit::double::intervals::{Intervals, ROOM};
 use crate::fit::single::exp_log::{LOG, Row, log, store};
@@ -7,7 +7,7 @@ use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::{FromIdentity, chord_of, step_vector};
 
-/// The squares of chords between keys that [`LOG`] takes.
+/// The largest squared chord between keys for which [`LOG`] holds.
 pub(crate) const LONGEST_CHORD: f32 = 1.0;
 
 /// Steps between the keys of a block's intervals.

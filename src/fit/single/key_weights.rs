@@ -1,4 +1,4 @@
-//! What the tangents at the keys of a block are made of, side by side.
+//! The tangent weights of the keys of a block, as a structure of arrays.
 
 use crate::curve::options::Ends;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
@@ -10,7 +10,7 @@ use crate::simd::lanes::Lanes;
 /// A [`TangentWeights`] for the key that each interval of a block starts with.
 pub(crate) struct KeyWeights {
     rule: WeightRule,
-    /// At a track's ends.
+    /// The weights at a track's ends.
     end: TangentWeights,
     is_loop: bool,
     pub(crate) before: [f32; ROOM],
@@ -49,14 +49,14 @@ impl KeyWeights {
         self.kinds[lane] = joint.kind;
     }
 
-    /// Those of all keys.
+    /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         in_lanes(&mut Between {
             weights: self,
             durations: &intervals.durations,
         });
         for stretch in stretches {
-            // Two keys alone have nothing beside them, not in a loop either.
+            // A track of two keys has no neighbouring intervals, not even in a loop.
             let end = match stretch.all {
                 1 => UNKNOWN,
                 _ if self.is_loop => continue,
@@ -78,7 +78,7 @@ struct Between<'a> {
 }
 
 impl InLanes for Between<'_> {
-    // A loop that the compiler makes vectors of.
+    // The compiler vectorises this loop.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {

@@ -1,5 +1,5 @@
-//! Handles of keys beside which steps are too long for f32: in f64, in vectors of a few
-//! keys.
+//! Long tangents: handles of keys whose tangents exceed the range of f32's formulas. They are
+//! computed in f64 over the full range, in vectors of a few keys.
 
 use std::marker::PhantomData;
 
@@ -11,13 +11,13 @@ use crate::math::ranges::Anywhere;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
-/// Worked out together: a block has few of them.
+/// The number of keys computed together; a block has few of them.
 pub(crate) const AT_ONCE: usize = 8;
 
-/// A number of each.
+/// One number for each key.
 type Row = [f64; AT_ONCE];
 
-/// Such keys.
+/// Keys with long tangents, and their handles.
 pub(crate) struct FarKeys {
     /// The intervals on both sides.
     before: Side,
@@ -26,7 +26,7 @@ pub(crate) struct FarKeys {
     outgoing: [Row; 3],
 }
 
-/// What is known of intervals.
+/// The intervals on one side of the keys.
 struct Side {
     from: [Row; 4],
     to: [Row; 4],
@@ -113,7 +113,7 @@ struct Find<'a, R> {
 }
 
 impl<R: HandleRule> InLanes for Find<'_, R> {
-    // A loop that the compiler makes vectors of.
+    // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let FarKeys {

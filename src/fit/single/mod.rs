@@ -1,4 +1,4 @@
-//! Curves in f32, for intervals that turn moderately and know their four keys.
+//! Curves in f32 straight from four keys, for intervals that turn through moderate angles.
 
 pub(crate) mod exp_log;
 pub(crate) mod fit_part;

@@ -1,5 +1,5 @@
-//! Curves that turn little, in vector lanes of f32: what the kernels evaluate comes
-//! straight from the keys, with nothing sampled and nothing fitted.
+//! Curves that turn through small angles, in vector lanes of f32: the coefficients that the kernels
+//! evaluate follow straight from the keys, and nothing is sampled or fitted.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
@@ -13,20 +13,23 @@ use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::SmallAngleCubic;
 use crate::twin::small_angle::small_angle_cubic;
 
-/// Lanes of the widest vectors.
+/// The lanes of the widest vectors.
 const VECTOR: usize = 16;
 
-/// So few curves are worked out one by one: most lanes would be for nothing.
+/// Up to this many curves are computed one by one: in vectors most lanes would be wasted.
 const FEW: usize = 6;
 
-/// The curves of a block's intervals.
+/// The small-angle curves of a block's intervals.
 pub(crate) struct GentleLanes {
-    /// Whether the keys of the interval, and of both beside it, are near each other.
+    /// Whether the squared chords of the interval and of both its neighbours are at most
+    /// [`LONGEST_STEP`].
     near: [bool; ROOM],
-    /// Whole vectors of lanes, behind which no lane holds such a curve.
+    /// The number of lanes to compute, rounded up to whole vectors; no lane beyond has such a
+    /// curve.
     wanted: usize,
     powers: [[[f32; 4]; ROOM]; 7],
-    /// Whether a lane has its curve.
+    /// Whether a lane's curve turns through small angles only, so that `powers` are its
+    /// coefficients.
     pub(crate) holds: [bool; ROOM],
 }
 
@@ -40,7 +43,7 @@ impl GentleLanes {
         }
     }
 
-    /// Finds out which keys are near each other.
+    /// Finds the intervals whose steps are short enough.
     pub(crate) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) {
         for j in 1..LANES {
             let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
@@ -54,11 +57,11 @@ impl GentleLanes {
             let place = self.near[lanes.clone()].iter().rposition(|&near| near);
             last = place.map(|place| lanes.start + place).or(last);
         }
-        // A lane's curve is worked out one lane before it.
+        // Step j of the loop computes the curve of lane j + 1, so `last` steps reach lane `last`.
         self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
     }
 
-    /// Prepares them.
+    /// Computes the curves of the intervals that [`GentleLanes::look`] found.
     pub(crate) fn prepare(
         &mut self,
         intervals: &Intervals,
@@ -86,12 +89,12 @@ impl GentleLanes {
         }
     }
 
-    /// Whether any lane may have its curve.
+    /// Whether any lane may have such a curve.
     pub(crate) fn may_hold(&self) -> bool {
         self.wanted > 0
     }
 
-    /// Writes it.
+    /// Writes a lane's coefficients to a segment.
     #[inline]
     pub(crate) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
         for (own, power) in segment.coefficients.iter_mut().zip(&self.powers) {
@@ -113,7 +116,7 @@ impl Curves<'_> {
         let Intervals { from, to, .. } = self.intervals;
         let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
         let (start, end) = (from[j + 1], to[j + 1]);
-        // Where there is no neighbour, the key again.
+        // A key without a neighbour takes its own place.
         let before = either(first.kind == KEY_INNER, from[j], start);
         let after = either(last.kind == KEY_INNER, to[j + 2], end);
         small_angle_cubic([before, start, end, after], first, last)
@@ -125,7 +128,7 @@ impl InLanes for Curves<'_> {
     fn run<L: Lanes>(&mut self) {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
-        // The lane before each is context, at least.
+        // Lane 0 is always context, so the first curve is in lane 1.
         for j in 0..self.lanes.wanted.min(LANES) {
             let curve = self.curve(j);
             for power in 0..7 {

@@ -87,7 +87,7 @@ fn a_set_knows_which_keys_the_one_before_turns() {
         let times = [0.0, 1.0];
         let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
         let mut pushed = TrackSet::new();
-        // Nothing is kept of a track that is refused.
+        // A track that is refused leaves no signs behind.
         let refused = [
             Quat::IDENTITY,
             -Quat::IDENTITY,
@@ -104,7 +104,7 @@ fn a_set_knows_which_keys_the_one_before_turns() {
         }
         assert_eq!(pushed.select(1..2).signs(0).is_turned(1), is_turned);
     }
-    // From one track to the next nothing turns.
+    // Signs are not continued from one track to the next.
     let apart = [Quat::IDENTITY, near, -near, -far];
     let set = TrackSet::with_shared_times(&[0.0, 1.0], &apart).unwrap();
     assert!(set.arcs_are_short());

@@ -36,7 +36,7 @@ pub(crate) struct Section {
 #[derive(Serialize)]
 pub(crate) struct Row {
     name: String,
-    milliseconds: f64,
+    pub(crate) milliseconds: f64,
     million_rotations_per_second: f64,
     nanoseconds_per_rotation: f64,
     /// 1 is as fast as memory can be written.

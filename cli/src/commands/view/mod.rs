@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tumble::{Axes, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Quantity, TrackSet};
-use tumble_formats::dat::Loaded;
+use tumble_formats::Loaded;
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
