@@ -77,5 +77,5 @@ own=profile.dev.package.tumble
 CARGO_INCREMENTAL=0 cargo test -p tumble-cli --test cost --config "$own.opt-level=3" \
     --config "$own.codegen-units=16" --config "$own.overflow-checks=false" \
     --config "$own.debug-assertions=false"
-# Twenty seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
-FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test --workspace
+# Eight seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
+FUZZ_SECONDS=${FUZZ_SECONDS:-8} cargo test --workspace

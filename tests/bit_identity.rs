@@ -99,7 +99,7 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
 /// that is ignored until memory runs out.
 #[test]
 fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
-    let set = hostile_set(5, 100);
+    let set = hostile_set(5, 40);
     let frames = Frames::fps(25).between(-1.0, 20.0);
     let budgets = [None, Some(1), Some(10_000), Some(200_000), Some(5_000_000)];
     let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());

@@ -7,6 +7,7 @@ pub(crate) mod destination;
 pub(crate) mod engine;
 pub(crate) mod evaluate;
 pub(crate) mod fallback;
+mod fill;
 pub(crate) mod from_keys;
 pub(crate) mod row;
 pub(crate) mod scratch;

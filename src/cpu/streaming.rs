@@ -4,13 +4,9 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use crate::cpu::destination::Places;
 use crate::cpu::evaluate::{Affine, FEW, frames, frames_past_caches};
-use crate::simd::dispatch::{
-    InLanes, InLanesInto, VectorWidth, fence, in_lanes_into, in_lanes_of, streaming_stores_from,
-};
+use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
 use crate::twin::evaluate::Evaluate;
@@ -327,39 +323,12 @@ impl Samples for Staged<'_, '_> {
     }
 }
 
-/// Stores one rotation everywhere.
-struct Fill([[f32; 4]; EACH]);
-
-impl InLanesInto<[Line]> for Fill {
-    type Outcome = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(&self, lines: &mut [Line]) {
-        let value = L::of_block(&bytemuck::cast_slice(&self.0)[0]);
-        for block in bytemuck::cast_slice_mut::<Line, L::Block>(lines) {
-            value.store_past_caches(block);
-        }
-        fence();
-    }
-}
-
-impl VectorWidth {
-    /// Fills `output` with one rotation by streaming stores, on some processors the fastest way to
-    /// write more than the caches hold: a limit with which the speed of evaluation is compared.
-    pub fn fill_past_caches(self, output: &mut [Quat], value: Quat) {
-        let rotations: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
-        let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);
-        before.fill(value.to_array());
-        in_lanes_into(self, &Fill([value.to_array(); EACH]), lines);
-        after.fill(value.to_array());
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use std::cell::Cell;
     use std::convert::Infallible;
 
+    use glam::Quat;
     use proptest::prelude::*;
 
     use super::*;
