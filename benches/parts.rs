@@ -46,7 +46,7 @@ fn prepare(bencher: Bencher<'_, '_>, method: &str) {
 
 /// The same for Bessel-Overhauser with steps of 3 degrees, which are motion capture's.
 #[divan::bench]
-fn prepare_gentle(bencher: Bencher<'_, '_>) {
+fn prepare_small_angle(bencher: Bencher<'_, '_>) {
     let (engine, set) = (one_thread(), set(0.05));
     bencher
         .counter(ItemsCount::new(TRACKS * KEYS))

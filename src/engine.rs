@@ -13,7 +13,7 @@ use crate::evaluate::uploaded::Uploaded;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
-use crate::gpu::self_test::CanaryReport;
+use crate::gpu::self_test::SelfTestReport;
 use crate::method::interpolation::Interpolation;
 use crate::output::rotations::{Layout, Rotations};
 use crate::prepare::clip_data::Wanted;
@@ -115,10 +115,10 @@ impl Engine {
     /// The results of the device's self-test, one report for each check; empty on the CPU, which
     /// devices are compared with.
     #[must_use]
-    pub fn canaries(&self) -> &[CanaryReport] {
+    pub fn self_tests(&self) -> &[SelfTestReport] {
         match &*self.backend {
             Backend::Cpu(_) => &[],
-            Backend::Vulkan(opened) => &opened.canaries,
+            Backend::Vulkan(opened) => &opened.self_tests,
         }
     }
 

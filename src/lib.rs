@@ -79,7 +79,7 @@ pub use crate::gpu::error::VulkanError;
 pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
 pub use crate::gpu::options::{EngineOptions, Reads, Timings, Transfer};
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
-pub use crate::gpu::self_test::CanaryReport;
+pub use crate::gpu::self_test::SelfTestReport;
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
 pub use crate::method::{Continuity, Cost, Keys, METHODS, Method};

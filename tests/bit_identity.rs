@@ -879,11 +879,11 @@ fn few_times_of_each_track_have_the_bits_of_many() {
         let place = |random: &mut Random| times[random.next() as usize % count];
         let on_key = place(&mut random);
         let between = place(&mut random) + random.between(0.0, 0.01);
-        let anywhere = random.between(-4.0, 4.0);
+        let full_range = random.between(-4.0, 4.0);
         asked.push(match track % 4 {
-            0 => vec![on_key, between, anywhere],
-            1 => vec![between, anywhere, between],
-            _ => vec![anywhere, between, on_key],
+            0 => vec![on_key, between, full_range],
+            1 => vec![between, full_range, between],
+            _ => vec![full_range, between, on_key],
         });
         set.push("", &times, &keys).unwrap();
     }

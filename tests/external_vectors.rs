@@ -3,7 +3,7 @@
 #![allow(clippy::approx_constant)] // theirs have fewer digits
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::{Curve, Kind, angle_between, nlerp, slerp, squad};
+use tumble::reference::{Curve, angle_between, nlerp, slerp, squad};
 use tumble::{Device, Ends, Engine, Frames, Interpolation, Method, Path, TrackSet, method};
 
 fn q(wxyz: [f64; 4]) -> DQuat {
@@ -248,7 +248,13 @@ fn drake_angular_velocity_across_a_sign_flip() {
         .map(|angle| DQuat::from_axis_angle(axis, angle).as_quat())
         .to_vec();
     let times = [0.0, 1.6, 2.32];
-    let curve = Curve::new(Kind::Slerp, Path::Shortest, Ends::default(), &times, &keys);
+    let curve = Curve::new(
+        tumble::method::SLERP.reference,
+        Path::Shortest,
+        Ends::default(),
+        &times,
+        &keys,
+    );
     for (time, rate) in [(0.8, 0.875), (2.0, 4.027777777777778)] {
         assert!((curve.velocity(time) - axis * rate).length() < 1e-6);
     }

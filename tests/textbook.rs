@@ -7,7 +7,7 @@ use crate::support::Random;
 use glam::{DQuat, DVec3, Quat};
 use proptest::prelude::*;
 use tumble::reference::{
-    Curve, Kind, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
+    Curve, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left,
 };
 use tumble::{Continuity, Ends, Keys, METHODS, Method, Path, method};
@@ -17,18 +17,14 @@ fn moving() -> impl Iterator<Item = Method> {
     METHODS.into_iter().filter(|&method| method != method::STEP)
 }
 
-fn kinds() -> impl Iterator<Item = Kind> {
-    moving().map(|method| method.reference)
-}
-
 /// Methods that follow from the keys alone, also at the ends.
 fn free() -> impl Iterator<Item = Method> {
     let given = [method::HERMITE, method::GLTF_CUBIC];
     moving().filter(move |method| !given.contains(method))
 }
 
-fn curve(kind: Kind, ends: Ends, times: &[f64], keys: &[Quat]) -> Curve {
-    Curve::new(kind, Path::Shortest, ends, times, keys)
+fn curve(method: Method, ends: Ends, times: &[f64], keys: &[Quat]) -> Curve {
+    Curve::new(method.reference, Path::Shortest, ends, times, keys)
 }
 
 /// `count` keys, each up to `step` radians from the one before.
@@ -116,11 +112,7 @@ fn keys_are_met_with_all_ends() {
     for _ in 0..20 {
         let keys = random_keys(&mut random, 9, 2.5);
         let times = uneven_times(&mut random, 9);
-        for kind in METHODS
-            .iter()
-            .filter(|m| m.interpolates)
-            .map(|m| m.reference)
-        {
+        for method in METHODS.into_iter().filter(|m| m.interpolates) {
             for ends in [
                 Ends::Parabolic,
                 Ends::Natural,
@@ -130,7 +122,7 @@ fn keys_are_met_with_all_ends() {
                 },
                 Ends::Frozen,
             ] {
-                let curve = curve(kind, ends, &times, &keys);
+                let curve = curve(method, ends, &times, &keys);
                 for (&time, key) in times.iter().zip(&keys) {
                     assert!(angle_between(curve.rotation(time), key.as_dquat()) < 1e-13);
                 }
@@ -145,8 +137,8 @@ fn velocity_is_the_derivative_of_the_rotation() {
     let keys = random_keys(&mut random, 8, 2.0);
     let times = uneven_times(&mut random, 8);
     let h = 1e-5;
-    for kind in kinds() {
-        let curve = curve(kind, Ends::Natural, &times, &keys);
+    for method in moving() {
+        let curve = curve(method, Ends::Natural, &times, &keys);
         for time in samples(&times).skip(1).take(198) {
             // Not across a key, where acceleration jumps.
             if times.iter().any(|key| (key - time).abs() < 2.0 * h) {
@@ -158,7 +150,7 @@ fn velocity_is_the_derivative_of_the_rotation() {
             let exact = curve.velocity(time);
             assert!(
                 (numeric - exact).length() < 1e-6,
-                "{kind:?} at {time}: {numeric} {exact}"
+                "{method:?} at {time}: {numeric} {exact}"
             );
         }
     }
@@ -194,7 +186,7 @@ fn continuity_is_what_is_promised() {
             let (mut velocity, mut acceleration) = (0.0f64, 0.0f64);
             for _ in 0..20 {
                 let keys = random_keys(&mut random, 10, 2.0);
-                let curve = curve(method.reference, method.ends, times, &keys);
+                let curve = curve(method, method.ends, times, &keys);
                 velocity = velocity.max(velocity_jumps(&curve, 9));
                 acceleration = acceleration.max(acceleration_jumps(&curve, 9));
             }
@@ -217,8 +209,8 @@ fn bessel_overhauser_equals_catmull_rom_on_uniform_keys() {
         let keys = random_keys(&mut random, 8, 3.0);
         let times = even_times(8);
         for ends in [Ends::Parabolic, Ends::Natural] {
-            let a = curve(Kind::BesselOverhauser, ends, &times, &keys);
-            let b = curve(Kind::CatmullRom, ends, &times, &keys);
+            let a = curve(method::BESSEL_OVERHAUSER, ends, &times, &keys);
+            let b = curve(method::CATMULL_ROM, ends, &times, &keys);
             for time in samples(&times) {
                 assert!(angle_between(a.rotation(time), b.rotation(time)) < 1e-12);
             }
@@ -238,7 +230,7 @@ fn constant_velocity_keys_give_constant_velocity_to_the_very_ends() {
         ] {
             let key = |time: &f64| DQuat::from_axis_angle(axis, rate * time).as_quat();
             let keys: Vec<Quat> = times.iter().map(key).collect();
-            let curve = curve(method.reference, method.ends, times, &keys);
+            let curve = curve(method, method.ends, times, &keys);
             let off = samples(times)
                 .map(|time| (curve.velocity(time) - axis * rate).length())
                 .fold(0.0, f64::max);
@@ -259,21 +251,21 @@ fn turning_all_keys_turns_every_sample() {
     let times = uneven_times(&mut random, 8);
     let turn = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
     let exact = turn.as_dquat();
-    for kind in kinds() {
-        let own = curve(kind, Ends::Parabolic, &times, &keys);
+    for method in moving() {
+        let own = curve(method, Ends::Parabolic, &times, &keys);
         let left: Vec<Quat> = keys.iter().map(|&key| turn * key).collect();
         let right: Vec<Quat> = keys.iter().map(|&key| key * turn).collect();
-        let left = curve(kind, Ends::Parabolic, &times, &left);
-        let right = curve(kind, Ends::Parabolic, &times, &right);
+        let left = curve(method, Ends::Parabolic, &times, &left);
+        let right = curve(method, Ends::Parabolic, &times, &right);
         for time in samples(&times) {
             let rotation = own.rotation(time);
             assert!(
                 angle_between(left.rotation(time), exact * rotation) < 1e-13,
-                "{kind:?}"
+                "{method:?}"
             );
             assert!(
                 angle_between(right.rotation(time), rotation * exact) < 1e-13,
-                "{kind:?}"
+                "{method:?}"
             );
         }
     }
@@ -293,13 +285,13 @@ fn the_signs_of_keys_do_not_matter_on_the_shortest_path() {
             }
         };
         let flipped: Vec<Quat> = keys.iter().map(flip).collect();
-        for kind in kinds() {
-            let a = curve(kind, Ends::Parabolic, &times, &keys);
-            let b = curve(kind, Ends::Parabolic, &times, &flipped);
+        for method in moving() {
+            let a = curve(method, Ends::Parabolic, &times, &keys);
+            let b = curve(method, Ends::Parabolic, &times, &flipped);
             for time in samples(&times) {
                 assert!(
                     angle_between(a.rotation(time), b.rotation(time)) < 1e-14,
-                    "{kind:?}"
+                    "{method:?}"
                 );
             }
         }
@@ -316,8 +308,8 @@ fn a_symmetric_method_takes_the_same_way_backwards() {
             let times = uneven_times(&mut random, 9);
             let backwards: Vec<f64> = times.iter().rev().map(|time| -time).collect();
             let reversed: Vec<Quat> = keys.iter().rev().copied().collect();
-            let a = curve(method.reference, method.ends, &times, &keys);
-            let b = curve(method.reference, method.ends, &backwards, &reversed);
+            let a = curve(method, method.ends, &times, &keys);
+            let b = curve(method, method.ends, &backwards, &reversed);
             for time in samples(&times) {
                 off = off.max(angle_between(a.rotation(time), b.rotation(-time)));
             }
@@ -340,7 +332,7 @@ fn a_tangent_longer_than_pi_points_forwards() {
     let key = |i: i32| Quat::from_rotation_x((step * f64::from(i)) as f32);
     let keys: Vec<Quat> = (0..4).map(key).collect();
     let times = [0.0, 0.1, 0.9, 1.7];
-    let curve = curve(Kind::BesselOverhauser, Ends::Parabolic, &times, &keys);
+    let curve = curve(method::BESSEL_OVERHAUSER, Ends::Parabolic, &times, &keys);
     // L = 8 · 0.5, R = 0.5 / 8: their sum is 4.06, longer than pi.
     let expected = 2.0 * (8.0 * 0.5 + 0.5 / 8.0) / 0.9;
     let found = curve.velocity(0.1);
@@ -360,7 +352,7 @@ fn natural_ends_have_no_angular_acceleration() {
     for method in with_ends().filter(|&method| method != method::SQUAD) {
         let keys = random_keys(&mut random, 6, 1.5);
         let times = uneven_times(&mut random, 6);
-        let natural = curve(method.reference, Ends::Natural, &times, &keys);
+        let natural = curve(method, Ends::Natural, &times, &keys);
         let ends = [(0, 0.0), (4, 1.0)].map(|(i, t)| natural.segment_acceleration(i, t).length());
         assert!(ends[0] < 1e-8 && ends[1] < 1e-8, "{method}: {ends:?}");
     }
@@ -378,12 +370,7 @@ fn clamped_ends_have_the_velocities_given() {
     for method in with_ends() {
         let keys = random_keys(&mut random, 6, 1.5);
         let times = uneven_times(&mut random, 6);
-        let clamped = curve(
-            method.reference,
-            Ends::Clamped { start, end },
-            &times,
-            &keys,
-        );
+        let clamped = curve(method, Ends::Clamped { start, end }, &times, &keys);
         let off = [
             clamped.segment_velocity(0, 0.0) - start,
             clamped.segment_velocity(4, 1.0) - end,
@@ -392,8 +379,8 @@ fn clamped_ends_have_the_velocities_given() {
             off[0].length() < 1e-11 && off[1].length() < 1e-11,
             "{method}: {off:?}"
         );
-        let secant = curve(method.reference, Ends::Secant, &times, &keys);
-        let slerp = curve(Kind::Slerp, Ends::Secant, &times, &keys);
+        let secant = curve(method, Ends::Secant, &times, &keys);
+        let slerp = curve(method::SLERP, Ends::Secant, &times, &keys);
         for (i, t) in [(0, 0.0), (4, 1.0)] {
             let off = secant.segment_velocity(i, t) - slerp.segment_velocity(i, t);
             assert!(off.length() < 1e-11, "{method}: {off}");
@@ -416,7 +403,7 @@ fn loops_are_smooth_across_the_seam() {
                 Continuity::C0 => even_times(8),
                 _ => uneven_times(&mut random, 8),
             };
-            let closed = curve(method.reference, Ends::Loop, &times, &keys);
+            let closed = curve(method, Ends::Loop, &times, &keys);
             let (end, start) = (
                 closed.segment_velocity(6, 1.0),
                 closed.segment_velocity(0, 0.0),
@@ -438,13 +425,17 @@ fn frozen_ends_stand_still_like_the_original() {
     let mut random = Random(13);
     let keys = random_keys(&mut random, 6, 1.5);
     let times = even_times(6);
-    for kind in [Kind::CatmullRom, Kind::BesselOverhauser, Kind::BSpline] {
-        let frozen = curve(kind, Ends::Frozen, &times, &keys);
+    for method in [
+        method::CATMULL_ROM,
+        method::BESSEL_OVERHAUSER,
+        method::B_SPLINE,
+    ] {
+        let frozen = curve(method, Ends::Frozen, &times, &keys);
         let at =
             |time, key: usize| angle_between(frozen.rotation(time), keys[key].as_dquat()) < 1e-14;
         assert!(
             at(0.0, 0) && at(0.79, 0) && at(3.3, 4) && at(3.99, 4) && at(4.0, 5),
-            "{kind:?}"
+            "{method:?}"
         );
         assert_eq!(frozen.velocity(0.3), DVec3::ZERO);
     }
@@ -455,9 +446,9 @@ fn two_keys_are_joined_by_slerp_and_one_stands_still() {
     let mut random = Random(14);
     let keys = random_keys(&mut random, 2, 3.0);
     let times = [1.0, 2.5];
-    for kind in kinds() {
+    for method in moving() {
         for ends in [Ends::Parabolic, Ends::Natural, Ends::Frozen] {
-            let two = curve(kind, ends, &times, &keys);
+            let two = curve(method, ends, &times, &keys);
             let middle = slerp(keys[0].as_dquat(), keys[1].as_dquat(), 0.5);
             let sign = if keys[0].dot(keys[1]) < 0.0 {
                 None
@@ -465,9 +456,12 @@ fn two_keys_are_joined_by_slerp_and_one_stands_still() {
                 Some(middle)
             };
             if let Some(middle) = sign {
-                assert!(angle_between(two.rotation(1.75), middle) < 1e-7, "{kind:?}");
+                assert!(
+                    angle_between(two.rotation(1.75), middle) < 1e-7,
+                    "{method:?}"
+                );
             }
-            let one = curve(kind, ends, &times[..1], &keys[..1]);
+            let one = curve(method, ends, &times[..1], &keys[..1]);
             assert_eq!(one.rotation(9.0), one.rotation(-9.0));
         }
     }

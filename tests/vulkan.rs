@@ -1,4 +1,4 @@
-//! Vulkan's side of the bargain: devices, canaries, validation, handles.
+//! Vulkan's side of the bargain: devices, self-tests, validation, handles.
 
 use crate::support::{dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines};
 use bytemuck::Pod;
@@ -9,13 +9,13 @@ use tumble::{
 };
 
 #[test]
-fn every_device_passes_every_canary() {
+fn every_device_passes_every_check() {
     for device in vulkan_devices() {
         let engine = Engine::new(device).unwrap();
-        assert_eq!(engine.canaries().len(), 12);
-        for canary in engine.canaries() {
-            assert!(canary.total > 0, "{canary:?}");
-            assert_eq!(canary.differing, 0, "{}: {canary:?}", engine.device_name());
+        assert_eq!(engine.self_tests().len(), 12);
+        for check in engine.self_tests() {
+            assert!(check.total > 0, "{check:?}");
+            assert_eq!(check.differing, 0, "{}: {check:?}", engine.device_name());
         }
         let info = engine.device_info().unwrap();
         assert!(

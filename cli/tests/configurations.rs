@@ -1,5 +1,5 @@
 //! Every way in which the software drivers can be set up gives the CPU's bits, or is
-//! caught by a canary, named and refused.
+//! caught by a self-test, named and refused.
 #![cfg(target_os = "linux")]
 
 use std::path::Path;
@@ -80,7 +80,7 @@ fn swiftshader_gives_the_same_bits() {
     );
 }
 
-/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise: which canary
+/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise: which self-test
 /// finds that first depends on the processor.
 #[test]
 fn a_driver_that_is_not_exact_is_named_and_refused() {
@@ -92,7 +92,7 @@ fn a_driver_that_is_not_exact_is_named_and_refused() {
     for word in ["llvmpipe", "--allow-inexact"] {
         assert!(run.words.contains(word), "{word}: {}", run.words);
     }
-    let canaries = ["contraction", "re-association of a sum"];
-    let is_told = |canary| (run.words).contains(&format!("is not exact: canary `{canary}`"));
-    assert!(canaries.into_iter().any(is_told), "{}", run.words);
+    let self_tests = ["contraction", "re-association of a sum"];
+    let is_told = |check| (run.words).contains(&format!("is not exact: self-test `{check}`"));
+    assert!(self_tests.into_iter().any(is_told), "{}", run.words);
 }

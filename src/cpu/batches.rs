@@ -54,7 +54,7 @@ impl CpuEngine {
         let samples_of_a_run = || rotations / keys.max(1);
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);
-            let mut memory = self.memories.take(interpolation, timeline, set);
+            let mut memory = self.scratch_pool.take(interpolation, timeline, set);
             for (i, batch) in batches.iter().enumerate() {
                 memory.prepare(set, batch.intervals(set))?;
                 // Fetches the next batch's times and keys while this batch is evaluated: the
@@ -75,7 +75,7 @@ impl CpuEngine {
                 }
             }
             stage.finish();
-            self.memories.give_back(memory);
+            self.scratch_pool.give_back(memory);
             Ok(())
         };
         if batches.len() <= 1 {

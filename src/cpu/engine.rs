@@ -1,7 +1,7 @@
 //! The CPU as a device: its threads, its vector width, and the evaluation of one part of a track.
 
 use crate::cpu::row::Row;
-use crate::cpu::scratch::Memories;
+use crate::cpu::scratch::ScratchPool;
 use crate::cpu::streaming::Output;
 use crate::prepare::clip_data::PartRef;
 use crate::shader::Form;
@@ -17,7 +17,7 @@ pub(crate) const TASK: usize = 16 * 1024;
 pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
     pool: Option<rayon::ThreadPool>,
-    pub(crate) memories: Memories,
+    pub(crate) scratch_pool: ScratchPool,
 }
 
 impl CpuEngine {
@@ -32,7 +32,7 @@ impl CpuEngine {
         Ok(Self {
             width,
             pool,
-            memories: Memories::default(),
+            scratch_pool: ScratchPool::default(),
         })
     }
 
@@ -41,7 +41,7 @@ impl CpuEngine {
         Self {
             width,
             pool: None,
-            memories: Memories::default(),
+            scratch_pool: ScratchPool::default(),
         }
     }
 

@@ -68,14 +68,16 @@ impl CpuEngine {
             }
         }
         let resolve = |batch: Batch<'_>| -> Result<(), SetError> {
-            let mut memory = self.memories.take(row.interpolation, row.timeline, row.set);
+            let mut memory = self
+                .scratch_pool
+                .take(row.interpolation, row.timeline, row.set);
             let intervals = (batch.iter()).map(|(piece, _)| (row.index, piece.intervals.clone()));
             memory.prepare(row.set, intervals)?;
             for (part, (piece, own)) in memory.parts().zip(batch) {
                 let own = &mut Output::Here(own);
                 self.part(part, row.timeline, &TrackCopy::own(piece.samples), own)?;
             }
-            self.memories.give_back(memory);
+            self.scratch_pool.give_back(memory);
             Ok(())
         };
         batches.into_par_iter().try_for_each(resolve)

@@ -22,9 +22,9 @@ const KEPT_EACH: usize = 4;
 
 /// The scratch pool: what threads have given back, the latest last.
 #[derive(Default)]
-pub(crate) struct Memories(Mutex<Vec<Memory>>);
+pub(crate) struct ScratchPool(Mutex<Vec<Memory>>);
 
-impl Memories {
+impl ScratchPool {
     /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
     /// only what the samples of this timeline need.
     pub(crate) fn take(
@@ -75,18 +75,22 @@ mod tests {
             .upload(&set, method::SLERP)
             .unwrap();
         let timeline = clip.timeline(&Frames::fps(60)).unwrap();
-        let memories = Memories::default();
-        let take = |own| memories.take(&Interpolation::from(own), &timeline, &set);
-        let kept = || memories.0.lock().unwrap().len();
+        let scratch_pool = ScratchPool::default();
+        let take = |own| scratch_pool.take(&Interpolation::from(own), &timeline, &set);
+        let kept = || scratch_pool.0.lock().unwrap().len();
         for own in [method::SLERP, method::BESSEL_OVERHAUSER] {
-            memories.give_back(take(own));
+            scratch_pool.give_back(take(own));
         }
         assert_eq!(kept(), 2);
         let first = take(method::SLERP);
         assert_eq!(kept(), 1);
-        memories.give_back(first);
+        scratch_pool.give_back(first);
         for _ in 0..9 * rayon::current_num_threads() {
-            memories.give_back(Memories::default().take(&method::SLERP.into(), &timeline, &set));
+            scratch_pool.give_back(ScratchPool::default().take(
+                &method::SLERP.into(),
+                &timeline,
+                &set,
+            ));
         }
         assert_eq!(kept(), KEPT_EACH * rayon::current_num_threads());
     }

@@ -22,7 +22,7 @@ pub(crate) struct Nodes<const PAIRS: usize> {
 }
 
 /// The seven Chebyshev nodes, for a polynomial of degree 6.
-pub(crate) const GENTLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.21694186, 0.48746395]);
+pub(crate) const SMALL_ANGLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.21694186, 0.48746395]);
 
 /// The eleven Chebyshev nodes, for a polynomial of degree 10.
 pub(crate) const FULL_NODES: Nodes<5> =
@@ -143,7 +143,7 @@ mod tests {
     /// Chebyshev coefficient for another.
     #[test]
     fn chebyshev_polynomials_come_back() {
-        come_back(&GENTLE_NODES);
+        come_back(&SMALL_ANGLE_NODES);
         come_back(&FULL_NODES);
         come_back(&END_NODES);
         come_back(&FEW_END_NODES);

@@ -104,8 +104,8 @@ mod tests {
                 for (place, keys) in block.keys.iter_mut().enumerate() {
                     keys[lane] = key(turn * (place as f64 - 1.5)).as_quat().to_array();
                 }
-                let joint = WeightRule::ByTime.between(1.0, 1.0);
-                block.weights = [[joint; LANES]; 2];
+                let tangent_weights = WeightRule::ByTime.between(1.0, 1.0);
+                block.weights = [[tangent_weights; LANES]; 2];
                 block.parameters[lane] = (lane as f32 * 0.618).fract() - 0.5;
             }
             in_lanes(&mut block);
@@ -131,8 +131,8 @@ mod tests {
     fn what_turns_too_much_is_left_out() {
         let mut block = CubicBlock::new();
         block.count = 3;
-        let joint = WeightRule::Alike.between(1.0, 1.0);
-        block.weights = [[joint; LANES]; 2];
+        let tangent_weights = WeightRule::Alike.between(1.0, 1.0);
+        block.weights = [[tangent_weights; LANES]; 2];
         let turned = |turn: f32| glam::Quat::from_rotation_z(turn).to_array();
         for (place, keys) in block.keys.iter_mut().enumerate() {
             keys[0] = turned(0.1 * place as f32);

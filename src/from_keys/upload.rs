@@ -65,9 +65,9 @@ impl KeyPiece<'_, '_> {
         mut samples: &mut [KeySample],
         mut weights: &mut [TangentWeights],
     ) -> Result<(), FramesError> {
-        let (mut keys, lent) = match keys {
+        let (mut keys, imported) = match keys {
             Keys::Copied(keys) => (keys, None),
-            Keys::Lent(first) => (&mut [][..], Some(first)),
+            Keys::ImportedMemory(first) => (&mut [][..], Some(first)),
         };
         let mut first_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
@@ -80,14 +80,14 @@ impl KeyPiece<'_, '_> {
             };
             let (own_keys, other_keys) = keys.split_at_mut(task.keys.min(keys.len()));
             let (own_samples, other_samples) = samples.split_at_mut(told);
-            let (own_joints, other_joints) = weights.split_at_mut(joined);
-            (keys, samples, weights) = (other_keys, other_samples, other_joints);
+            let (own_tangent_weights, other_tangent_weights) = weights.split_at_mut(joined);
+            (keys, samples, weights) = (other_keys, other_samples, other_tangent_weights);
             let written = Written {
                 keys: own_keys,
                 samples: own_samples,
-                weights: own_joints,
+                weights: own_tangent_weights,
                 next_key: first_key,
-                lent,
+                imported,
             };
             places.push((task, written));
             first_key += task.keys;
@@ -116,7 +116,7 @@ impl KeyPiece<'_, '_> {
                         samples: std::mem::take(&mut written.samples),
                     };
                     in_lanes(&mut of_tracks);
-                    if written.lent.is_some() {
+                    if written.imported.is_some() {
                         return Ok(());
                     }
                 }
@@ -134,7 +134,7 @@ impl KeyPiece<'_, '_> {
     ) -> Result<(), FramesError> {
         let keys: &[[u32; 4]] = bytemuck::cast_slice(part.keys.keys);
         let first_key = written.place_of(self.job.set, part.keys.index, part.keys.first_key);
-        if written.lent.is_none() {
+        if written.imported.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
             own.copy_from_slice(keys);
             let signs = part.keys.signs;
@@ -255,7 +255,7 @@ pub(crate) enum Keys<'w> {
     Copied(&'w mut [[u32; 4]]),
     /// In imported memory, as they are stored: the set's first key has this place there. No key is
     /// turned.
-    Lent(usize),
+    ImportedMemory(usize),
 }
 
 /// Results that a thread keeps for the next track.
@@ -273,13 +273,13 @@ struct Written<'w> {
     /// The place of the next key among the piece's.
     next_key: usize,
     /// The place of the set's first key in imported memory, where keys are read from there.
-    lent: Option<usize>,
+    imported: Option<usize>,
 }
 
 impl Written<'_> {
     /// The place of a track's key, which is the next one where keys are copied.
     fn place_of(&self, set: &TrackSet, track: usize, key: usize) -> usize {
-        self.lent
+        self.imported
             .map_or(self.next_key, |first| first + set.keys_of(0..track) + key)
     }
 }

@@ -50,7 +50,7 @@ fn usage(is_texels: bool) -> vk::BufferUsageFlags {
 }
 
 /// Whether a device can import such memory for a buffer.
-pub(crate) fn may_be_lent(physical: &PhysicalDevice, is_texels: bool) -> bool {
+pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> bool {
     let info = vk::PhysicalDeviceExternalBufferInfo::default()
         .usage(usage(is_texels))
         .handle_type(LENT);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::buffer::may_be_lent;
+use crate::gpu::buffer::may_be_imported;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::options::Reads;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
@@ -43,7 +43,7 @@ impl LogicalDevice {
         let reads_texels = physical.reads_texels(reads);
         let borrows = physical.info.kind == DeviceKind::Cpu
             && physical.lent_alignment.is_some()
-            && may_be_lent(&physical, reads_texels);
+            && may_be_imported(&physical, reads_texels);
         if borrows {
             extensions.push(ext::external_memory_host::NAME.as_ptr());
         }

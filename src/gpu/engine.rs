@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::from_keys::KeySlot;
-use crate::gpu::imported_memory::Lent;
-use crate::gpu::in_flight::{External, Slot, Target};
+use crate::gpu::from_keys::KeysInFlight;
+use crate::gpu::imported_memory::ImportedMemory;
+use crate::gpu::in_flight::{External, InFlight, Target};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
@@ -30,15 +30,15 @@ const WINDOW: u64 = 1 << 21;
 const SMALLEST_WINDOW: usize = 1 << 16;
 
 /// Windows in flight: the host fills one while the device works on another.
-pub(crate) const SLOTS: usize = 2;
+pub(crate) const IN_FLIGHT: usize = 2;
 
 /// A Vulkan device with its kernels.
 pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
-    pub(crate) slots: Mutex<Vec<Slot>>,
-    pub(crate) key_slots: Mutex<Vec<KeySlot>>,
+    pub(crate) in_flight: Mutex<Vec<InFlight>>,
+    pub(crate) keys_in_flight: Mutex<Vec<KeysInFlight>>,
     /// Whether kernels write into memory that the host reads; else results are copied out of the
     /// device's own memory.
     pub(crate) in_place: bool,
@@ -111,15 +111,15 @@ impl VulkanEngine {
         let mut group_bytes = largest;
         if let Some(budget) = options.memory {
             let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
-            window = window.min(budget / 2 / SLOTS as u64 / each);
+            window = window.min(budget / 2 / IN_FLIGHT as u64 / each);
             group_bytes = group_bytes.min(budget / 2);
         }
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         Ok(Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
-            slots: Mutex::default(),
-            key_slots: Mutex::default(),
+            in_flight: Mutex::default(),
+            keys_in_flight: Mutex::default(),
             in_place,
             lends: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
@@ -152,7 +152,9 @@ impl VulkanEngine {
     }
 
     /// Runs the self-test.
-    pub(crate) fn canaries(&self) -> Result<Vec<crate::gpu::self_test::CanaryReport>, VulkanError> {
+    pub(crate) fn self_tests(
+        &self,
+    ) -> Result<Vec<crate::gpu::self_test::SelfTestReport>, VulkanError> {
         crate::gpu::self_test::run(self)
     }
 
@@ -246,12 +248,16 @@ impl VulkanEngine {
 
     /// Frees the buffers that are kept for the next evaluation; false when there are none.
     pub(crate) fn give_back(&self) -> bool {
-        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut key_slots = (self.key_slots.lock()).unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = self
+            .in_flight
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let mut keys_in_flight =
+            (self.keys_in_flight.lock()).unwrap_or_else(PoisonError::into_inner);
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = slots.len() + key_slots.len() + free.len();
-        slots.clear();
-        key_slots.clear();
+        let kept = in_flight.len() + keys_in_flight.len() + free.len();
+        in_flight.clear();
+        keys_in_flight.clear();
         free.clear();
         kept > 0
     }
@@ -326,10 +332,14 @@ impl VulkanEngine {
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
         let target = match self.lends {
-            true => Lent::to_write(&self.device, output, job.encoding.bytes()),
+            true => ImportedMemory::to_write(&self.device, output, job.encoding.bytes()),
             false => Err(output),
         };
-        self.run(job, window, target.map_or_else(Target::Slice, Target::Lent))
+        self.run(
+            job,
+            window,
+            target.map_or_else(Target::Slice, Target::ImportedMemory),
+        )
     }
 
     /// Evaluates into a buffer of the caller's device, where it stays.

@@ -56,13 +56,13 @@ pub enum VulkanError {
     },
     /// The device computes other bits than the CPU.
     #[error(
-        "{device} is not exact: canary `{canary}` differs in {differing} of {total} results; it is used only when inexact devices are allowed"
+        "{device} is not exact: self-test `{check}` differs in {differing} of {total} results; it is used only when inexact devices are allowed"
     )]
     Inexact {
         /// The device's name.
         device: String,
         /// The check of the self-test that failed.
-        canary: &'static str,
+        check: &'static str,
         /// Results that differ.
         differing: usize,
         /// Results compared.

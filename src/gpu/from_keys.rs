@@ -13,10 +13,10 @@ use crate::from_keys::pieces::{KeyJob, KeyPiece};
 use crate::from_keys::upload::Keys;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{SLOTS, VulkanEngine};
+use crate::gpu::engine::{IN_FLIGHT, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::imported_memory::Lent;
-use crate::gpu::in_flight::{Slot, Stopwatch, Target, copy};
+use crate::gpu::imported_memory::ImportedMemory;
+use crate::gpu::in_flight::{InFlight, Stopwatch, Target, copy};
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::Kernel;
@@ -24,7 +24,7 @@ use crate::shader::{FROM_KEYS_WORKGROUP, ROWS_PER_INVOCATION};
 
 /// What one piece in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.
-pub(crate) struct KeySlot {
+pub(crate) struct KeysInFlight {
     submission: Submission,
     keys: Option<Buffer>,
     samples: Option<Buffer>,
@@ -32,24 +32,24 @@ pub(crate) struct KeySlot {
     weights: Option<Buffer>,
     /// The bytes of the result that the piece in flight makes.
     output: Range<usize>,
-    /// As [`Slot::compiled`].
+    /// As [`InFlight::compiled`].
     compiled: bool,
 }
 
 /// The caller's memory, imported where possible.
 struct Borrowed<'a> {
     /// The set's keys, where kernels read them in place.
-    keys: Option<Lent<'a>>,
+    keys: Option<ImportedMemory<'a>>,
     target: Target<'a>,
 }
 
 impl Borrowed<'_> {
-    /// See [`Lent::has_come_back`].
+    /// See [`ImportedMemory::has_come_back`].
     fn has_come_back(&mut self) {
         if let Some(keys) = &mut self.keys {
             keys.has_come_back();
         }
-        if let Target::Lent(output) = &mut self.target {
+        if let Target::ImportedMemory(output) = &mut self.target {
             output.has_come_back();
         }
     }
@@ -62,12 +62,12 @@ impl VulkanEngine {
         job: &KeyJob<'_>,
         output: &mut [[f32; 4]],
     ) -> Result<(), EvaluateError> {
-        let mut slots = self
-            .key_slots
+        let mut in_flight = self
+            .keys_in_flight
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        while slots.len() < SLOTS {
-            slots.push(KeySlot::new(&self.device)?);
+        while in_flight.len() < IN_FLIGHT {
+            in_flight.push(KeysInFlight::new(&self.device)?);
         }
         let each = size_of::<Quat>();
         // A piece's result may begin at any rotation, and a binding must be able to as well.
@@ -78,32 +78,39 @@ impl VulkanEngine {
             .min_storage_buffer_offset_alignment;
         let lends = self.lends && alignment <= each as u64;
         let output = bytemuck::cast_slice_mut(output);
-        let mut lent = Borrowed {
+        let mut imported = Borrowed {
             keys: (job.keys().filter(|_| lends && self.device.reads_texels))
-                .and_then(|keys| Lent::to_read(&self.device, bytemuck::cast_slice(keys)))
+                .and_then(|keys| ImportedMemory::to_read(&self.device, bytemuck::cast_slice(keys)))
                 .filter(|keys| keys.start().is_multiple_of(each)),
             target: match lends {
-                true => Lent::to_write(&self.device, output, each)
-                    .map_or_else(Target::Slice, Target::Lent),
+                true => ImportedMemory::to_write(&self.device, output, each)
+                    .map_or_else(Target::Slice, Target::ImportedMemory),
                 false => Target::Slice(output),
             },
         };
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
-        let mut result = self.submit_pieces(job, &mut slots, &mut next, &mut lent, &mut stopwatch);
+        let mut result = self.submit_pieces(
+            job,
+            &mut in_flight,
+            &mut next,
+            &mut imported,
+            &mut stopwatch,
+        );
         // Also after an error: work that was submitted uses the slots' buffers.
-        for i in 1..=SLOTS {
-            let finished = slots[(next + i) % SLOTS].finish(&mut lent.target, &mut stopwatch);
+        for i in 1..=IN_FLIGHT {
+            let finished =
+                in_flight[(next + i) % IN_FLIGHT].finish(&mut imported.target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
         }
         if result.is_ok() {
-            lent.has_come_back();
+            imported.has_come_back();
         }
         if stopwatch.is_slow() {
             self.halve_windows(); // those of the next call
         }
         if result.is_err() {
-            slots.clear(); // a fence or a recording may be half way
+            in_flight.clear(); // a fence or a recording may be half way
         }
         *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
@@ -112,9 +119,9 @@ impl VulkanEngine {
     fn submit_pieces(
         &self,
         job: &KeyJob<'_>,
-        slots: &mut [KeySlot],
+        in_flight: &mut [KeysInFlight],
         next: &mut usize,
-        lent: &mut Borrowed<'_>,
+        imported: &mut Borrowed<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), EvaluateError> {
         let kernel = match job.curve {
@@ -132,19 +139,19 @@ impl VulkanEngine {
             let Some(piece) = pieces.next(self.window())? else {
                 return Ok(());
             };
-            *next = (*next + 1) % SLOTS;
-            let slot = &mut slots[*next];
-            slot.finish(&mut lent.target, stopwatch)?;
+            *next = (*next + 1) % IN_FLIGHT;
+            let evaluation = &mut in_flight[*next];
+            evaluation.finish(&mut imported.target, stopwatch)?;
             let writing = Instant::now();
             let own = start..start + piece.rotation_count() * size_of::<Quat>();
-            slot.start(&self.device, &pipeline, &piece, lent, own.clone())?;
+            evaluation.start(&self.device, &pipeline, &piece, imported, own.clone())?;
             stopwatch.timings.work_lists += writing.elapsed();
             start = own.end;
         }
     }
 }
 
-impl KeySlot {
+impl KeysInFlight {
     fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         Ok(Self {
             submission: Submission::new(device)?,
@@ -163,12 +170,12 @@ impl KeySlot {
         device: &Arc<LogicalDevice>,
         pipeline: &Pipeline,
         piece: &KeyPiece<'_, '_>,
-        lent: &Borrowed<'_>,
+        imported: &Borrowed<'_>,
         output: Range<usize>,
     ) -> Result<(), EvaluateError> {
-        let [key_bytes, sample_bytes, mut rotation_bytes, joint_bytes] = piece.bytes();
-        let place = match &lent.target {
-            Target::Lent(memory) if !output.is_empty() => {
+        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = piece.bytes();
+        let place = match &imported.target {
+            Target::ImportedMemory(memory) if !output.is_empty() => {
                 rotation_bytes = 0;
                 let start = memory.start() + output.start;
                 let size = output.len() as u64;
@@ -177,11 +184,11 @@ impl KeySlot {
             _ => None,
         };
         let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
-            Slot::grow(device, buffer, bytes as u64, residence)
+            InFlight::grow(device, buffer, bytes as u64, residence)
         };
         room(&mut self.samples, sample_bytes, Residence::Upload)?;
         room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
-        room(&mut self.weights, joint_bytes.max(1), Residence::Upload)?;
+        room(&mut self.weights, weight_bytes.max(1), Residence::Upload)?;
         let (Some(samples), Some(rotations), Some(weights)) =
             (&mut self.samples, &self.rotations, &mut self.weights)
         else {
@@ -191,12 +198,12 @@ impl KeySlot {
             piece.write(
                 keys,
                 bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
-                bytemuck::cast_slice_mut(weights.bytes_mut(0..joint_bytes)),
+                bytemuck::cast_slice_mut(weights.bytes_mut(0..weight_bytes)),
             )
         };
-        let keys = match &lent.keys {
+        let keys = match &imported.keys {
             Some(keys) if piece.keys_are_as_given() => {
-                write(Keys::Lent(keys.start() / size_of::<Quat>()))?;
+                write(Keys::ImportedMemory(keys.start() / size_of::<Quat>()))?;
                 keys.binding()
             }
             _ => {
@@ -210,7 +217,7 @@ impl KeySlot {
             }
         };
         let mut bindings = vec![keys, Binding::whole(samples)];
-        if joint_bytes > 0 {
+        if weight_bytes > 0 {
             bindings.push(Binding::whole(weights));
         }
         bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));

@@ -18,7 +18,7 @@ const LEAST: usize = 1 << 20;
 const PAGE: usize = 4096;
 
 /// Imported memory: the caller's, which a device may read or write as long as this lives.
-pub(crate) struct Lent<'a> {
+pub(crate) struct ImportedMemory<'a> {
     device: Arc<LogicalDevice>,
     /// The pages that it lies in.
     buffer: Buffer,
@@ -31,7 +31,7 @@ pub(crate) struct Lent<'a> {
     lender: PhantomData<&'a mut [u8]>,
 }
 
-impl<'a> Lent<'a> {
+impl<'a> ImportedMemory<'a> {
     /// Imports memory for kernels to write values of `each` bytes; returns the slice where that is
     /// impossible.
     pub(crate) fn to_write(
@@ -45,8 +45,8 @@ impl<'a> Lent<'a> {
         // A binding begins at an aligned offset, a whole number of values before the result:
         // either every value is aligned, or the start of the page is such an offset.
         let binds = is_aligned(start) && is_aligned(each) || start.is_multiple_of(each);
-        let lent = binds.then(|| Self::new(device, NonNull::from(&mut *bytes).cast(), size));
-        lent.flatten().ok_or(bytes)
+        let imported = binds.then(|| Self::new(device, NonNull::from(&mut *bytes).cast(), size));
+        imported.flatten().ok_or(bytes)
     }
 
     /// Imports memory for kernels to read.
@@ -107,7 +107,7 @@ impl<'a> Lent<'a> {
     }
 }
 
-impl Drop for Lent<'_> {
+impl Drop for ImportedMemory<'_> {
     fn drop(&mut self) {
         // After an error or a panic, submitted work may not have ended.
         if !self.is_idle {

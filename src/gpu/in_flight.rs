@@ -10,9 +10,9 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::EvaluateError;
 use crate::gpu::error::VulkanError;
-use crate::gpu::imported_memory::Lent;
+use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
-use crate::gpu::sample_list::Singles;
+use crate::gpu::sample_list::SampleList;
 use crate::gpu::submission::{Spent, Submission};
 use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};
 use crate::output::encoding::Encoding;
@@ -24,7 +24,7 @@ use crate::time::frames::{Ticks, Timeline};
 
 /// What one window in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.
-pub(crate) struct Slot {
+pub(crate) struct InFlight {
     pub(crate) submission: Submission,
     /// Items and distances, as the host writes them.
     pub(crate) items: Buffer,
@@ -92,7 +92,7 @@ pub(crate) enum Target<'a> {
     /// Straight into a mapped buffer.
     Buffer(&'a mut Buffer),
     /// Straight into the caller's memory, which is imported.
-    Lent(Lent<'a>),
+    ImportedMemory(ImportedMemory<'a>),
     /// Through a window's own buffer into the caller's memory.
     Slice(&'a mut [u8]),
     /// Into a buffer of the caller's.
@@ -107,7 +107,7 @@ pub(crate) struct External {
     pub(crate) offset: u64,
 }
 
-impl Slot {
+impl InFlight {
     pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         Ok(Self {
             submission: Submission::new(device)?,
@@ -137,7 +137,7 @@ impl Slot {
         Ok(())
     }
 
-    /// Writes the work list of a window into the slot's buffers, one group after another; `shift`
+    /// Writes the work list of a window into its buffers, one group after another; `shift`
     /// is added to every place in the output.
     pub(crate) fn list(
         &mut self,
@@ -147,10 +147,10 @@ impl Slot {
         window: &Window,
         shift: u32,
     ) -> Result<Work, EvaluateError> {
-        if let Some(singles) = Singles::new(clip, timeline, window) {
-            let bytes = singles.count() * size_of::<ListedSample>();
-            let list = room(device, &mut self.items, "tumble items", bytes)?;
-            return Ok(singles.write(bytemuck::cast_slice_mut(list), shift)?);
+        if let Some(list) = SampleList::new(clip, timeline, window) {
+            let bytes = list.count() * size_of::<ListedSample>();
+            let place = room(device, &mut self.items, "tumble items", bytes)?;
+            return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
         }
         let lists = work(clip, timeline, window, shift, &mut self.spare)?;
         let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
@@ -210,7 +210,7 @@ impl Slot {
         let all = window.start * rotation..(window.start + window.len()) * rotation;
         let output: &mut [u8] = match target {
             Target::Buffer(buffer) => buffer.bytes_mut(all),
-            Target::Lent(memory) => memory.bytes_mut(all),
+            Target::ImportedMemory(memory) => memory.bytes_mut(all),
             Target::External(_) => &mut [],
             Target::Slice(slice) => {
                 let output = &mut slice[all];

@@ -141,11 +141,11 @@ impl PhysicalDevice {
         let mut controls = vk::PhysicalDeviceFloatControlsProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
-        let mut lent = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
+        let mut imported = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance);
         let borrows = has(ext::external_memory_host::NAME);
         if borrows {
-            all = all.push_next(&mut lent);
+            all = all.push_next(&mut imported);
         }
         if reports_controls {
             all = all.push_next(&mut controls);
@@ -201,7 +201,7 @@ impl PhysicalDevice {
             memory,
             has_int64: features.shader_int64 == vk::TRUE,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
-            lent_alignment: borrows.then_some(lent.min_imported_host_pointer_alignment),
+            lent_alignment: borrows.then_some(imported.min_imported_host_pointer_alignment),
             info,
         }))
     }

@@ -7,7 +7,7 @@ use crate::gpu::engine::{ClipBuffers, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
-use crate::gpu::self_test::CanaryReport;
+use crate::gpu::self_test::SelfTestReport;
 use crate::prepare::clip_data::ClipData;
 
 /// How often a lost device is opened again for one call.
@@ -18,7 +18,7 @@ pub(crate) struct Opened {
     /// Replaced when the device is lost.
     current: RwLock<Arc<VulkanEngine>>,
     options: EngineOptions,
-    pub(crate) canaries: Vec<CanaryReport>,
+    pub(crate) self_tests: Vec<SelfTestReport>,
     pub(crate) info: DeviceInfo,
 }
 
@@ -66,7 +66,7 @@ impl Opened {
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
         Ok(Self {
-            canaries: trust(&engine, options)?,
+            self_tests: trust(&engine, options)?,
             info: engine.info().clone(),
             current: RwLock::new(Arc::new(engine)),
             options: options.clone(),
@@ -155,16 +155,19 @@ impl Opened {
     }
 }
 
-fn trust(engine: &VulkanEngine, options: &EngineOptions) -> Result<Vec<CanaryReport>, VulkanError> {
-    let canaries = engine.canaries()?;
-    let failed = canaries.iter().find(|canary| canary.differing > 0);
-    if let (Some(canary), false) = (failed, options.allow_inexact) {
+fn trust(
+    engine: &VulkanEngine,
+    options: &EngineOptions,
+) -> Result<Vec<SelfTestReport>, VulkanError> {
+    let self_tests = engine.self_tests()?;
+    let failed = self_tests.iter().find(|check| check.differing > 0);
+    if let (Some(check), false) = (failed, options.allow_inexact) {
         return Err(VulkanError::Inexact {
             device: engine.info().name.clone(),
-            canary: canary.name,
-            differing: canary.differing,
-            total: canary.total,
+            check: check.name,
+            differing: check.differing,
+            total: check.total,
         });
     }
-    Ok(canaries)
+    Ok(self_tests)
 }

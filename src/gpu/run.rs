@@ -7,9 +7,9 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::gpu::buffer::Residence;
-use crate::gpu::engine::{Job, SLOTS, VulkanEngine};
+use crate::gpu::engine::{IN_FLIGHT, Job, VulkanEngine};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::{Finish, Slot, Stopwatch, Target};
+use crate::gpu::in_flight::{Finish, InFlight, Stopwatch, Target};
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
@@ -24,13 +24,16 @@ impl VulkanEngine {
         window: &Window,
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = self
+            .in_flight
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         // `self.window()` counts rotations of 16 bytes; of larger ones a window holds fewer.
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
         let cut = |window: &Window| window.cut((self.window() / each).max(1));
         let mut windows = VecDeque::from(cut(window));
-        while slots.len() < SLOTS.min(windows.len()) {
-            slots.push(Slot::new(&self.device)?);
+        while in_flight.len() < IN_FLIGHT.min(windows.len()) {
+            in_flight.push(InFlight::new(&self.device)?);
         }
         let mut next = 0;
         let mut result = Ok(());
@@ -41,14 +44,14 @@ impl VulkanEngine {
                 windows = rest.flat_map(|window| window.within(cut)).collect();
                 continue;
             }
-            next = (next + 1) % slots.len();
-            let slot = &mut slots[next];
-            result = slot
+            next = (next + 1) % in_flight.len();
+            let evaluation = &mut in_flight[next];
+            result = evaluation
                 .finish(job.encoding, &mut target, &mut stopwatch)
                 .map_err(EvaluateError::from)
                 .and_then(|()| {
                     let listing = Instant::now();
-                    let started = self.start(slot, job, window, &target);
+                    let started = self.start(evaluation, job, window, &target);
                     stopwatch.timings.work_lists += listing.elapsed();
                     started
                 });
@@ -57,20 +60,20 @@ impl VulkanEngine {
             }
         }
         // Also after an error: work that was submitted uses the caller's buffers.
-        let oldest_first = slots.len();
+        let oldest_first = in_flight.len();
         for i in 1..=oldest_first {
-            let slot = &mut slots[(next + i) % oldest_first];
-            let finished = slot.finish(job.encoding, &mut target, &mut stopwatch);
+            let evaluation = &mut in_flight[(next + i) % oldest_first];
+            let finished = evaluation.finish(job.encoding, &mut target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
         }
-        if let (Target::Lent(memory), Ok(())) = (&mut target, &result) {
+        if let (Target::ImportedMemory(memory), Ok(())) = (&mut target, &result) {
             memory.has_come_back();
         }
         if stopwatch.is_slow() {
             self.halve_windows(); // those of the next call
         }
         if result.is_err() {
-            slots.clear(); // a fence or a recording may be half way
+            in_flight.clear(); // a fence or a recording may be half way
         }
         *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
@@ -79,7 +82,7 @@ impl VulkanEngine {
     /// Submits one window.
     fn start(
         &self,
-        slot: &mut Slot,
+        evaluation: &mut InFlight,
         job: Job<'_>,
         window: Window,
         target: &Target<'_>,
@@ -99,7 +102,9 @@ impl VulkanEngine {
             .max(1);
         let start = match target {
             Target::Buffer(_) => window.start as u64 * rotation,
-            Target::Lent(memory) => memory.start() as u64 + window.start as u64 * rotation,
+            Target::ImportedMemory(memory) => {
+                memory.start() as u64 + window.start as u64 * rotation
+            }
             Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
             Target::Slice(_) => 0,
         };
@@ -110,20 +115,20 @@ impl VulkanEngine {
         }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let work = slot.list(&self.device, clip, timeline, &window, shift as u32)?;
+        let work = evaluation.list(&self.device, clip, timeline, &window, shift as u32)?;
 
         let staged_items = !self.in_place;
         if staged_items {
-            Slot::grow(
+            InFlight::grow(
                 &self.device,
-                &mut slot.device_items,
-                slot.items.size(),
+                &mut evaluation.device_items,
+                evaluation.items.size(),
                 Residence::Device,
             )?;
-            let size = slot.distances.size();
-            Slot::grow(
+            let size = evaluation.distances.size();
+            InFlight::grow(
                 &self.device,
-                &mut slot.device_distances,
+                &mut evaluation.device_distances,
                 size,
                 Residence::Device,
             )?;
@@ -134,31 +139,40 @@ impl VulkanEngine {
             } else {
                 Residence::Device
             };
-            Slot::grow(&self.device, &mut slot.rotations, size, residence)?;
+            InFlight::grow(&self.device, &mut evaluation.rotations, size, residence)?;
             if !self.in_place {
-                Slot::grow(&self.device, &mut slot.readback, size, Residence::Readback)?;
+                InFlight::grow(
+                    &self.device,
+                    &mut evaluation.readback,
+                    size,
+                    Residence::Readback,
+                )?;
             }
         }
-        slot.submission.begin(work.groups.len() as u32)?;
-        let (mut items, mut distances) = (&slot.items, &slot.distances);
-        if let (Some(own_items), Some(own_distances)) = (&slot.device_items, &slot.device_distances)
+        evaluation.submission.begin(work.groups.len() as u32)?;
+        let (mut items, mut distances) = (&evaluation.items, &evaluation.distances);
+        if let (Some(own_items), Some(own_distances)) =
+            (&evaluation.device_items, &evaluation.device_distances)
         {
-            slot.submission.copy(items, own_items, 0, items.size());
-            slot.submission
+            evaluation
+                .submission
+                .copy(items, own_items, 0, items.size());
+            evaluation
+                .submission
                 .copy(distances, own_distances, 0, distances.size());
-            slot.submission.barrier(Access::Copy, Access::Kernel);
+            evaluation.submission.barrier(Access::Copy, Access::Kernel);
             (items, distances) = (own_items, own_distances);
         }
-        let rotations = match (target, &slot.rotations) {
+        let rotations = match (target, &evaluation.rotations) {
             (Target::Buffer(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
-            (Target::Lent(memory), _) => Binding::stretch(memory.raw(), aligned, size),
+            (Target::ImportedMemory(memory), _) => Binding::stretch(memory.raw(), aligned, size),
             (Target::External(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
             (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let form = clip.interpolation.form();
         let pipeline = self.pipeline(Kernel::over_segments(form, work.list, encoding.store()))?;
-        slot.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
+        evaluation.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
         for own in work.groups {
             let item_count = own.items;
@@ -183,7 +197,7 @@ impl VulkanEngine {
                 first_output: own.first_output,
             };
             let groups = self.workgroups(item_count);
-            slot.submission.dispatch(
+            evaluation.submission.dispatch(
                 &pipeline,
                 &bindings,
                 bytemuck::bytes_of(&dispatch),
@@ -192,28 +206,28 @@ impl VulkanEngine {
             first_item += item_count;
         }
         let mut patches = work.patches;
-        match (target, &slot.rotations, &slot.readback) {
+        match (target, &evaluation.rotations, &evaluation.readback) {
             (Target::Slice(_), Some(rotations), Some(readback)) => {
-                slot.submission.barrier(Access::Kernel, Access::Copy);
-                slot.submission.copy(rotations, readback, 0, size);
-                slot.submission.barrier(Access::Copy, Access::Host);
+                evaluation.submission.barrier(Access::Kernel, Access::Copy);
+                evaluation.submission.copy(rotations, readback, 0, size);
+                evaluation.submission.barrier(Access::Copy, Access::Host);
             }
             (Target::External(buffer), ..) => {
-                slot.submission.barrier(Access::Kernel, Access::Copy);
+                evaluation.submission.barrier(Access::Kernel, Access::Copy);
                 let mut bytes = [0; Encoding::MOST_BYTES];
                 let bytes = &mut bytes[..encoding.bytes()];
                 for (place, value) in patches.drain(..) {
                     encoding.encode(&[value], bytes);
                     let offset = start + place as u64 * rotation;
-                    slot.submission.update(buffer.raw, offset, bytes);
+                    evaluation.submission.update(buffer.raw, offset, bytes);
                 }
-                slot.submission.barrier(Access::Kernel, Access::Any);
-                slot.submission.barrier(Access::Copy, Access::Any);
+                evaluation.submission.barrier(Access::Kernel, Access::Any);
+                evaluation.submission.barrier(Access::Copy, Access::Any);
             }
-            _ => slot.submission.barrier(Access::Kernel, Access::Host),
+            _ => evaluation.submission.barrier(Access::Kernel, Access::Host),
         }
-        slot.submission.submit()?;
-        slot.done = Some(Finish { window, patches });
+        evaluation.submission.submit()?;
+        evaluation.done = Some(Finish { window, patches });
         Ok(())
     }
 

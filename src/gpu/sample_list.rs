@@ -24,7 +24,7 @@ use crate::time::times::TimeLanes;
 use crate::time::wrap::TrackCopy;
 
 /// A window whose samples are listed one by one.
-pub(crate) struct Singles<'a> {
+pub(crate) struct SampleList<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
     /// The parts of each group that has any in the window, in the order of their samples.
@@ -39,7 +39,7 @@ struct GroupParts<'a> {
     first: usize,
 }
 
-impl<'a> Singles<'a> {
+impl<'a> SampleList<'a> {
     /// `None` for a window whose work is listed by runs.
     pub(crate) fn new(
         clip: &'a ClipData,
@@ -118,7 +118,7 @@ impl<'a> Singles<'a> {
     /// Writes the list; `shift` is added to every place in the output.
     pub(crate) fn write(
         &self,
-        mut singles: &mut [ListedSample],
+        mut list: &mut [ListedSample],
         shift: u32,
     ) -> Result<Work, FramesError> {
         let mut pieces = Vec::new();
@@ -139,14 +139,14 @@ impl<'a> Singles<'a> {
                     None => end,
                 };
                 let next = next.min(end);
-                let (own_singles, other_singles) = singles.split_at_mut(next - first);
-                singles = other_singles;
+                let (own_list, other_list) = list.split_at_mut(next - first);
+                list = other_list;
                 pieces.push(Piece {
                     all: self,
                     prepared: own.prepared,
                     parts,
                     first,
-                    singles: own_singles,
+                    list: own_list,
                     told: 0,
                     patches: Vec::new(),
                     result: Ok(()),
@@ -175,12 +175,12 @@ impl<'a> Singles<'a> {
 
 /// The piece of the list that one thread writes.
 struct Piece<'a> {
-    all: &'a Singles<'a>,
+    all: &'a SampleList<'a>,
     prepared: &'a Prepared,
     parts: &'a [Part],
     /// The place of its first sample in the window.
     first: usize,
-    singles: &'a mut [ListedSample],
+    list: &'a mut [ListedSample],
     /// How many of them are written.
     told: usize,
     patches: Vec<Patch>,
@@ -190,7 +190,7 @@ struct Piece<'a> {
 impl InLanes for Piece<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let Singles {
+        let SampleList {
             timeline, window, ..
         } = *self.all;
         let (prepared, samples) = (self.prepared, window.samples.clone());
@@ -211,7 +211,7 @@ impl InLanes for Piece<'_> {
                 return;
             }
         }
-        self.singles[self.told..].fill(NOTHING);
+        self.list[self.told..].fill(NOTHING);
     }
 }
 
@@ -243,25 +243,25 @@ impl Piece<'_> {
     /// Lists the samples of a run that belong to this piece and are not listed yet.
     #[inline(always)]
     fn tell(&mut self, track: usize, run: Run) {
-        let Singles {
+        let SampleList {
             timeline, window, ..
         } = *self.all;
         let place = window.place(track, run.sample);
         // A sample within rounding of the boundary between two parts may come from both: the first
         // one counts.
         let skipped = (self.first + self.told).saturating_sub(place);
-        let from = (place + skipped - self.first).min(self.singles.len());
+        let from = (place + skipped - self.first).min(self.list.len());
         let to = (place + run.count)
             .saturating_sub(self.first)
-            .min(self.singles.len());
+            .min(self.list.len());
         if from >= to {
             return;
         }
         if self.told < from {
-            self.singles[self.told..from].fill(NOTHING);
+            self.list[self.told..from].fill(NOTHING);
         }
         self.told = to;
-        let own = &mut self.singles[from..to];
+        let own = &mut self.list[from..to];
         let first_sample = run.sample + skipped;
         match run.source {
             RunSource::Constant(constant) => own.fill(held(constant)),
@@ -315,7 +315,7 @@ impl Piece<'_> {
                 }
             }
             let parameters = found.parameters();
-            let own = &mut self.singles[self.told..][..found.count];
+            let own = &mut self.list[self.told..][..found.count];
             for (lane, single) in own.iter_mut().enumerate() {
                 *single = ListedSample {
                     source: found.sources[lane],

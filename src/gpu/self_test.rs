@@ -32,7 +32,7 @@ use crate::twin::self_test::reply;
 /// How a device did on one canary, a check of the self-test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct CanaryReport {
+pub struct SelfTestReport {
     /// What it looks for.
     pub name: &'static str,
     /// Results compared.
@@ -42,7 +42,7 @@ pub struct CanaryReport {
 }
 
 /// Runs every canary on a device.
-pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanError> {
+pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
     let mut reports = expressions(engine.device(), Exactness::Demanded)?;
     for (name, method) in [
         ("arc kernel", SLERP),
@@ -56,7 +56,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<CanaryReport>, VulkanErro
         let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
         let cpu = CpuEngine::on_shared_threads(VectorWidth::Baseline);
         let buffers = engine.upload(&clip, None)?;
-        let mut report = CanaryReport {
+        let mut report = SelfTestReport {
             name,
             total: 0,
             differing: 0,
@@ -121,7 +121,7 @@ type Value = fn(&Reply) -> f32;
 fn expressions(
     device: &Arc<LogicalDevice>,
     exactness: Exactness,
-) -> Result<Vec<CanaryReport>, VulkanError> {
+) -> Result<Vec<SelfTestReport>, VulkanError> {
     let probes = probes();
     let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
     let reply_bytes = probes.len() * size_of::<Reply>();
@@ -161,7 +161,7 @@ fn expressions(
     submission.wait()?;
     let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
 
-    let canaries: [(&str, Value); 10] = [
+    let self_tests: [(&str, Value); 10] = [
         ("contraction", |reply| reply.contraction),
         ("re-association of a sum", |reply| reply.reassociation),
         ("rounding to nearest even", |reply| reply.rounding),
@@ -180,9 +180,9 @@ fn expressions(
             .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
             .count()
     };
-    Ok(canaries
+    Ok(self_tests
         .into_iter()
-        .map(|(name, value)| CanaryReport {
+        .map(|(name, value)| SelfTestReport {
             name,
             total: probes.len(),
             differing: count(value),

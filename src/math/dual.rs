@@ -129,13 +129,13 @@ impl<R: Real> Scalar for Near<R> {
 
 /// A dual number of the second order: a value with its first and second derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Jet {
+pub(crate) struct Dual {
     pub(crate) value: f64,
     pub(crate) first: f64,
     pub(crate) second: f64,
 }
 
-impl Jet {
+impl Dual {
     /// The parameter itself, whose first derivative is 1.
     pub(crate) fn parameter(value: f64) -> Self {
         Self {
@@ -155,7 +155,7 @@ impl Jet {
     }
 }
 
-impl Add for Jet {
+impl Add for Dual {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self {
@@ -166,7 +166,7 @@ impl Add for Jet {
     }
 }
 
-impl Sub for Jet {
+impl Sub for Dual {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         Self {
@@ -177,7 +177,7 @@ impl Sub for Jet {
     }
 }
 
-impl Mul for Jet {
+impl Mul for Dual {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let both = self.first * other.first;
@@ -200,7 +200,7 @@ fn series(coefficients: &[f64], x: f64) -> [f64; 3] {
     sums
 }
 
-impl Scalar for Jet {
+impl Scalar for Dual {
     type Constant = f64;
 
     fn constant(value: f64) -> Self {
@@ -270,12 +270,12 @@ mod tests {
     /// Catches a wrong derivative, and a series that is used too far from 0.
     #[test]
     fn derivatives_are_those_of_the_values() {
-        type Function = (fn(Jet) -> Jet, fn(f64) -> f64);
+        type Function = (fn(Dual) -> Dual, fn(f64) -> f64);
         let functions: [Function; 4] = [
             (|x| x.waves().0, |x| x.waves().0),
             (|x| x.waves().1, |x| x.waves().1),
-            (Jet::arc_square, f64::arc_square),
-            (Jet::reciprocal_root, f64::reciprocal_root),
+            (Dual::arc_square, f64::arc_square),
+            (Dual::reciprocal_root, f64::reciprocal_root),
         ];
         for (place, (of_jet, of_number)) in functions.into_iter().enumerate() {
             for i in 1..99 {
@@ -285,19 +285,22 @@ mod tests {
                 let first = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
                 let second = (16.0 * (at(1.0) + at(-1.0)) - (at(2.0) + at(-2.0)) - 30.0 * at(0.0))
                     / (12.0 * h * h);
-                let jet = of_jet(Jet::parameter(x));
-                assert_eq!(jet.value, of_number(x));
+                let dual = of_jet(Dual::parameter(x));
+                assert_eq!(dual.value, of_number(x));
                 let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within * (1.0 + a.abs());
-                assert!(near(jet.first, first, 1e-9), "{place} {x} {jet:?} {first}");
+                assert!(
+                    near(dual.first, first, 1e-9),
+                    "{place} {x} {dual:?} {first}"
+                );
                 let within = 1e-15 / (h * h) + 1e-8;
                 assert!(
-                    near(jet.second, second, within),
-                    "{place} {x} {jet:?} {second}"
+                    near(dual.second, second, within),
+                    "{place} {x} {dual:?} {second}"
                 );
             }
         }
-        let still = Jet::constant(0.0);
+        let still = Dual::constant(0.0);
         assert_eq!(still.waves().0.value, 1.0);
-        assert_eq!(Jet::parameter(0.0).arc_square().first, 4.0);
+        assert_eq!(Dual::parameter(0.0).arc_square().first, 4.0);
     }
 }

@@ -7,8 +7,8 @@ use crate::math::quaternion::{
     Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled, square,
 };
 
-/// The exponentials and logarithms that a method's rule is made of. There are two: [`Near`] for the
-/// principal range, in vector lanes, and [`Anywhere`] for the full range, for single lanes outside
+/// The exponentials and logarithms that a method's rule is made of. There are two: [`PrincipalRange`] for the
+/// principal range, in vector lanes, and [`FullRange`] for the full range, for single lanes outside
 /// it. So a lane's result depends on nothing but its own numbers.
 pub(crate) trait Algebra {
     /// f64, or a vector of them.
@@ -21,7 +21,7 @@ pub(crate) trait Algebra {
     fn log_toward(&mut self, q: [Self::Number; 4], axis: [Self::Number; 3]) -> [Self::Number; 3];
     /// See [`log_near`].
     fn log_near(&mut self, q: [Self::Number; 4], near: [Self::Number; 3]) -> [Self::Number; 3];
-    /// The logarithm of a step between keys; `near` is the one that [`Near`] gave.
+    /// The logarithm of a step between keys; `near` is the one that [`PrincipalRange`] gave.
     fn log_of_step(
         &mut self,
         step: [Self::Number; 4],
@@ -30,9 +30,9 @@ pub(crate) trait Algebra {
 }
 
 /// The full range, at the price of square roots, divisions and range reductions.
-pub(crate) struct Anywhere;
+pub(crate) struct FullRange;
 
-impl Algebra for Anywhere {
+impl Algebra for FullRange {
     type Number = f64;
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl Algebra for Anywhere {
 }
 
 /// The principal range: half-angles up to pi/2, by polynomials alone, within 1e-12.
-pub(crate) struct Near<R> {
+pub(crate) struct PrincipalRange<R> {
     /// 0 as long as every argument was in the principal range, else 1.
     pub(crate) doubt: R,
 }
@@ -237,7 +237,7 @@ fn near_or_nan<R: Real>(value: R, limit: f64) -> R {
     value.up_to(R::all(limit), R::all(0.0), R::all(f64::NAN))
 }
 
-impl<R: Real> Near<R> {
+impl<R: Real> PrincipalRange<R> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self { doubt: R::all(0.0) }
@@ -250,7 +250,7 @@ impl<R: Real> Near<R> {
     }
 }
 
-impl<R: Real> Algebra for Near<R> {
+impl<R: Real> Algebra for PrincipalRange<R> {
     type Number = R;
 
     #[inline(always)]
@@ -334,12 +334,12 @@ mod tests {
 
     /// Catches a wrong digit in a polynomial, and one used beyond its range.
     #[test]
-    fn near_is_anywhere_or_says_that_it_does_not_hold() {
+    fn principal_range_is_full_range_or_says_that_it_does_not_hold() {
         let direction = scaled([1.0, 2.0, -2.0], 1.0 / 3.0);
         for i in 0..=20_000 {
             let angle = f64::from(i) * 1e-4;
             let a = scaled(direction, angle);
-            let mut near = Near::new();
+            let mut near = PrincipalRange::new();
             let (q, back) = (near.exp(a), near.log(exp(a)));
             assert_eq!(near.doubt == 0.0, angle <= FRAC_PI_2, "{angle}");
             if near.doubt == 0.0 {
@@ -349,7 +349,7 @@ mod tests {
                 assert!(error <= 1e-12 * angle, "{angle}: {error}");
             }
         }
-        let mut near = Near::new();
+        let mut near = PrincipalRange::new();
         near.exp([f64::NAN; 3]);
         near.exp([0.0; 3]);
         assert_eq!(near.doubt, 1.0);

@@ -35,7 +35,7 @@ pub const B_SPLINE: Method = Method {
         key: 220.0,
         rotation: 3.0,
     },
-    reference: reference::Kind::BSpline,
+    reference: reference::b_spline::B_SPLINE,
     curves: &CURVES,
 };
 

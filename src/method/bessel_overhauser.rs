@@ -31,7 +31,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
         key: 210.0,
         rotation: 2.8,
     },
-    reference: reference::Kind::BesselOverhauser,
+    reference: reference::handles::BESSEL_OVERHAUSER,
     curves: &CURVES,
 };
 

@@ -32,7 +32,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
         key: 840.0,
         rotation: 3.2,
     },
-    reference: reference::Kind::BesselOverhauserMean,
+    reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
     curves: &CURVES,
 };
 

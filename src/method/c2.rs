@@ -43,7 +43,7 @@ pub const C2: Method = Method {
         key: 1100.0,
         rotation: 3.2,
     },
-    reference: reference::Kind::C2,
+    reference: reference::c2::C2,
     curves: &CURVES,
 };
 
@@ -67,7 +67,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let third = sum(both, scaled(log, -2.0));
         intervals.set_numbers(lane, 0, &intervals.key(lane));
         intervals.set_numbers(lane, 4, [start, second, third].as_flattened());
-        intervals.set_energy(lane, [start, second, third]);
+        intervals.set_squared_extent(lane, [start, second, third]);
     }
 }
 

@@ -31,7 +31,7 @@ pub const CATMULL_ROM: Method = Method {
         key: 150.0,
         rotation: 2.6,
     },
-    reference: reference::Kind::CatmullRom,
+    reference: reference::handles::CATMULL_ROM,
     curves: &CURVES,
 };
 

@@ -32,7 +32,7 @@ pub const GLTF_CUBIC: Method = Method {
         key: 350.0,
         rotation: 3.8,
     },
-    reference: reference::Kind::GltfCubic,
+    reference: reference::given::GLTF_CUBIC,
     curves: &CURVES,
 };
 
@@ -62,7 +62,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         // the quaternion's length.
         let log = intervals.log(lane);
         let across = [cross3(start, outgoing), log, cross3(end, incoming)];
-        intervals.set_energy(lane, across);
+        intervals.set_squared_extent(lane, across);
     }
 }
 

@@ -33,7 +33,7 @@ pub const HERMITE: Method = Method {
         key: 160.0,
         rotation: 2.8,
     },
-    reference: reference::Kind::Hermite,
+    reference: reference::given::HERMITE,
     curves: &CURVES,
 };
 

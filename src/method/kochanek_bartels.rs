@@ -34,7 +34,7 @@ pub const KOCHANEK_BARTELS: Method = Method {
         key: 860.0,
         rotation: 3.2,
     },
-    reference: reference::Kind::KochanekBartels,
+    reference: reference::handles::KOCHANEK_BARTELS,
     curves: &CURVES,
 };
 

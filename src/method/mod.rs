@@ -49,10 +49,10 @@ use std::str::FromStr;
 use crate::fit::double::handles::HandleRule;
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::fit::single::long_tangents::FarKeys;
+use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
-use crate::reference;
+use crate::reference::curve::Definition;
 use crate::shader::Form;
 use crate::tracks::set::Track;
 
@@ -115,7 +115,7 @@ pub struct Method {
     /// Its cost on one thread.
     pub cost: Cost,
     /// Its textbook definition in f64.
-    pub reference: reference::Kind,
+    pub reference: Definition,
     /// How its curves follow from the keys. This is a reference to a static because every crate
     /// that names a constant would compile its functions again, and all that they call, for each
     /// vector width.
@@ -152,7 +152,7 @@ pub(crate) struct FromKeys {
     /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
     /// Finds, in f64, the handles of keys whose tangents are too long for f32's formulas.
-    pub(crate) find_far: fn(&mut FarKeys),
+    pub(crate) find_long: fn(&mut LongTangents),
 }
 
 /// The numbers that a method has for an interval beside its keys.
@@ -181,7 +181,7 @@ impl Smooth {
         Self {
             direct: Some(FromKeys {
                 weights,
-                find_far: FarKeys::find::<R>,
+                find_long: LongTangents::find::<R>,
             }),
             ..self
         }

@@ -29,7 +29,7 @@ pub const NLERP: Method = Method {
         key: 150.0,
         rotation: 2.8,
     },
-    reference: reference::Kind::Nlerp,
+    reference: reference::given::NLERP,
     curves: &CURVES,
 };
 

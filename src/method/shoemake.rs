@@ -30,7 +30,7 @@ pub const SHOEMAKE: Method = Method {
         key: 1500.0,
         rotation: 4.1,
     },
-    reference: reference::Kind::Shoemake,
+    reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
 };
 

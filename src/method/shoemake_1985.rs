@@ -27,7 +27,7 @@ pub const SHOEMAKE_1985: Method = Method {
         key: 530.0,
         rotation: 2.8,
     },
-    reference: reference::Kind::Shoemake1985,
+    reference: reference::handles::SHOEMAKE_1985,
     curves: &CURVES,
 };
 

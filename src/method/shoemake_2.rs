@@ -28,7 +28,7 @@ pub const SHOEMAKE_2: Method = Method {
         key: 700.0,
         rotation: 3.1,
     },
-    reference: reference::Kind::Shoemake2,
+    reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
 };
 

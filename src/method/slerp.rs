@@ -26,7 +26,7 @@ pub const SLERP: Method = Method {
         key: 10.0,
         rotation: 1.7,
     },
-    reference: reference::Kind::Slerp,
+    reference: reference::given::SLERP,
     curves: &CURVES,
 };
 
@@ -38,6 +38,6 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let log = intervals.log(lane);
         intervals.set_numbers(lane, 0, &intervals.key(lane));
         intervals.set_numbers(lane, 4, &log);
-        intervals.set_energy(lane, [log, [0.0; 3], [0.0; 3]]);
+        intervals.set_squared_extent(lane, [log, [0.0; 3], [0.0; 3]]);
     }
 }

@@ -28,7 +28,7 @@ pub const SQUAD: Method = Method {
         key: 300.0,
         rotation: 2.9,
     },
-    reference: reference::Kind::Squad,
+    reference: reference::handles::SQUAD,
     curves: &CURVES,
 };
 

@@ -24,7 +24,7 @@ pub const STEP: Method = Method {
         key: 3.4,
         rotation: 0.87,
     },
-    reference: reference::Kind::Step,
+    reference: reference::given::STEP,
     curves: &CURVES,
 };
 

@@ -8,12 +8,12 @@ use crate::curve::options::Ends;
 use crate::fit::double::handles::Steps;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
-use crate::fit::single::handles::{FindCurves, FindHandles, LONGEST_DIRECT, WholeLanes};
+use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
 use crate::fit::single::hermite_fit::Halves;
 use crate::fit::single::key_steps::{FindSteps, KeySteps};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::FarKeys;
-use crate::fit::single::small_angle::GentleLanes;
+use crate::fit::single::long_tangents::LongTangents;
+use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
@@ -32,8 +32,8 @@ const SPANS: usize = 2 * LANES;
 pub(crate) struct Direct {
     steps: KeySteps,
     weights: KeyWeights,
-    gentle: GentleLanes,
-    whole: WholeLanes,
+    small_angle: SmallAngleLanes,
+    whole: HandlesF32,
     /// The span and the segment that each lane becomes; the first of the two if it is cut.
     spans: [u32; ROOM],
     places: [u32; ROOM],
@@ -56,7 +56,7 @@ pub(crate) struct Direct {
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
-    find_far: fn(&mut FarKeys),
+    find_long: fn(&mut LongTangents),
     smooth: Smooth,
     ends: Ends,
 }
@@ -66,8 +66,8 @@ impl Direct {
         Self {
             steps: KeySteps::new(),
             weights: KeyWeights::new(how.weights, ends),
-            gentle: GentleLanes::new(),
-            whole: WholeLanes::new(),
+            small_angle: SmallAngleLanes::new(),
+            whole: HandlesF32::new(),
             spans: [0; ROOM],
             places: [0; ROOM],
             usual: List::new(),
@@ -79,7 +79,7 @@ impl Direct {
             keys: [NONE; SPANS],
             left_over: List::new(),
             rest: None,
-            find_far: how.find_far,
+            find_long: how.find_long,
             smooth,
             ends,
         }
@@ -92,17 +92,17 @@ impl Direct {
             intervals,
         });
         self.weights.bring(intervals, stretches);
-        self.gentle.look(&self.steps, stretches);
-        if self.gentle.may_hold() {
-            (self.gentle).prepare(intervals, &self.weights, stretches);
+        self.small_angle.look(&self.steps, stretches);
+        if self.small_angle.may_hold() {
+            (self.small_angle).prepare(intervals, &self.weights, stretches);
         }
-        self.whole.wanted = self.gentle.holds.map(|is_gentle| !is_gentle);
+        self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
         in_lanes(&mut FindHandles {
             lanes: &mut self.whole,
             steps: &self.steps,
             weights: &self.weights,
             intervals,
-            find_far: self.find_far,
+            find_long: self.find_long,
         });
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
@@ -121,18 +121,18 @@ impl Direct {
         lanes: Range<usize>,
         key: u32,
     ) {
-        if self.gentle.may_hold() {
-            for lane in lanes.clone().filter(|&lane| self.gentle.holds[lane]) {
+        if self.small_angle.may_hold() {
+            for lane in lanes.clone().filter(|&lane| self.small_angle.holds[lane]) {
                 // A negative squared extent puts the lane on no list.
                 self.whole.energies[lane] = -1.0;
             }
         }
         self.list(lanes.clone());
         self.begin(prepared, intervals, lanes.clone(), key);
-        if self.gentle.may_hold() {
-            for lane in lanes.filter(|&lane| self.gentle.holds[lane]) {
+        if self.small_angle.may_hold() {
+            for lane in lanes.filter(|&lane| self.small_angle.holds[lane]) {
                 let place = self.places[lane] as usize;
-                self.gentle
+                self.small_angle
                     .write(lane, &mut prepared.segments.polynomials[place]);
             }
         }
@@ -143,19 +143,19 @@ impl Direct {
         let energies = &self.whole.energies[lanes.clone()];
         let [few, whole, direct] =
             [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
-        let is_usual = |energy: f32| energy > few && energy <= whole;
+        let is_usual = |squared_extent: f32| squared_extent > few && squared_extent <= whole;
         (self.usual).push_where(lanes.clone(), energies, is_usual);
-        let takes_few = |energy: f32| energy >= 0.0 && energy <= few;
+        let takes_few = |squared_extent: f32| squared_extent >= 0.0 && squared_extent <= few;
         (self.few_powers.lanes).push_where(lanes.clone(), energies, takes_few);
-        let is_cut = |energy: f32| energy > whole && energy <= direct;
-        for (cut, &energy) in self.cut[lanes.clone()].iter_mut().zip(energies) {
-            *cut = u32::from(is_cut(energy));
+        let is_cut = |squared_extent: f32| squared_extent > whole && squared_extent <= direct;
+        for (cut, &squared_extent) in self.cut[lanes.clone()].iter_mut().zip(energies) {
+            *cut = u32::from(is_cut(squared_extent));
         }
-        let is_long = |energy: f32| energy > whole || energy.is_nan();
+        let is_long = |squared_extent: f32| squared_extent > whole || squared_extent.is_nan();
         (self.long).push_where(lanes.clone(), energies, is_long);
         for lane in self.long.iter() {
-            let energy = self.whole.energies[lane];
-            if energy <= direct {
+            let squared_extent = self.whole.energies[lane];
+            if squared_extent <= direct {
                 self.halves.lanes.push(lane);
             } else {
                 self.left_over.push(lane);

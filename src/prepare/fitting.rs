@@ -22,7 +22,7 @@ use crate::time::spans::{NONE, Part, Source, Spans};
 pub(crate) struct Fitting {
     shape: &'static Shape,
     quantity: Quantity,
-    gentle: Queue,
+    small_angle: Queue,
     full: Queue,
     /// Made for the first track of two keys.
     steady: Option<Box<SteadyBlock>>,
@@ -58,7 +58,7 @@ impl Fitting {
         Self {
             shape,
             quantity,
-            gentle: Queue::new(Tier::Gentle),
+            small_angle: Queue::new(Tier::SmallAngle),
             full: Queue::new(Tier::Full),
             steady: None,
             cutter: Cutter::new(shape, quantity),
@@ -94,7 +94,7 @@ impl Fitting {
         span: usize,
     ) {
         let queue = match tier(curves.energies[lane]) {
-            Tier::Gentle => &mut self.gentle,
+            Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {
                 let curve = curves.curve(lane, self.shape, self.quantity);
@@ -110,7 +110,7 @@ impl Fitting {
 
     /// Copies the curves that were taken into blocks, and fits the blocks that are full.
     pub(crate) fn bring(&mut self, prepared: &mut Prepared, curves: &Intervals) {
-        for queue in [&mut self.gentle, &mut self.full] {
+        for queue in [&mut self.small_angle, &mut self.full] {
             let mut lanes = &queue.lanes[..];
             while !lanes.is_empty() {
                 let new = || Box::new(FitBlock::new(self.shape, self.quantity, queue.tier));
@@ -149,7 +149,7 @@ impl Fitting {
     /// Fits the curves that still wait, and replaces the spans of cut curves by those of their
     /// parts.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
-        for queue in [&mut self.gentle, &mut self.full] {
+        for queue in [&mut self.small_angle, &mut self.full] {
             if let Some(block) = &mut queue.block {
                 run(block, &mut queue.spans, &mut self.cutter, prepared);
             }

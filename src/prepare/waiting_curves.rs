@@ -48,9 +48,9 @@ impl List {
         is_wanted: impl Fn(f32) -> bool,
     ) {
         let mut count = self.count;
-        for (lane, &energy) in lanes.zip(energies) {
+        for (lane, &squared_extent) in lanes.zip(energies) {
             self.lanes[count % ROOM_FOR] = lane as u32;
-            count += usize::from(is_wanted(energy));
+            count += usize::from(is_wanted(squared_extent));
         }
         self.count = count;
     }

@@ -3,11 +3,17 @@
 use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
+use crate::reference::curve::Definition;
+use crate::reference::given::with_frozen_ends;
 use crate::reference::quaternion::{exponential, invert, logarithm, multiply, vector};
 use crate::reference::segment::{Basis, Segment};
-use crate::reference::tangents::Track;
+use crate::reference::track::Track;
 
-pub(crate) fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
+/// The cumulative cubic B-spline.
+pub(crate) const B_SPLINE: Definition =
+    Definition::new(|track, ends| with_frozen_ends(track, ends, |i| b_spline(track, ends, i)));
+
+fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
     let basis = Basis::Knots(knots(track, ends, i));

@@ -4,12 +4,20 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::curve::options::Ends;
+use crate::reference::curve::Definition;
+use crate::reference::given::smooth;
 use crate::reference::quaternion::{exponential, from_parts, invert, logarithm, multiply, vector};
 use crate::reference::segment::Segment;
-use crate::reference::tangents::Track;
+use crate::reference::track::Track;
+
+/// Cubic rotation vectors with continuous angular acceleration.
+pub(crate) const C2: Definition = Definition::new(|track, ends| {
+    let velocities = velocities(track, ends);
+    smooth(track, ends, |i| segment(track, &velocities, i))
+});
 
 /// The curve of interval `i`, given the angular velocity at every key.
-pub(crate) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
+fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
     let powers = Interval::new(track, i).cubic(velocities, i).powers;
     Segment::RotationVector {
         base: track.keys[i],
@@ -20,7 +28,7 @@ pub(crate) fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment 
 /// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
 /// continuous. Each in turn is changed so that it is continuous at its key, until nothing changes
 /// any more.
-pub(crate) fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
+fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
     let secant = |i: usize| 2.0 * logarithm(track.difference(i)) / track.step(i);
     let mut velocities: Vec<DVec3> = (0..=last)

@@ -7,13 +7,15 @@
 pub(crate) mod b_spline;
 pub(crate) mod c2;
 pub(crate) mod curve;
+pub(crate) mod given;
+pub(crate) mod handles;
 pub(crate) mod pace;
 pub(crate) mod quaternion;
 pub(crate) mod segment;
-pub(crate) mod tangents;
+pub(crate) mod track;
 pub(crate) mod vector;
 
-pub use crate::reference::curve::{Curve, Kind};
+pub use crate::reference::curve::{Curve, Definition};
 pub use crate::reference::quaternion::{
     angle_between, nlerp, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left, squad,

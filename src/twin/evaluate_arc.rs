@@ -57,12 +57,12 @@ impl Evaluate for ArcSegment {
         parameters: &mut impl Parameters<L>,
     ) -> (Begun<L>, [L; 4]) {
         let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
-        let (sine, fall) = if FAR {
+        let (sine, cosine_minus_one) = if FAR {
             begun.turn
         } else {
             quarter_halves(begun.parameter, begun.z).sine_cosm1()
         };
-        let (s, f) = (sine.fourfold(), fall.fourfold());
+        let (s, f) = (sine.fourfold(), cosine_minus_one.fourfold());
         // Written out: closures are not always inlined.
         let mut quarters = [
             turned(middle, tangent, s[0], f[0]),
@@ -85,9 +85,14 @@ impl Evaluate for ArcSegment {
     #[inline(always)]
     fn at(&self, parameter: f32) -> Vec4 {
         let z = parameter * parameter * self.constant();
-        let (sine, fall) = sine_cosm1_quarter(parameter, z);
-        let (sine, fall) = (Vec4::splat(sine), Vec4::splat(fall));
-        turned(self.middle.into(), self.tangent.into(), sine, fall)
+        let (sine, cosine_minus_one) = sine_cosm1_quarter(parameter, z);
+        let (sine, cosine_minus_one) = (Vec4::splat(sine), Vec4::splat(cosine_minus_one));
+        turned(
+            self.middle.into(),
+            self.tangent.into(),
+            sine,
+            cosine_minus_one,
+        )
     }
 
     #[inline(always)]
@@ -148,18 +153,18 @@ pub(crate) fn on_arc<N: Number>(
     parameter: N,
 ) -> [N; 4] {
     let z = parameter * parameter * square;
-    let (sine, fall) = sine_cosm1_quarter(parameter, z);
+    let (sine, cosine_minus_one) = sine_cosm1_quarter(parameter, z);
     [
-        turned(middle[0], tangent[0], sine, fall),
-        turned(middle[1], tangent[1], sine, fall),
-        turned(middle[2], tangent[2], sine, fall),
-        turned(middle[3], tangent[3], sine, fall),
+        turned(middle[0], tangent[0], sine, cosine_minus_one),
+        turned(middle[1], tangent[1], sine, cosine_minus_one),
+        turned(middle[2], tangent[2], sine, cosine_minus_one),
+        turned(middle[3], tangent[3], sine, cosine_minus_one),
     ]
 }
 
 #[inline(always)]
-fn turned<N: Number>(middle: N, tangent: N, sine: N, fall: N) -> N {
-    middle + (middle * fall + tangent * sine)
+fn turned<N: Number>(middle: N, tangent: N, sine: N, cosine_minus_one: N) -> N {
+    middle + (middle * cosine_minus_one + tangent * sine)
 }
 
 #[inline(always)]

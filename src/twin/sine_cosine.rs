@@ -10,8 +10,8 @@ use crate::simd::lanes::Number;
 /// Sine and cosine for |angle| <= pi/2.
 #[inline(always)]
 pub(crate) fn sine_cosine(angle: f32) -> (f32, f32) {
-    let (sine, fall) = sine_cosm1(angle, angle * angle);
-    (sine, fall + 1.0)
+    let (sine, cosine_minus_one) = sine_cosm1(angle, angle * angle);
+    (sine, cosine_minus_one + 1.0)
 }
 
 /// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2 that is given by its square `z`. With
@@ -76,8 +76,8 @@ mod tests {
     #[test]
     fn sine_and_cosine_are_as_accurate_as_stated() {
         let short: fn(f32) -> (f32, f32) = |angle| {
-            let (sine, fall) = sine_cosm1_quarter(angle, angle * angle);
-            (sine, fall + 1.0)
+            let (sine, cosine_minus_one) = sine_cosm1_quarter(angle, angle * angle);
+            (sine, cosine_minus_one + 1.0)
         };
         for (range, bound, pair) in [(FRAC_PI_4, 7e-8, short), (FRAC_PI_2, 1.2e-7, sine_cosine)] {
             let mut worst = 0.0f64;

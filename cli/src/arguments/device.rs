@@ -24,7 +24,7 @@ pub(crate) struct DeviceArguments {
     /// a device by its index or part of its name (`tumble devices`)
     #[arg(long, value_name = "DEVICE", default_value = "first")]
     device: Choice,
-    /// Use a device although its canaries fail: its bits may differ from the CPU's
+    /// Use a device although its self-tests fail: its bits may differ from the CPU's
     #[arg(long)]
     allow_inexact: bool,
     /// Device memory to use besides results, such as 256MiB

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::{CanaryReport, Device, DeviceInfo, Engine, EngineOptions, VulkanError};
+use tumble::{Device, DeviceInfo, Engine, EngineOptions, SelfTestReport, VulkanError};
 
 use crate::commands::probe;
 use crate::messages::exit::Failure;
@@ -32,9 +32,9 @@ struct Entry {
     index: usize,
     #[serde(flatten)]
     info: DeviceInfo,
-    /// It opens, and no canary differs.
+    /// It opens, and no self-test differs.
     exact: bool,
-    canaries: Vec<CanaryReport>,
+    self_tests: Vec<SelfTestReport>,
     /// Why it could not be opened.
     error: Option<String>,
 }
@@ -98,16 +98,16 @@ impl Entry {
         let info = vulkan.info().clone();
         let mut options = EngineOptions::default();
         options.allow_inexact = true;
-        let (canaries, error) = match Engine::with_options(device, &options) {
-            Ok(engine) => (engine.canaries().to_vec(), None),
+        let (self_tests, error) = match Engine::with_options(device, &options) {
+            Ok(engine) => (engine.self_tests().to_vec(), None),
             Err(error) => (Vec::new(), Some(error.to_string())),
         };
-        let exact = error.is_none() && canaries.iter().all(|canary| canary.differing == 0);
+        let exact = error.is_none() && self_tests.iter().all(|check| check.differing == 0);
         Some(Self {
             index,
             info,
             exact,
-            canaries,
+            self_tests,
             error,
         })
     }
@@ -144,18 +144,18 @@ impl Entry {
             return format!("unknown: it could not be opened: {error}");
         }
         let failed: Vec<String> = self
-            .canaries
+            .self_tests
             .iter()
-            .filter(|canary| canary.differing > 0)
+            .filter(|check| check.differing > 0)
             .map(|c| format!("{} ({} of {})", c.name, c.differing, c.total))
             .collect();
         if failed.is_empty() {
-            let results: usize = self.canaries.iter().map(|canary| canary.total).sum();
+            let results: usize = self.self_tests.iter().map(|check| check.total).sum();
             return format!(
-                "yes: all {} canaries pass ({results} results)",
-                self.canaries.len()
+                "yes: all {} self-tests pass ({results} results)",
+                self.self_tests.len()
             );
         }
-        format!("NO: these canaries differ: {}", failed.join(", "))
+        format!("NO: these self-tests differ: {}", failed.join(", "))
     }
 }

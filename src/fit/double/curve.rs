@@ -7,7 +7,7 @@ use crate::curve::options::{Axes, Quantity};
 use crate::fit::double::shape::Shape;
 use crate::fit::motion::arc_length::Pace;
 use crate::fit::motion::derivatives as motion;
-use crate::math::dual::Jet;
+use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, dot};
 
 /// The curve of one key interval, or a piece of it.
@@ -67,7 +67,7 @@ impl Curve {
         if self.quantity != Quantity::Rotation || self.pace.is_some() {
             let parameter = match &self.pace {
                 Some(pace) => pace.parameter(self, t),
-                None => Jet::parameter(t),
+                None => Dual::parameter(t),
             };
             let rotation = self.moving(parameter);
             return motion::value(self.quantity, rotation, self.rate);
@@ -84,12 +84,12 @@ impl Curve {
     /// The curve that continues from `t` at the constant angular velocity that this one has there;
     /// its parameter is in seconds.
     pub(crate) fn beyond(&self, t: f64) -> Self {
-        let rotation = self.moving(Jet::parameter(t));
+        let rotation = self.moving(Dual::parameter(t));
         let [x, y, z, _] = motion::value(Quantity::Velocity(Axes::Body), rotation, self.rate);
         let half = [0.5 * x, 0.5 * y, 0.5 * z];
         let shape = Shape::ROTATION_VECTOR;
         let mut numbers = shape.shared;
-        numbers[..4].copy_from_slice(&rotation.map(|jet| jet.value));
+        numbers[..4].copy_from_slice(&rotation.map(|dual| dual.value));
         numbers[4..7].copy_from_slice(&half);
         Self {
             shape,
@@ -102,7 +102,7 @@ impl Curve {
     }
 
     /// The rotation and its derivatives, as dual numbers.
-    pub(crate) fn moving(&self, parameter: Jet) -> [Jet; 4] {
+    pub(crate) fn moving(&self, parameter: Dual) -> [Dual; 4] {
         (self.shape.moving)(&self.numbers, parameter)
     }
 }

@@ -26,7 +26,7 @@ impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
         segments: &mut [PolynomialSegment],
     ) {
         match block.tier() {
-            Tier::Gentle | Tier::Full => {
+            Tier::SmallAngle | Tier::Full => {
                 fit::<L, PAIRS, OWN_BASIS, true>(block, nodes, segments);
             }
             Tier::Piece => fit::<L, PAIRS, OWN_BASIS, false>(block, nodes, segments),

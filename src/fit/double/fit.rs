@@ -32,7 +32,7 @@ pub(crate) const MOST: usize = 16;
 pub(crate) enum Tier {
     /// Degree 6, for curves that turn through small angles, such as between the dense keys of
     /// motion capture.
-    Gentle,
+    SmallAngle,
     /// Degree 10.
     Full,
     /// Degree 10 for a piece of a curve, which may turn any distance.
@@ -41,7 +41,7 @@ pub(crate) enum Tier {
 
 /// The squared extent (the sum of the three half-rotation vectors' squares) up to which degree 6
 /// fits a curve within 2e-8.
-pub(crate) const GENTLE: f64 = 0.002;
+pub(crate) const SMALL_ANGLE: f64 = 0.002;
 
 /// The squared extent above which curves are cut without trying to fit them whole: hardly any
 /// would fit.
@@ -59,10 +59,10 @@ pub(crate) type Lane64 = [f64; LANES];
 pub(crate) type Lane32 = [f32; LANES];
 
 /// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be cut without a try.
-pub(crate) fn tier(energy: f64) -> Tier {
-    if energy <= GENTLE {
-        Tier::Gentle
-    } else if energy <= LONGEST_WHOLE {
+pub(crate) fn tier(squared_extent: f64) -> Tier {
+    if squared_extent <= SMALL_ANGLE {
+        Tier::SmallAngle
+    } else if squared_extent <= LONGEST_WHOLE {
         Tier::Full
     } else {
         // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.
@@ -320,7 +320,7 @@ impl FitBlock {
     /// Whether every fit of this block is good enough without a check: curves of small angle whose
     /// shape is [entire](Shape::entire).
     pub(crate) fn is_trusted(&self) -> bool {
-        self.tier == Tier::Gentle && self.is_entire()
+        self.tier == Tier::SmallAngle && self.is_entire()
     }
 
     fn is_entire(&self) -> bool {
@@ -340,7 +340,7 @@ impl FitBlock {
     /// Whether the polynomial of a lane is near enough to its curve.
     pub(crate) fn fits(&self, lane: usize, segments: &[PolynomialSegment]) -> bool {
         let reach = match self.tier {
-            Tier::Gentle | Tier::Full => SHORT_REACH,
+            Tier::SmallAngle | Tier::Full => SHORT_REACH,
             Tier::Piece => REACH,
         };
         let is_near = self.tails[lane] <= TOLERANCE && self.reaches[lane] <= reach * reach;

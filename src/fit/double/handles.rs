@@ -6,10 +6,10 @@ use std::ops::Range;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{
-    Intervals, LANES, Lane, ROOM, Stretch, at, energy, load, load3, load4, put, store,
+    Intervals, LANES, Lane, ROOM, Stretch, at, load, load3, load4, put, squared_extent, store,
 };
 use crate::math::quaternion::{self, Quaternion, Real, Vector, normalised, product, scaled, sum};
-use crate::math::ranges::{Algebra, Anywhere, Near};
+use crate::math::ranges::{Algebra, FullRange, PrincipalRange};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::time::frame_clock::FrameClock;
@@ -24,7 +24,7 @@ impl InLanes for Steps<'_> {
         for lane in (0..own.whole()).step_by(L::COUNT) {
             let (from, to) = (units::<L>(&own.from, lane), units::<L>(&own.to, lane));
             let step = quaternion::step(from, to);
-            let mut near = Near::new();
+            let mut near = PrincipalRange::new();
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
@@ -37,7 +37,7 @@ impl InLanes for Steps<'_> {
     }
 }
 
-impl<D: Doubles> Near<D> {
+impl<D: Doubles> PrincipalRange<D> {
     #[inline(always)]
     fn is_in_doubt(&self) -> bool {
         !self.doubt.are_at_most(0.0)
@@ -156,7 +156,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.intervals;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let mut near = Near::new();
+            let mut near = PrincipalRange::new();
             let (before, after) = (own.intervals::<L>(lane), own.intervals::<L>(lane + 1));
             let handles = R::handles(&mut near, before, after);
             store(&mut own.incoming, lane + 1, handles.incoming);
@@ -168,7 +168,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
                     stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
                 };
                 for j in near.lanes(lane + 1, own.count).filter(is_key) {
-                    own.handles_anywhere::<R>(j);
+                    own.handles_full_range::<R>(j);
                 }
             }
         }
@@ -188,14 +188,14 @@ impl Intervals {
 
     /// Computes the handles of the key at the start of an interval, over the full range.
     #[inline(never)]
-    fn handles_anywhere<R: HandleRule>(&mut self, lane: usize) {
+    fn handles_full_range<R: HandleRule>(&mut self, lane: usize) {
         let interval = |lane: usize| Interval {
             duration: self.durations[lane],
             step: self.step(lane),
             log: self.log(lane),
             key: self.outward(lane),
         };
-        let handles = R::handles(&mut Anywhere, interval(lane - 1), interval(lane));
+        let handles = R::handles(&mut FullRange, interval(lane - 1), interval(lane));
         self.set_incoming(lane, handles.incoming);
         self.set_outgoing(lane, handles.outgoing);
     }
@@ -213,15 +213,15 @@ impl InLanes for BetweenHandles<'_> {
             let first = load3::<L, ROOM>(&own.outgoing, lane);
             let step = load4::<L, ROOM>(&own.steps, lane);
             let last = load3::<L, ROOM>(&own.incoming, lane + 1);
-            let mut near = Near::new();
+            let mut near = PrincipalRange::new();
             let middle = between(&mut near, first, step, last);
             let (bases, vectors) = product_numbers(&mut own.numbers);
             store(bases, lane, units::<L>(&own.from, lane));
             store_vectors(vectors, lane, [first, middle, last]);
-            energy([first, middle, last]).store(&mut own.energies[lane..]);
+            squared_extent([first, middle, last]).store(&mut own.energies[lane..]);
             if near.is_in_doubt() {
                 for j in near.lanes(lane, own.count) {
-                    own.between_anywhere(j);
+                    own.between_full_range(j);
                 }
             }
         }
@@ -231,12 +231,12 @@ impl InLanes for BetweenHandles<'_> {
 impl Intervals {
     /// Computes the curve of a lane between its handles, over the full range.
     #[inline(never)]
-    fn between_anywhere(&mut self, lane: usize) {
+    fn between_full_range(&mut self, lane: usize) {
         let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
-        let middle = between(&mut Anywhere, first, self.step(lane), last);
+        let middle = between(&mut FullRange, first, self.step(lane), last);
         let vectors = [first, middle, last];
         self.set_numbers(lane, Product::VECTORS, vectors.as_flattened());
-        self.set_energy(lane, vectors);
+        self.set_squared_extent(lane, vectors);
     }
 }
 
@@ -317,7 +317,7 @@ fn control_lanes(
                 controls[4 * place + c][j] = control[c];
             }
         }
-        energies[j] = energy([first, log(j), last]);
+        energies[j] = squared_extent([first, log(j), last]);
     }
 }
 
@@ -333,13 +333,13 @@ impl InLanes for BetweenNeighbours<'_> {
             let before = load3::<L, ROOM>(&own.logs, lane);
             let log = load3::<L, ROOM>(&own.logs, lane + 1);
             let after = load3::<L, ROOM>(&own.logs, lane + 2);
-            let mut near = Near::new();
+            let mut near = PrincipalRange::new();
             let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
             let base = product(units::<L>(&own.from, lane + 1), back);
             let (bases, vectors) = product_numbers(&mut own.numbers);
             store(bases, lane + 1, base);
             store_vectors(vectors, lane + 1, [before, log, after]);
-            energy([before, log, after]).store(&mut own.energies[lane + 1..]);
+            squared_extent([before, log, after]).store(&mut own.energies[lane + 1..]);
             if near.is_in_doubt() {
                 for j in near.lanes(lane + 1, own.count) {
                     let back = quaternion::exp(scaled(own.log(j - 1), -1.0));

@@ -246,8 +246,8 @@ impl Intervals {
     }
 
     /// Sets the squared extent of the interval's curve.
-    pub(crate) fn set_energy(&mut self, lane: usize, vectors: [Vector; 3]) {
-        self.energies[lane] = energy(vectors);
+    pub(crate) fn set_squared_extent(&mut self, lane: usize, vectors: [Vector; 3]) {
+        self.energies[lane] = squared_extent(vectors);
     }
 
     /// The curve of an interval.
@@ -295,7 +295,7 @@ pub(crate) fn put<const N: usize>(lanes: &mut [Lane; N], lane: usize, value: [f6
 
 /// The squared extent: the sum of the vectors' squares.
 #[inline(always)]
-pub(crate) fn energy<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
+pub(crate) fn squared_extent<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
     square(a) + square(b) + square(c)
 }
 

@@ -13,8 +13,8 @@ use crate::curve::formula::{Formula, NUMBERS, Numbers};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
 use crate::fit::double::intervals::{load, rounded};
-use crate::fit::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
-use crate::math::dual::{Jet, Near};
+use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
+use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -32,7 +32,7 @@ pub(crate) struct Shape {
     /// Whether its values are unit quaternions.
     pub(crate) is_unit: bool,
     pub(crate) rotation: fn(&Numbers, f64) -> Quaternion,
-    pub(crate) moving: fn(&Numbers, Jet) -> [Jet; 4],
+    pub(crate) moving: fn(&Numbers, Dual) -> [Dual; 4],
     /// See [`Sampling::fit`].
     pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
 }
@@ -45,7 +45,7 @@ impl Shape {
             entire: false,
             is_unit: true,
             rotation: F::rotation::<f64>,
-            moving: F::rotation::<Jet>,
+            moving: F::rotation::<Dual>,
             fit: fit::<Directly<F>>,
         }
     }
@@ -118,7 +118,7 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     fn run<L: Lanes>(&mut self) {
         let Self(block, segments, _) = self;
         match block.tier() {
-            Tier::Gentle => S::fit::<L, _>(block, &GENTLE_NODES, segments),
+            Tier::SmallAngle => S::fit::<L, _>(block, &SMALL_ANGLE_NODES, segments),
             Tier::Full | Tier::Piece => S::fit::<L, _>(block, &FULL_NODES, segments),
         }
     }
@@ -161,7 +161,7 @@ impl<F: Formula> Sampling for Directly<F> {
                 doubt.store(&mut doubts);
                 let mut lanes = samples.lanes();
                 for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
-                    sample_anywhere::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
+                    sample_full_range::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
                 }
                 samples = lanes.at(0);
             }
@@ -185,7 +185,7 @@ fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
 /// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
 /// into the `j`th place of the sample arrays.
 #[inline(never)]
-fn sample_anywhere<F: Formula, const PAIRS: usize>(
+fn sample_full_range<F: Formula, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,

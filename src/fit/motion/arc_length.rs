@@ -1,7 +1,7 @@
 //! Arc length of curves, by which they are traversed at constant speed.
 
 use crate::fit::double::curve::Curve;
-use crate::math::dual::Jet;
+use crate::math::dual::Dual;
 use crate::math::quaternion::{length, step};
 
 /// A curve's parameter is divided into this many equal parts; the arc length up to each is kept.
@@ -47,7 +47,7 @@ impl Pace {
 
     /// The curve's own parameter where it has turned by the fraction `part` of its length, with the
     /// first two derivatives by `part`.
-    pub(crate) fn parameter(&self, curve: &Curve, part: f64) -> Jet {
+    pub(crate) fn parameter(&self, curve: &Curve, part: f64) -> Dual {
         let mut u = self.place(curve, part * self.total());
         let (mut velocity, mut acceleration) = rates(curve, u);
         if length(velocity) < SLOW * self.total() {
@@ -58,7 +58,7 @@ impl Pace {
         let speed = length(velocity).max(1e-12);
         let first = self.total() / speed;
         let along: f64 = velocity.iter().zip(acceleration).map(|(v, a)| v * a).sum();
-        Jet {
+        Dual {
             value: u,
             first,
             // |ω| u' is constant, so its derivative is 0.
@@ -139,14 +139,14 @@ fn gauss(curve: &Curve, from: f64, to: f64) -> f64 {
 
 /// Angular velocity and acceleration at `u`, per unit of the parameter.
 fn rates(curve: &Curve, u: f64) -> ([f64; 3], [f64; 3]) {
-    let rotation = curve.moving(Jet::parameter(u));
-    let at = rotation.map(|jet| jet.value);
+    let rotation = curve.moving(Dual::parameter(u));
+    let at = rotation.map(|dual| dual.value);
     let twice = |derivative: [f64; 4]| {
         let [x, y, z, _] = step(at, derivative);
         [2.0 * x, 2.0 * y, 2.0 * z]
     };
     (
-        twice(rotation.map(|jet| jet.first)),
-        twice(rotation.map(|jet| jet.second)),
+        twice(rotation.map(|dual| dual.first)),
+        twice(rotation.map(|dual| dual.second)),
     )
 }

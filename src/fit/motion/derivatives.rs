@@ -4,8 +4,8 @@
 use crate::curve::options::{Axes, Quantity};
 use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
 use crate::fit::double::intervals::LANES;
-use crate::fit::nodes::{FULL_NODES, GENTLE_NODES, Nodes};
-use crate::math::dual::Jet;
+use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
+use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, Vector, product, step};
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -13,12 +13,12 @@ use crate::simd::lanes::Lanes;
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
 /// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
-pub(crate) fn value(quantity: Quantity, rotation: [Jet; 4], rate: f64) -> Quaternion {
-    let at = rotation.map(|jet| jet.value);
+pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quaternion {
+    let at = rotation.map(|dual| dual.value);
     let (derivative, scale, axes) = match quantity {
         Quantity::Rotation => return at,
-        Quantity::Velocity(axes) => (rotation.map(|jet| jet.first), rate, axes),
-        Quantity::Acceleration(axes) => (rotation.map(|jet| jet.second), rate * rate, axes),
+        Quantity::Velocity(axes) => (rotation.map(|dual| dual.first), rate, axes),
+        Quantity::Acceleration(axes) => (rotation.map(|dual| dual.second), rate * rate, axes),
     };
     // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
     let [x, y, z, _] = step(at, derivative);
@@ -55,7 +55,7 @@ impl InLanes for Fit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         match self.0.tier() {
-            Tier::Gentle => self.fit::<L, _>(&GENTLE_NODES),
+            Tier::SmallAngle => self.fit::<L, _>(&SMALL_ANGLE_NODES),
             Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
         }
     }
@@ -105,9 +105,9 @@ fn sample<const PAIRS: usize>(
         middle[c][lane] = (between[c] / unit) as f32;
         for (k, [before, after]) in pairs.iter().enumerate() {
             let rise = (after[c] - between[c]) / unit;
-            let fall = (before[c] - between[c]) / unit;
-            even[k][c][lane] = (rise + fall) as f32;
-            odd[k][c][lane] = (rise - fall) as f32;
+            let cosine_minus_one = (before[c] - between[c]) / unit;
+            even[k][c][lane] = (rise + cosine_minus_one) as f32;
+            odd[k][c][lane] = (rise - cosine_minus_one) as f32;
         }
     }
     unit as f32

@@ -6,11 +6,11 @@
 //! where the curve turns little. Only the vector between the handles is computed in f64, because
 //! the rounding errors of all others would add up in it.
 
-use crate::fit::double::intervals::{Intervals, ROOM, energy};
+use crate::fit::double::intervals::{Intervals, ROOM, squared_extent};
 use crate::fit::single::exp_log::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
 use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::{AT_ONCE, FarKeys};
+use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
 use crate::math::quaternion::{self, Real as _, dot, product, scaled, square, sum};
 use crate::math::ranges::MEDIUM_SQUARE;
 use crate::shader::KEY_INNER;
@@ -19,7 +19,7 @@ use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::{composed, minus};
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
-/// [`LONGEST_FALL`]; from Chebyshev nodes, within 5e-10.
+/// [`LARGEST_COSINE_MINUS_ONE`]; from Chebyshev nodes, within 5e-10.
 const MEDIUM_LOG: [f64; 8] = [
     0.333_333_332_749_309,
     0.133_333_465_469_371,
@@ -33,7 +33,7 @@ const MEDIUM_LOG: [f64; 8] = [
 
 /// An upper bound of 1 - cos(x), where x is the length of any half-rotation vector of a curve with
 /// a squared extent of at most [`LONGEST_DIRECT`].
-const LONGEST_FALL: f32 = 0.5645;
+const LARGEST_COSINE_MINUS_ONE: f32 = 0.5645;
 
 /// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
 /// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
@@ -43,7 +43,7 @@ const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
 /// The handles and curves of a block's intervals, in f32.
-pub(crate) struct WholeLanes {
+pub(crate) struct HandlesF32 {
     /// The lanes whose curves are asked for.
     pub(crate) wanted: [bool; ROOM],
     /// Handles at the key that the interval starts with, towards the interval before it
@@ -58,7 +58,7 @@ pub(crate) struct WholeLanes {
     pub(crate) energies: Row,
 }
 
-impl WholeLanes {
+impl HandlesF32 {
     pub(crate) fn new() -> Self {
         Self {
             wanted: [false; ROOM],
@@ -73,12 +73,12 @@ impl WholeLanes {
 
 /// Finds the handles of the keys between intervals.
 pub(crate) struct FindHandles<'a> {
-    pub(crate) lanes: &'a mut WholeLanes,
+    pub(crate) lanes: &'a mut HandlesF32,
     pub(crate) steps: &'a KeySteps,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
     /// Finds the handles for which the range of f32's formulas is too short, in f64.
-    pub(crate) find_far: fn(&mut FarKeys),
+    pub(crate) find_long: fn(&mut LongTangents),
 }
 
 impl InLanes for FindHandles<'_> {
@@ -86,7 +86,7 @@ impl InLanes for FindHandles<'_> {
     fn run<L: Lanes>(&mut self) {
         let (steps, weights, intervals) = (self.steps, self.weights, self.intervals);
         let own = &mut *self.lanes;
-        let (mut far_keys, mut far_count) = ([0; ROOM], 0);
+        let (mut long_tangents, mut far_count) = ([0; ROOM], 0);
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let key = lane + 1;
             if !own.wanted[lane..key + L::COUNT].contains(&true) {
@@ -111,13 +111,13 @@ impl InLanes for FindHandles<'_> {
             if (-far).any_at_most(-1.0) {
                 for key in key..key + L::COUNT {
                     let is_far = own.far[key] >= 1.0 && weights.kinds[key] == KEY_INNER;
-                    far_keys[far_count] = key;
+                    long_tangents[far_count] = key;
                     far_count += usize::from(is_far);
                 }
             }
         }
-        for keys in far_keys[..far_count].chunks(AT_ONCE) {
-            own.set_far(keys, intervals, self.find_far);
+        for keys in long_tangents[..far_count].chunks(AT_ONCE) {
+            own.set_far(keys, intervals, self.find_long);
         }
     }
 }
@@ -134,7 +134,7 @@ const TWO_THIRDS: f32 = 2.0 / 3.0;
 
 /// Finds the curves between handles.
 pub(crate) struct FindCurves<'a> {
-    pub(crate) lanes: &'a mut WholeLanes,
+    pub(crate) lanes: &'a mut HandlesF32,
     pub(crate) steps: &'a KeySteps,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
@@ -161,7 +161,7 @@ impl InLanes for FindCurves<'_> {
             let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
             let start = L::load_rotations(&intervals.from[own..]);
             let end = L::load_rotations(&intervals.to[own..]);
-            let (w2, fall) = between::<L>(w1, [start, end], w3);
+            let (w2, cosine_minus_one) = between::<L>(w1, [start, end], w3);
             let chord = L::load(&steps.chords[own..]);
             let before = L::load(&steps.chords[lane..]);
             let after = L::load(&steps.chords[next..]);
@@ -169,11 +169,11 @@ impl InLanes for FindCurves<'_> {
             let far = L::load(&whole.far[own..]).larger(L::load(&whole.far[next..]));
             let far = far
                 .larger(chords)
-                .larger(fall * L::all(-1.0 / LONGEST_FALL));
+                .larger(cosine_minus_one * L::all(-1.0 / LARGEST_COSINE_MINUS_ONE));
             // 0 where everything holds, else `IN_DOUBT`; `sign` is 1 for NaN.
             let half = L::all(0.5 * IN_DOUBT as f32);
             let doubt = (far - L::all(1.0)).sign() * half + half;
-            let energy = energy([w1, w2, w3]) + doubt;
+            let squared_extent = squared_extent([w1, w2, w3]) + doubt;
             let none = L::all(0.0);
             let numbers = [
                 start,
@@ -182,7 +182,7 @@ impl InLanes for FindCurves<'_> {
                 [w3[0], w3[1], w3[2], none],
                 end,
             ];
-            energy.store(&mut whole.energies[own..own + L::COUNT]);
+            squared_extent.store(&mut whole.energies[own..own + L::COUNT]);
             for (i, all) in whole.numbers.iter_mut().enumerate() {
                 L::store_rotations(numbers[i], &mut all[own..own + L::COUNT]);
             }
@@ -229,7 +229,12 @@ mod tests {
     /// Catches a wrong digit in a coefficient, and a range that is too short.
     #[test]
     fn logarithms_hold_for_every_curve_that_is_fitted() {
-        assert_near(&MEDIUM_LOG, f64::from(LONGEST_FALL), longer, 5e-10);
-        assert!(1.0 - LONGEST_DIRECT.sqrt().cos() < f64::from(LONGEST_FALL));
+        assert_near(
+            &MEDIUM_LOG,
+            f64::from(LARGEST_COSINE_MINUS_ONE),
+            longer,
+            5e-10,
+        );
+        assert!(1.0 - LONGEST_DIRECT.sqrt().cos() < f64::from(LARGEST_COSINE_MINUS_ONE));
     }
 }

@@ -209,12 +209,13 @@ fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bo
         let second = if IS_WHOLE {
             // About the middle of the whole curve the second basis function is odd.
             let [_, after] = gains[1];
-            let (sine, fall) = turned(L::all(after.gain), L::all(after.squared), squares[1]);
+            let (sine, cosine_minus_one) =
+                turned(L::all(after.gain), L::all(after.squared), squares[1]);
             let sine = Sides {
                 before: -sine,
                 after: sine,
             };
-            (sine, Sides::same(fall))
+            (sine, Sides::same(cosine_minus_one))
         } else {
             on_both_sides(gains[1], squares[1])
         };
@@ -279,7 +280,7 @@ fn on_both_sides<L: Lanes>([before, after]: [Gain; 2], square: L) -> SineCosm1<S
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
 /// up to 0.201; from Chebyshev nodes, within 3e-9.
 const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
-const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
+const COSINE_MINUS_ONE: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
 /// The sine over the length and the cosine minus one for `gain` times a vector; `squared` is the
 /// square of `gain`, `square` that of the vector.
@@ -287,8 +288,10 @@ const FALL: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 fn turned<N: Number>(gain: N, squared: N, square: N) -> SineCosm1<N> {
     let z = square * squared;
     let sinc = ((N::all(SINC[2]) * z + N::all(SINC[1])) * z + N::all(SINC[0])) * z;
-    let fall = ((N::all(FALL[2]) * z + N::all(FALL[1])) * z + N::all(FALL[0])) * z;
-    (gain * sinc + gain, fall)
+    let cosine_minus_one = ((N::all(COSINE_MINUS_ONE[2]) * z + N::all(COSINE_MINUS_ONE[1])) * z
+        + N::all(COSINE_MINUS_ONE[0]))
+        * z;
+    (gain * sinc + gain, cosine_minus_one)
 }
 
 #[cfg(test)]
@@ -308,7 +311,7 @@ mod tests {
         let sinc = |z: f64| libm::sin(libm::sqrt(z)) / libm::sqrt(z);
         assert_near(&SINC.map(f64::from), LARGEST, sinc, 3e-9);
         let cosine = |z: f64| libm::cos(libm::sqrt(z));
-        assert_near(&FALL.map(f64::from), LARGEST, cosine, 3e-9);
+        assert_near(&COSINE_MINUS_ONE.map(f64::from), LARGEST, cosine, 3e-9);
         for (gains, longest) in [
             (&FEW_POWERS.gains[..], LONGEST_OF_FEW),
             (&WHOLE.gains, LONGEST_WHOLE),

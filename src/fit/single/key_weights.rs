@@ -42,11 +42,11 @@ impl KeyWeights {
         }
     }
 
-    fn set(&mut self, lane: usize, joint: TangentWeights) {
-        self.before[lane] = joint.before;
-        self.after[lane] = joint.after;
-        self.outgoing[lane] = joint.outgoing;
-        self.kinds[lane] = joint.kind;
+    fn set(&mut self, lane: usize, tangent_weights: TangentWeights) {
+        self.before[lane] = tangent_weights.before;
+        self.after[lane] = tangent_weights.after;
+        self.outgoing[lane] = tangent_weights.outgoing;
+        self.kinds[lane] = tangent_weights.kind;
     }
 
     /// Computes the weights of all keys of a block.
@@ -91,11 +91,11 @@ impl InLanes for Between<'_> {
             ..
         } = &mut *self.weights;
         for j in 0..LANES {
-            let joint = rule.between(self.durations[j], self.durations[j + 1]);
-            before[j + 1] = joint.before;
-            after[j + 1] = joint.after;
-            outgoing[j + 1] = joint.outgoing;
-            kinds[j + 1] = joint.kind;
+            let tangent_weights = rule.between(self.durations[j], self.durations[j + 1]);
+            before[j + 1] = tangent_weights.before;
+            after[j + 1] = tangent_weights.after;
+            outgoing[j + 1] = tangent_weights.outgoing;
+            kinds[j + 1] = tangent_weights.kind;
         }
     }
 }

@@ -5,9 +5,9 @@ use std::marker::PhantomData;
 
 use crate::fit::double::handles::{HandleRule, Handles, Interval};
 use crate::fit::double::intervals::Intervals;
-use crate::fit::single::handles::WholeLanes;
+use crate::fit::single::handles::HandlesF32;
 use crate::math::quaternion::{log, normalised, step};
-use crate::math::ranges::Anywhere;
+use crate::math::ranges::FullRange;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
@@ -18,7 +18,7 @@ pub(crate) const AT_ONCE: usize = 8;
 type Row = [f64; AT_ONCE];
 
 /// Keys with long tangents, and their handles.
-pub(crate) struct FarKeys {
+pub(crate) struct LongTangents {
     /// The intervals on both sides.
     before: Side,
     after: Side,
@@ -33,7 +33,7 @@ struct Side {
     durations: Row,
 }
 
-impl FarKeys {
+impl LongTangents {
     /// Finds their handles by a rule.
     pub(crate) fn find<R: HandleRule>(&mut self) {
         in_lanes(&mut Find::<R> {
@@ -43,16 +43,16 @@ impl FarKeys {
     }
 }
 
-impl WholeLanes {
+impl HandlesF32 {
     /// Sets the handles of a few keys, as `find` finds them.
     #[inline(never)]
     pub(crate) fn set_far(
         &mut self,
         keys: &[usize],
         intervals: &Intervals,
-        find: fn(&mut FarKeys),
+        find: fn(&mut LongTangents),
     ) {
-        let mut far = FarKeys {
+        let mut far = LongTangents {
             before: Side::none(),
             after: Side::none(),
             incoming: [[0.0; AT_ONCE]; 3],
@@ -108,7 +108,7 @@ impl Side {
 }
 
 struct Find<'a, R> {
-    keys: &'a mut FarKeys,
+    keys: &'a mut LongTangents,
     rule: PhantomData<R>,
 }
 
@@ -116,14 +116,14 @@ impl<R: HandleRule> InLanes for Find<'_, R> {
     // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let FarKeys {
+        let LongTangents {
             before,
             after,
             incoming,
             outgoing,
         } = &mut *self.keys;
         for i in 0..AT_ONCE {
-            let found = R::handles(&mut Anywhere, before.interval(i), after.interval(i));
+            let found = R::handles(&mut FullRange, before.interval(i), after.interval(i));
             let Handles {
                 incoming: [x0, y0, z0],
                 outgoing: [x1, y1, z1],

@@ -20,7 +20,7 @@ const VECTOR: usize = 16;
 const FEW: usize = 6;
 
 /// The small-angle curves of a block's intervals.
-pub(crate) struct GentleLanes {
+pub(crate) struct SmallAngleLanes {
     /// Whether the squared chords of the interval and of both its neighbours are at most
     /// [`LONGEST_STEP`].
     near: [bool; ROOM],
@@ -33,7 +33,7 @@ pub(crate) struct GentleLanes {
     pub(crate) holds: [bool; ROOM],
 }
 
-impl GentleLanes {
+impl SmallAngleLanes {
     pub(crate) fn new() -> Self {
         Self {
             near: [false; ROOM],
@@ -61,7 +61,7 @@ impl GentleLanes {
         self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
     }
 
-    /// Computes the curves of the intervals that [`GentleLanes::look`] found.
+    /// Computes the curves of the intervals that [`SmallAngleLanes::look`] found.
     pub(crate) fn prepare(
         &mut self,
         intervals: &Intervals,
@@ -80,7 +80,7 @@ impl GentleLanes {
             return;
         }
         for lane in near {
-            let curve = curves.curve(lane - 1);
+            let curve = curves.curve(lane - 1, curves.neighbours(lane - 1));
             let own = &mut *curves.lanes;
             for (powers, power) in own.powers.iter_mut().zip(curve.powers) {
                 powers[lane] = power;
@@ -104,22 +104,29 @@ impl GentleLanes {
 }
 
 struct Curves<'a> {
-    lanes: &'a mut GentleLanes,
+    lanes: &'a mut SmallAngleLanes,
     intervals: &'a Intervals,
     weights: &'a KeyWeights,
 }
 
 impl Curves<'_> {
-    /// The curve of lane `j + 1`.
+    /// The curve of lane `j + 1`, between the keys before and after it.
     #[inline(always)]
-    fn curve(&self, j: usize) -> SmallAngleCubic {
+    fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic {
         let Intervals { from, to, .. } = self.intervals;
         let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
-        let (start, end) = (from[j + 1], to[j + 1]);
-        // A key without a neighbour takes its own place.
-        let before = either(first.kind == KEY_INNER, from[j], start);
-        let after = either(last.kind == KEY_INNER, to[j + 2], end);
-        small_angle_cubic([before, start, end, after], first, last)
+        small_angle_cubic([before, from[j + 1], to[j + 1], after], first, last)
+    }
+
+    /// The keys before and after lane `j + 1`; a key without a neighbour takes its own place.
+    #[inline(always)]
+    fn neighbours(&self, j: usize) -> [[f32; 4]; 2] {
+        let Intervals { from, to, .. } = self.intervals;
+        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        [
+            either(first.kind == KEY_INNER, from[j], from[j + 1]),
+            either(last.kind == KEY_INNER, to[j + 2], to[j + 1]),
+        ]
     }
 }
 
@@ -129,8 +136,15 @@ impl InLanes for Curves<'_> {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
         // Lane 0 is always context, so the first curve is in lane 1.
-        for j in 0..self.lanes.wanted.min(LANES) {
-            let curve = self.curve(j);
+        let count = self.lanes.wanted.min(LANES);
+        // Chosen in a loop of their own: a choice between two keys in memory would keep the
+        // compiler from making vectors of the loop behind it, which then costs twice as much.
+        let mut neighbours = [[[0.0; 4]; 2]; LANES];
+        for j in 0..count {
+            neighbours[j] = self.neighbours(j);
+        }
+        for j in 0..count {
+            let curve = self.curve(j, neighbours[j]);
             for power in 0..7 {
                 for c in 0..4 {
                     powers[power][c][j + 1] = curve.powers[power][c];
