@@ -12,8 +12,7 @@ use crate::reference::track::Track;
 use crate::tracks::key_data::Tcb;
 use crate::tracks::set as tracks;
 
-/// A method by the book: how the curve of a track follows from its keys. Every
-/// [`Method`](crate::method::Method) has one.
+/// A method by the book: how the curve of a track follows from its keys. Every method has one.
 #[derive(Clone, Copy)]
 pub struct Definition {
     /// The curve of every interval of a track.
