@@ -4,7 +4,7 @@
 //! cargo test --release --test load -- --ignored --nocapture --test-threads 1
 //! ```
 //!
-//! Each prints its figures; ARCHITECTURE.md has those of one machine.
+//! Each prints its figures; docs/testing.md has those of one machine.
 #![cfg(target_os = "linux")]
 
 #[path = "../support/program.rs"]
