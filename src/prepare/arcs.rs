@@ -13,7 +13,7 @@ use crate::prepare::prepared::Prepared;
 use crate::shader::ArcSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::time::spans::{NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
@@ -112,20 +112,8 @@ impl Prepare for ArcPreparation {
         let count = spans.starts.len() - first_span;
         let sources = (segments..segments + count as u32).map(Source::Segment);
         spans.sources.extend(sources);
-        let beyond = prepared.beyond_of_copies(track);
-        prepared.parts.push(Part {
-            track: index as u32,
-            first_key: start as u32,
-            spans: first_span..first_span + count,
-            end: track.times[end],
-            before: if start == 0 { first_key } else { NONE },
-            after: if end + 1 == track.keys.len() {
-                last_key
-            } else {
-                NONE
-            },
-            beyond,
-        });
+        let spans = first_span..first_span + count;
+        prepared.push_part((index, track), &intervals, spans, [first_key, last_key]);
         if long.is_empty() {
             self.push(prepared, keys, self.path.signs(set, index), intervals);
             return Ok(());

@@ -126,11 +126,27 @@ impl Prepared {
         self.wrap.copies(span, timeline, samples)
     }
 
-    /// The [`Beyond`] of a part of this track if the wrap mode repeats tracks: it holds the track's
-    /// time span.
-    pub(crate) fn beyond_of_copies(&self, track: Track) -> Option<Box<Beyond>> {
-        let new = || Box::new(Beyond::new(track.times));
-        self.wrap.repeats().then(new)
+    /// Adds a part: these intervals of a track, the `index`th of its set, with these spans. What
+    /// is held before and after the keys are constants, used only where the intervals reach the
+    /// first or the last key.
+    pub(crate) fn push_part(
+        &mut self,
+        (index, track): (usize, Track),
+        intervals: &Range<usize>,
+        spans: Range<usize>,
+        [before, after]: [u32; 2],
+    ) {
+        let is_last = intervals.end + 1 == track.keys.len();
+        let new_beyond = || Box::new(Beyond::new(track.times));
+        self.parts.push(Part {
+            track: index as u32,
+            first_key: intervals.start as u32,
+            spans,
+            end: track.times[intervals.end],
+            before: if intervals.start == 0 { before } else { NONE },
+            after: if is_last { after } else { NONE },
+            beyond: self.wrap.repeats().then(new_beyond),
+        });
     }
 
     pub(crate) fn constant(&mut self, value: [f32; 4]) -> u32 {

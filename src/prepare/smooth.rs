@@ -18,7 +18,7 @@ use crate::prepare::prepared::Prepared;
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frame_rate::FrameRate;
-use crate::time::spans::{NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
@@ -106,25 +106,16 @@ impl Prepare for SmoothPreparation {
         } else if meets_keys {
             prepared.constant(STILL);
         }
-        let held = |at_end: bool, key: u32, outside: WrapMode| {
+        let held = |key: u32, outside: WrapMode| {
             let goes_on = self.goes_on(outside) && all > 0;
-            if meets_keys && at_end && !goes_on {
-                key
-            } else {
-                NONE
-            }
+            if meets_keys && !goes_on { key } else { NONE }
         };
+        let held = [
+            held(first_key, self.interpolation.before),
+            held(last_key, self.interpolation.after),
+        ];
         let part = prepared.parts.len();
-        let beyond = prepared.beyond_of_copies(track);
-        prepared.parts.push(Part {
-            track: index as u32,
-            first_key: intervals.start as u32,
-            spans: 0..0,
-            end: track.times[intervals.end],
-            before: held(intervals.start == 0, first_key, self.interpolation.before),
-            after: held(intervals.end == all, last_key, self.interpolation.after),
-            beyond,
-        });
+        prepared.push_part((index, track), &intervals, 0..0, held);
         let looped = matches!(self.interpolation.ends, Ends::Loop);
         // Two keys are joined by constant velocity, whatever lies beside them.
         let alone = all == 1 && self.interpolation.method.interpolates;

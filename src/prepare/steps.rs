@@ -8,7 +8,7 @@ use crate::curve::options::{InterpolationError, Quantity};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
-use crate::time::spans::{NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks whose keys are held.
@@ -47,17 +47,8 @@ impl Prepare for StepPreparation {
         let keys = track.keys[intervals.start..=intervals.end].iter();
         prepared.constants.extend(keys.map(value));
         let first_span = prepared.spans.len();
-        let all = track.keys.len() - 1;
-        let beyond = prepared.beyond_of_copies(track);
-        prepared.parts.push(Part {
-            track: index as u32,
-            first_key: intervals.start as u32,
-            spans: first_span..first_span + intervals.len(),
-            end: track.times[intervals.end],
-            before: if intervals.start == 0 { first } else { NONE },
-            after: if intervals.end == all { last } else { NONE },
-            beyond,
-        });
+        let spans = first_span..first_span + intervals.len();
+        prepared.push_part((index, track), &intervals, spans, [first, last]);
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], Source::Constant(constant), NONE);
         }

@@ -3,64 +3,21 @@
 //! checks for overflow keep loops scalar.
 #![cfg(all(target_arch = "x86_64", not(debug_assertions)))]
 
-use std::env;
-use std::hint::black_box;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use tumble::{Device, Engine, Frames, Layout, Method, VectorWidth};
-use tumble_formats::generate::{Generate, Steps};
+use tumble::VectorWidth;
 
-/// What this program evaluates when it is called by itself: keys, motion, method and frames a
-/// second.
-const RUN: &str = "TUMBLE_COST_RUN";
-
-const TRACKS: u64 = 32;
-
-/// Not a test, but what valgrind counts: one evaluation.
-#[test]
-fn one_evaluation() {
-    let Ok(run) = env::var(RUN) else {
-        return;
-    };
-    let [keys, motion, method, fps] = *run.split(' ').collect::<Vec<_>>() else {
-        panic!("{run}");
-    };
-    let set = Generate {
-        boxes: TRACKS as usize,
-        keys: keys.parse().unwrap(),
-        steps: match motion {
-            "random" => Steps::Random,
-            _ => Steps::Uniform,
-        },
-        ..Generate::default()
-    };
-    let set = set.track_set().unwrap();
-    let frames = Frames::fps(fps.parse().unwrap());
-    let method: Method = method.parse().unwrap();
-    let engine = Engine::new(Device::Cpu).unwrap();
-    engine
-        .stream(
-            &set,
-            method,
-            &frames,
-            Layout::TrackMajor,
-            1 << 20,
-            |chunk| {
-                black_box(chunk.rotations);
-                Ok::<(), tumble::Error>(())
-            },
-        )
-        .unwrap();
-}
-
-/// Instructions of one evaluation on one thread; nothing where valgrind is not installed, which
-/// in CI it must be.
-fn instructions(keys: u32, motion: &str, method: &str, fps: u32, width: &str) -> Option<u64> {
+/// Instructions that `tumble` executes to evaluate a file, on one thread; nothing
+/// where valgrind is not installed, which in CI it must be.
+fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64> {
     let run = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(env::current_exe().unwrap())
-        .args(["--exact", "one_evaluation", "--test-threads", "1"])
-        .env(RUN, format!("{keys} {motion} {method} {fps}"))
+        .arg(env!("CARGO_BIN_EXE_tumble"))
+        .arg("eval")
+        .arg(file)
+        .args(["-m", method, "--fps", &fps.to_string(), "--device", "cpu"])
+        .args(["-o", "-"])
         .env("RAYON_NUM_THREADS", "1")
         .env("TUMBLE_VECTOR_WIDTH", width)
         .stdout(Stdio::null())
@@ -83,13 +40,31 @@ fn instructions(keys: u32, motion: &str, method: &str, fps: u32, width: &str) ->
     Some(count.expect(&words).trim().parse().expect("a number"))
 }
 
+const TRACKS: u64 = 32;
+
+fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
+    let file = folder.join(format!("{keys}.dat"));
+    let run = Command::new(env!("CARGO_BIN_EXE_tumble"))
+        .args(["generate", "--boxes", &TRACKS.to_string()])
+        .args(motion)
+        .args(["--keys", &keys.to_string(), "--seconds", "20", "-o"])
+        .arg(&file)
+        .output()
+        .unwrap();
+    assert!(run.status.success());
+    file
+}
+
 /// Bounds are a quarter above what was counted when they were set.
 #[test]
 fn rotations_and_keys_cost_no_more_than_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let random = |keys| generate(folder.path(), keys, &["--random"]);
+    let (few, many) = (random(26), random(260));
     let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
     let bounds = [
-        ("baseline", [22.0, 56.0, 59.0], [1850.0, 18_000.0]),
-        ("avx2", [9.5, 19.0, 20.0], [1215.0, 8650.0]),
+        ("baseline", [22.0, 47.0, 47.0], [2650.0, 18_000.0]),
+        ("avx2", [9.5, 20.0, 20.0], [1300.0, 8700.0]),
     ];
     let methods = ["slerp", "bessel-overhauser", "kochanek-bartels"];
     for (width, a_rotation, a_key) in bounds {
@@ -99,9 +74,9 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
         }
         let mut per_keys = Vec::new();
         for (method, bound) in methods.into_iter().zip(a_rotation) {
-            let count = |keys, fps| instructions(keys, "random", method, fps, width);
+            let count = |file, fps| instructions(file, method, fps, width);
             let (Some(coarse), Some(fine), Some(dense)) =
-                (count(26, 60), count(26, 240), count(260, 60))
+                (count(&few, 60), count(&few, 240), count(&many, 60))
             else {
                 return;
             };
@@ -125,14 +100,16 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
 /// and fit a cubic would take thousands of instructions for each sample.
 #[test]
 fn samples_straight_from_keys_cost_no_more_than_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let dense = generate(folder.path(), 2400, &[]);
     let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
-    for (width, bounds) in [("baseline", [142.0, 1005.0]), ("avx2", [102.0, 505.0])] {
+    for (width, bounds) in [("baseline", [131.0, 1000.0]), ("avx2", [81.0, 500.0])] {
         if width == "avx2" && !has_avx2 {
             eprintln!("no AVX2 here: not counted");
             continue;
         }
         for (method, bound) in ["slerp", "bessel-overhauser"].into_iter().zip(bounds) {
-            let count = |fps| instructions(2400, "uniform", method, fps, width);
+            let count = |fps| instructions(&dense, method, fps, width);
             let (Some(coarse), Some(fine)) = (count(24), count(96)) else {
                 return;
             };
