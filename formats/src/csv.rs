@@ -14,6 +14,8 @@ use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
 pub static FORMAT: Format = Format {
     name: "csv",
     summary: "text, a row for each frame",
+    extensions: &[],
+    probe: |_| false,
     read: None,
     write: Some(WriteResults {
         is_text: true,
@@ -31,6 +33,7 @@ pub static FORMAT: Format = Format {
         },
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),
+    write_motion: None,
 };
 
 impl<W: Write> ResultWriter for CsvWriter<'_, W> {

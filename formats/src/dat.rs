@@ -16,18 +16,17 @@ use glam::{DQuat, Quat};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, Loaded, ReadOptions};
-use crate::quaternion::{dot, rounded, unit};
+use crate::keys::QUIET_NORM;
+use crate::motion::Motion;
+use crate::quaternion::{dot, nearest_unit};
 use crate::source::Source;
 use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
-use tumble::{NORM_TOLERANCE, TrackSet, UNIT_TOLERANCE};
+use tumble::{NORM_TOLERANCE, TrackSet};
 
 /// More boxes are refused.
 pub const MAX_BOXES: usize = 65_536;
-
-/// Norms within this of 1 are normalised without a word: six printed digits.
-const QUIET_NORM: f64 = 0.0077;
 
 /// A dot product this close to 0 is a half turn within f32 rounding.
 const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
@@ -36,8 +35,11 @@ const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
 pub static FORMAT: Format = Format {
     name: "dat",
     summary: "keyframes of a chain of boxes, as text",
+    extensions: &[],
+    probe: |_| false,
     read: Some(open_dat),
     write: None,
+    write_motion: None,
 };
 
 /// Reads a file; `-` is standard input.
@@ -363,23 +365,15 @@ impl Keys {
         // Checked above; a set refuses what slipped through.
         let set = TrackSet::from_shared_times(times, keys)
             .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
-        Ok(Loaded {
+        let clip = Motion {
             set,
-            box_length,
-            warnings: lines.warnings,
+            ..Motion::default()
+        };
+        Ok(Loaded {
+            box_length: Some(box_length),
+            ..Loaded::of(clip, lines.warnings)
         })
     }
-}
-
-/// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
-/// writing and reading a set is exact; others are normalised in f64.
-fn nearest_unit(key: DQuat) -> Quat {
-    let near = rounded(key);
-    let exact = near.as_dquat();
-    if (dot(exact, exact).sqrt() - 1.0).abs() <= UNIT_TOLERANCE {
-        return near;
-    }
-    unit(key)
 }
 
 /// Writes a set whose tracks share their times, with boxes of that length. Numbers have as

@@ -12,16 +12,39 @@ pub enum Severity {
     Warning,
 }
 
+/// Where in an input a fault is.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// In text: both count from 1, columns in characters.
+    Text {
+        /// The line.
+        line: u64,
+        /// The column.
+        column: u64,
+    },
+    /// In what has no lines: a JSON pointer such as `/animations/0`, the name of an archive's
+    /// member, or a table's column and row.
+    Inside(String),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text { line, column } => write!(f, "{line}:{column}"),
+            Self::Inside(place) => f.write_str(place),
+        }
+    }
+}
+
 /// One thing to say about an input.
 ///
-/// Displayed as `FILE:LINE:COLUMN: error[CODE]: what is wrong, the value, the fix`.
-/// Lines and columns count from 1, columns in characters.
+/// Displayed as `FILE:PLACE: error[CODE]: what is wrong, the value, the fix`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
     /// The input's name, as it was given.
     pub file: String,
-    /// Line and column, where the fault has a place.
-    pub place: Option<(u64, u64)>,
+    /// Where the fault is, unless it is the input as a whole.
+    pub place: Option<Place>,
     /// Which fault.
     pub code: Code,
     /// What is wrong, in words.
@@ -33,8 +56,8 @@ pub struct Diagnostic {
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:", self.file)?;
-        if let Some((line, column)) = self.place {
-            write!(f, "{line}:{column}:")?;
+        if let Some(place) = &self.place {
+            write!(f, "{place}:")?;
         }
         let severity = match self.code.severity() {
             Severity::Error => "error",
@@ -49,6 +72,26 @@ impl fmt::Display for Diagnostic {
 }
 
 impl std::error::Error for Diagnostic {}
+
+impl Diagnostic {
+    /// A fault of an input as a whole.
+    pub fn new(file: impl Into<String>, code: Code, message: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            place: None,
+            code,
+            message: message.into(),
+            count: 1,
+        }
+    }
+
+    /// The same fault, inside the input: at a JSON pointer, a member, a column.
+    #[must_use]
+    pub fn inside(mut self, place: impl Into<String>) -> Self {
+        self.place = Some(Place::Inside(place.into()));
+        self
+    }
+}
 
 macro_rules! codes {
     ($($variant:ident = $code:literal, $title:literal, $explanation:literal;)+) => {
@@ -104,7 +147,15 @@ codes! {
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of it are normalised; others are more likely a mistake, such as a missing column.";
     TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line.";
+    KeyNorm = "E027", "no rotation", "A key's quaternion has a norm under 1e-6; no rotation can be told from it.";
+    EqualTimes = "E028", "two keys at one time", "The values differ, so one of the keys has to go: --duplicates first or last says which.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
+    Unrecognised = "E031", "an unknown format", "Neither the first bytes nor the ending of the name tell a format that can be read; --format names it.";
+    // E1xx and W1xx: glTF.
+    // E2xx and W2xx: BVH.
+    // E3xx and W3xx: NPY and NPZ.
+    // E4xx and W4xx: tables (Parquet, Arrow, CSV).
+    // E5xx and W5xx: trajectories.
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -117,6 +168,7 @@ codes! {
     Gap = "W010", "an unusual gap between times", "Under 1e-9 s or over 1e9 s: are the times seconds?";
     OneKey = "W011", "only one key", "The set stands still.";
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both ways round are equally short; the signs as stored decide.";
+    EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
 }
 
 impl Code {

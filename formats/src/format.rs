@@ -4,18 +4,22 @@
 use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::Quat;
-use tumble::{Encoding, Layout, Timeline, TrackSet};
+use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::keys::Duplicates;
+use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::text::lines::Limits;
 use crate::{csv, dat, npy};
 
-/// Every format; the first that can be read is that of inputs whose name tells none, the first
-/// that can be written that of such outputs.
+/// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
+/// format that can be read is that of inputs which tell neither way, the first that can be written
+/// that of such outputs.
 pub static FORMATS: [&Format; 3] = [&dat::FORMAT, &npy::FORMAT, &csv::FORMAT];
 
 /// A file format.
@@ -24,33 +28,138 @@ pub struct Format {
     pub name: &'static str,
     /// What it is, in a few words.
     pub summary: &'static str,
+    /// Other extensions of its files.
+    pub extensions: &'static [&'static str],
+    /// Whether a file that begins with these bytes (up to 64) is one.
+    pub probe: fn(&[u8]) -> bool,
     /// Reads keyframes from a file; `-` is standard input.
     pub read: Option<ReadKeys>,
-    /// How results are written.
+    /// How rotations are written as they come.
     pub write: Option<WriteResults>,
+    /// How sampled clips are written.
+    pub write_motion: Option<WriteMotion>,
 }
 
 /// Reads the keyframes of a file.
 pub type ReadKeys = fn(&Path, &ReadOptions) -> Result<Loaded, Diagnostic>;
 
 /// How inputs are read.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     /// How much is read at most.
     pub limits: Limits,
     /// Named pipes are read too.
     pub pipes: bool,
+    /// Times stay as the file has them, instead of on the frames that they were rounded from.
+    pub raw_times: bool,
+    /// What becomes of two different keys at one time.
+    pub duplicates: Duplicates,
+    /// The rate of the keys, for files that do not say it.
+    pub source_rate: Option<FrameRate>,
+    /// Which of a file's columns or arrays are what, for files that do not say it:
+    /// `rotations=keys:wxyz,time=t`.
+    pub map: Option<String>,
+    /// The unit of times that are whole numbers: `s`, `ms`, `us` or `ns`.
+    pub time_unit: Option<TimeUnit>,
+}
+
+/// The unit of times that are whole numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TimeUnit {
+    /// Seconds.
+    Seconds,
+    /// Thousandths of a second.
+    Milliseconds,
+    /// Millionths of a second.
+    Microseconds,
+    /// Billionths of a second.
+    Nanoseconds,
+}
+
+impl TimeUnit {
+    /// How many of them a second has.
+    #[must_use]
+    pub fn per_second(self) -> u64 {
+        match self {
+            Self::Seconds => 1,
+            Self::Milliseconds => 1_000,
+            Self::Microseconds => 1_000_000,
+            Self::Nanoseconds => 1_000_000_000,
+        }
+    }
 }
 
 /// What was read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Loaded {
-    /// The tracks of the file.
-    pub set: TrackSet,
-    /// The length of each box (a length, not a duration), where the file says it; else 1.
-    pub box_length: f64,
+    /// The clips of the file that could be read.
+    pub clips: Vec<Motion>,
+    /// Why the others could not; those that could are whole.
+    pub refused: Vec<Diagnostic>,
+    /// The length of each box of a chain (a length, not a duration), where the file is about such.
+    pub box_length: Option<f64>,
     /// What is remarkable, one entry for each kind.
     pub warnings: Vec<Diagnostic>,
+    /// The file itself, where it can be written again with other keys and everything else kept.
+    pub document: Option<Arc<dyn Document>>,
+}
+
+impl Loaded {
+    /// A file of one clip.
+    #[must_use]
+    pub fn of(clip: Motion, warnings: Vec<Diagnostic>) -> Self {
+        Self {
+            clips: vec![clip],
+            warnings,
+            ..Self::default()
+        }
+    }
+}
+
+/// A file that keeps what it holds beside animations.
+pub trait Document: fmt::Debug + Send + Sync {
+    /// The times, seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the
+    /// rate, and the clip's first and last time themselves, so that its length stays.
+    ///
+    /// # Errors
+    /// When the file's type of times cannot tell frames of this rate apart.
+    fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic>;
+
+    /// Writes the file in the format of that name, with the samples of some of its clips, each
+    /// with the clip's place, instead of their keys. Gives warnings.
+    ///
+    /// # Errors
+    /// When writing fails, or what was read cannot be written in this way.
+    fn write(
+        &self,
+        clips: &[(usize, Sampled<'_>)],
+        format: &str,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError>;
+}
+
+/// Writes sampled clips; gives warnings of what the format has no room for.
+pub type WriteMotion =
+    fn(&[Sampled<'_>], &MotionOptions, &mut dyn Write) -> Result<Vec<Diagnostic>, WriteError>;
+
+/// How sampled clips are written.
+#[derive(Debug, Clone, Default)]
+pub struct MotionOptions {
+    /// What messages call the output.
+    pub name: String,
+    /// The axes of the angles, for formats that have angles (BVH) [default: ZXY].
+    pub sequence: Option<EulerSequence>,
+}
+
+/// Why samples could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The system's reason.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The format cannot hold these samples.
+    #[error(transparent)]
+    Refused(#[from] Diagnostic),
 }
 
 /// How a format holds results.
@@ -105,8 +214,13 @@ impl Format {
     /// The format with that name, in any case.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
-        let mut formats = FORMATS.into_iter();
-        formats.find(|format| format.name.eq_ignore_ascii_case(name))
+        let has_name = |format: &&Self| {
+            let mut names = [format.name]
+                .into_iter()
+                .chain(format.extensions.iter().copied());
+            names.any(|own| own.eq_ignore_ascii_case(name))
+        };
+        FORMATS.into_iter().find(has_name)
     }
 
     /// The format that the extension of a file tells.
@@ -127,11 +241,25 @@ impl Format {
         formats.filter_map(|format| Some((format, format.write.as_ref()?)))
     }
 
-    /// What reads a file: by its extension; by the first of the table where that tells none.
+    /// The format of a file that begins with these bytes; by its name where they tell nothing, and
+    /// the first of the table where that tells nothing either.
     #[must_use]
-    pub fn reader(path: &Path) -> Option<ReadKeys> {
-        let named = Self::of(path).and_then(|format| format.read);
-        named.or_else(|| Self::readable().map(|(_, read)| read).next())
+    pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
+        let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
+        probed.or_else(|| Self::of(path)).unwrap_or(FORMATS[0])
+    }
+
+    /// Reads a file in this format.
+    ///
+    /// # Errors
+    /// The first fault that refuses the file; also when the format cannot be read.
+    pub fn open(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        let Some(read) = self.read else {
+            let message = format!("{} files are written, not read", self.name);
+            let name = path.display().to_string();
+            return Err(Diagnostic::new(name, Code::Unrecognised, message));
+        };
+        read(path, options)
     }
 }
 
@@ -154,9 +282,12 @@ mod tests {
                 Format::of(Path::new(&shouted)).unwrap(),
                 format
             ));
-            assert!(format.read.is_some() || format.write.is_some());
+            assert!(
+                format.read.is_some() || format.write.is_some() || format.write_motion.is_some()
+            );
         }
         assert!(Format::of(Path::new("walk")).is_none());
-        assert!(Format::reader(Path::new("walk")).is_some());
+        assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");
+        assert_eq!(Format::detect(Path::new("walk"), b"\x93NUMPY").name, "npy");
     }
 }

@@ -24,6 +24,8 @@ pub enum ComponentOrder {
 pub static FORMAT: Format = Format {
     name: "npy",
     summary: "NumPy's, float32",
+    extensions: &[],
+    probe: |start| start.starts_with(b"\x93NUMPY"),
     read: None,
     write: Some(WriteResults {
         is_text: false,
@@ -32,6 +34,7 @@ pub static FORMAT: Format = Format {
         rotations: |out, result| Ok(Box::new(NpyWriter::of(out, result)?)),
         poses: |poses, mut out| poses.write_npy(&mut out),
     }),
+    write_motion: None,
 };
 
 /// Rotations written at once, so that a signal is noticed soon: 4 MB.

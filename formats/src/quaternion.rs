@@ -1,6 +1,7 @@
 //! Quaternions on the way from text to keys.
 
 use glam::{DQuat, Quat};
+use tumble::UNIT_TOLERANCE;
 
 /// The inner product in R⁴.
 pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {
@@ -16,4 +17,15 @@ pub(crate) fn rounded(q: DQuat) -> Quat {
 pub(crate) fn unit(q: DQuat) -> Quat {
     let norm = dot(q, q).sqrt();
     Quat::from_array(q.to_array().map(|component| (component / norm) as f32))
+}
+
+/// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
+/// writing and reading a set is exact; others are normalised in f64.
+pub(crate) fn nearest_unit(key: DQuat) -> Quat {
+    let near = rounded(key);
+    let exact = near.as_dquat();
+    if (dot(exact, exact).sqrt() - 1.0).abs() <= UNIT_TOLERANCE {
+        return near;
+    }
+    unit(key)
 }

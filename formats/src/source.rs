@@ -17,13 +17,7 @@ impl Source {
     /// `-` is standard input; a named pipe is opened only when `pipes` says so.
     pub(super) fn open(path: &Path, pipes: bool) -> Result<Self, Diagnostic> {
         let name = path.display().to_string();
-        let refuse = |code, message: String| Diagnostic {
-            file: name.clone(),
-            place: None,
-            code,
-            message,
-            count: 1,
-        };
+        let refuse = |code, message: String| Diagnostic::new(&name, code, message);
         let unreadable = |error: io::Error| refuse(Code::Open, format!("cannot be read: {error}"));
         if path.as_os_str() == "-" {
             let reader: Box<dyn Read> = Box::new(io::stdin().lock());
@@ -68,13 +62,8 @@ impl Source {
         if same {
             return Ok(());
         }
-        Err(Diagnostic {
-            file: self.name.clone(),
-            place: None,
-            code: Code::Changed,
-            message: "changed while it was read; read it again when its writer is done".to_owned(),
-            count: 1,
-        })
+        let message = "changed while it was read; read it again when its writer is done";
+        Err(Diagnostic::new(&self.name, Code::Changed, message))
     }
 }
 

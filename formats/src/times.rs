@@ -47,6 +47,7 @@ pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnost
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnostic::Place;
 
     #[test]
     fn blanks_commas_lines_and_comments_separate() {
@@ -58,7 +59,8 @@ mod tests {
     #[test]
     fn faults_have_their_place() {
         let error = read_times("t", "0\n 1 x".as_bytes()).unwrap_err();
-        assert_eq!((error.place, error.code), (Some((2, 4)), Code::Number));
+        let place = Place::Text { line: 2, column: 4 };
+        assert_eq!((error.place, error.code), (Some(place), Code::Number));
         assert_eq!(
             read_times("t", "#\n".as_bytes()).unwrap_err().code,
             Code::Time

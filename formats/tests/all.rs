@@ -1,3 +1,4 @@
 //! Every test of the files.
 
 mod dat_fixtures;
+mod support;

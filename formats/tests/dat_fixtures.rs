@@ -35,7 +35,7 @@ fn said(path: &Path) -> String {
     let bytes = fs::read(path).unwrap();
     match read_dat(&name(path), &*bytes, &ReadOptions::default()) {
         Ok(loaded) => {
-            let (tracks, keys) = (loaded.set.track_count(), loaded.set.key_count());
+            let (tracks, keys) = (loaded.clips[0].set.track_count(), loaded.clips[0].set.key_count());
             let mut text = format!("accepted: {tracks} tracks, {keys} keys\n");
             for warning in &loaded.warnings {
                 assert_eq!(warning.code.severity(), Severity::Warning);
@@ -183,7 +183,7 @@ fn the_widest_file_is_read() {
     let text = format!("# 65536 3\n0{row}\n1{row}\n");
     let loaded = read_dat("t", text.as_bytes(), &ReadOptions::default()).unwrap();
     assert_eq!(
-        (loaded.set.track_count(), loaded.set.key_count()),
+        (loaded.clips[0].set.track_count(), loaded.clips[0].set.key_count()),
         (65_536, 131_072)
     );
 }
@@ -216,13 +216,13 @@ proptest! {
         let mut file = Vec::new();
         write_dat(&mut file, &set, 0.1).unwrap();
         let loaded = read_dat("t", &*file, &ReadOptions::default()).unwrap();
-        let read = loaded.set;
+        let read = loaded.clips[0].set.clone();
         prop_assert_eq!(read.track(0).times, set.track(0).times);
         let bits = |set: &TrackSet| -> Vec<[u32; 4]> {
             set.track(0).keys.iter().map(|q| q.to_array().map(f32::to_bits)).collect()
         };
         prop_assert_eq!(bits(&read), bits(&set));
-        prop_assert_eq!(loaded.box_length, 0.1);
+        prop_assert_eq!(loaded.box_length, Some(0.1));
     }
 }
 

@@ -99,7 +99,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
             for warning in &loaded.warnings {
                 place_is_inside(warning.place);
             }
-            for track in loaded.set.tracks() {
+            for track in loaded.clips[0].set.tracks() {
                 assert!(!track.keys.is_empty());
                 assert!(track.times.windows(2).all(|pair| pair[0] < pair[1]));
                 for key in track.keys {
@@ -107,12 +107,12 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
                 }
             }
             let mut written = Vec::new();
-            write_dat(&mut written, &loaded.set, loaded.box_length)
+            write_dat(&mut written, &loaded.clips[0].set, loaded.box_length.unwrap_or(1.0))
                 .expect("memory takes everything");
             let again = read_dat("fuzz", &*written, &ReadOptions::default()).expect("our own");
-            assert_eq!(bits(&again.set), bits(&loaded.set));
+            assert_eq!(bits(&again.clips[0].set), bits(&loaded.clips[0].set));
             let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
-            signature((codes, loaded.set.track_count().min(3)))
+            signature((codes, loaded.clips[0].set.track_count().min(3)))
         }
         Err(error) => {
             place_is_inside(error.place);

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Read};
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::source::MAX_BYTES;
 
 /// Lines of one input, with their numbers; what is remarkable about them collects
@@ -150,7 +150,10 @@ impl<R: BufRead> Lines<R> {
     pub(crate) fn refuse(&self, column: u64, code: Code, message: String) -> Diagnostic {
         Diagnostic {
             file: self.file.clone(),
-            place: Some((self.number, column)),
+            place: Some(Place::Text {
+                line: self.number,
+                column,
+            }),
             code,
             message,
             count: 1,
@@ -237,13 +240,7 @@ impl<R: BufRead> Lines<R> {
 }
 
 fn io_error(file: &str, error: &std::io::Error) -> Diagnostic {
-    Diagnostic {
-        file: file.to_owned(),
-        place: None,
-        code: Code::Open,
-        message: format!("cannot be read: {error}"),
-        count: 1,
-    }
+    Diagnostic::new(file, Code::Open, format!("cannot be read: {error}"))
 }
 
 /// The tokens of a line with their columns, both from 1.

@@ -1,0 +1,191 @@
+//! Keys as files have them, made into keys as sets take them: unit quaternions at increasing times.
+
+use glam::{DQuat, Quat};
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::quaternion::{dot, nearest_unit};
+use crate::warnings::Warnings;
+
+/// What becomes of two keys at one time whose values differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Duplicates {
+    /// The input is refused.
+    #[default]
+    Refuse,
+    /// The first of them stays.
+    First,
+    /// The last of them stays.
+    Last,
+}
+
+/// Norms within this of 1 are normalised without a word: six printed digits.
+pub(crate) const QUIET_NORM: f64 = 0.0077;
+
+/// Quaternions of a smaller norm say nothing about a rotation.
+const LEAST_NORM: f64 = 1e-6;
+
+/// Where the keys of one channel come from, for messages.
+pub(crate) struct Origin<'a> {
+    /// What messages call the input.
+    pub(crate) file: &'a str,
+    /// Where key `i` is.
+    pub(crate) place: &'a dyn Fn(usize) -> Place,
+    pub(crate) duplicates: Duplicates,
+}
+
+impl Origin<'_> {
+    fn refuse(&self, key: usize, code: Code, message: String) -> Diagnostic {
+        Diagnostic {
+            place: Some((self.place)(key)),
+            ..Diagnostic::new(self.file, code, message)
+        }
+    }
+
+    /// Unit quaternions in f32; signs stay as they are.
+    ///
+    /// # Errors
+    /// A key that is not finite, or whose norm is under 1e-6.
+    pub(crate) fn unit(
+        &self,
+        keys: impl IntoIterator<Item = DQuat>,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<Quat>, Diagnostic> {
+        let unit = |(place, key): (usize, DQuat)| {
+            let norm = dot(key, key).sqrt();
+            if !norm.is_finite() {
+                let message = format!("the quaternion {key} is not finite; repair or remove it");
+                return Err(self.refuse(place, Code::NotFinite, message));
+            }
+            if norm < LEAST_NORM {
+                let message = format!("the quaternion has norm {norm:e}; a rotation has norm 1");
+                return Err(self.refuse(place, Code::KeyNorm, message));
+            }
+            if (norm - 1.0).abs() > QUIET_NORM {
+                warnings.warn(Code::NormOff, || {
+                    let message = format!("the quaternion has norm {norm:.6}; it is normalised");
+                    (Some((self.place)(place)), message)
+                });
+            }
+            Ok(nearest_unit(key))
+        };
+        keys.into_iter().enumerate().map(unit).collect()
+    }
+
+    /// Which keys stay, so that times increase strictly; `None` if all do. `equal(i, j)` says
+    /// whether the values of two keys are the same.
+    ///
+    /// # Errors
+    /// Times that are not finite or decrease, and equal times with values that differ where
+    /// [`Duplicates::Refuse`] is asked for.
+    pub(crate) fn increasing(
+        &self,
+        times: &[f64],
+        equal: impl Fn(usize, usize) -> bool,
+        warnings: &mut Warnings,
+    ) -> Result<Option<Vec<usize>>, Diagnostic> {
+        if let Some(key) = times.iter().position(|time| !time.is_finite()) {
+            let message = format!("the time {} is not finite", times[key]);
+            return Err(self.refuse(key, Code::NotFinite, message));
+        }
+        if times.windows(2).all(|pair| pair[0] < pair[1]) {
+            return Ok(None);
+        }
+        let mut kept: Vec<usize> = Vec::with_capacity(times.len());
+        for (key, &time) in times.iter().enumerate() {
+            let Some(&before) = kept.last() else {
+                kept.push(key);
+                continue;
+            };
+            let last = times[before];
+            if time > last {
+                kept.push(key);
+            } else if time < last {
+                let message =
+                    format!("time {time} comes before the one before it, {last}; times increase");
+                return Err(self.refuse(key, Code::TimeNotIncreasing, message));
+            } else if equal(before, key) {
+                warnings.warn(Code::EqualKeys, || {
+                    let message = format!("two equal keys at time {time}; one is dropped");
+                    (Some((self.place)(key)), message)
+                });
+            } else {
+                match self.duplicates {
+                    Duplicates::Refuse => {
+                        let message = format!(
+                            "two different keys at time {time}; --duplicates first or last keeps one"
+                        );
+                        return Err(self.refuse(key, Code::EqualTimes, message));
+                    }
+                    Duplicates::First => {}
+                    Duplicates::Last => {
+                        kept.pop();
+                        kept.push(key);
+                    }
+                }
+            }
+        }
+        Ok(Some(kept))
+    }
+}
+
+/// The entries of a list whose keys stay.
+pub(crate) fn select<T: Copy>(list: &mut Vec<T>, kept: Option<&[usize]>) {
+    if let Some(kept) = kept {
+        *list = kept.iter().map(|&key| list[key]).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn origin(duplicates: Duplicates) -> Origin<'static> {
+        Origin {
+            file: "t",
+            place: &|key| Place::Inside(format!("key {key}")),
+            duplicates,
+        }
+    }
+
+    #[test]
+    fn keys_are_normalised_and_what_is_no_rotation_is_refused() {
+        let mut warnings = Warnings::new("t");
+        let keys = [
+            DQuat::from_xyzw(0.0, 0.0, 0.0, -2.0),
+            DQuat::from_xyzw(0.0, 3e-6, 0.0, 0.0),
+        ];
+        let unit = origin(Duplicates::Refuse)
+            .unit(keys, &mut warnings)
+            .unwrap();
+        assert_eq!(unit, [-Quat::IDENTITY, Quat::from_xyzw(0.0, 1.0, 0.0, 0.0)]);
+        let warnings = warnings.into_list();
+        assert_eq!((warnings.len(), warnings[0].count), (1, 2));
+        for (bad, code) in [(0.0, Code::KeyNorm), (f64::NAN, Code::NotFinite)] {
+            let keys = [DQuat::IDENTITY, DQuat::from_xyzw(0.0, 0.0, bad, 0.0)];
+            let found = origin(Duplicates::Refuse).unit(keys, &mut Warnings::new("t"));
+            let error = found.unwrap_err();
+            assert_eq!(
+                (error.code, error.to_string().contains("key 1")),
+                (code, true)
+            );
+        }
+    }
+
+    #[test]
+    fn equal_times_keep_one_key_or_are_refused() {
+        let (times, values) = ([0.0, 1.0, 1.0, 1.0, 2.0], [5, 6, 6, 7, 8]);
+        let kept = |duplicates| {
+            let equal = |i: usize, j: usize| values[i] == values[j];
+            origin(duplicates).increasing(&times, equal, &mut Warnings::new("t"))
+        };
+        assert_eq!(kept(Duplicates::First).unwrap(), Some(vec![0, 1, 4]));
+        assert_eq!(kept(Duplicates::Last).unwrap(), Some(vec![0, 3, 4]));
+        assert_eq!(kept(Duplicates::Refuse).unwrap_err().code, Code::EqualTimes);
+        let falling = origin(Duplicates::Last).increasing(
+            &[0.0, 1.0, 0.5],
+            |_, _| true,
+            &mut Warnings::new("t"),
+        );
+        assert_eq!(falling.unwrap_err().code, Code::TimeNotIncreasing);
+    }
+}

@@ -1,0 +1,100 @@
+//! What motion files hold: clips of keyed joints over a skeleton.
+
+use glam::{Quat, Vec3};
+use tumble::{FrameRate, TrackSet};
+
+/// One clip of a file.
+///
+/// `skeleton` and `channels` have an entry for each track of `set`, or none at all. A joint whose
+/// channel has no keys rests: its track has one key, the rest rotation, and its `skeleton` entry
+/// has the rest translation and scale.
+#[derive(Debug, Clone, Default)]
+pub struct Motion {
+    /// The clip's name, if the file gives it one.
+    pub name: Option<String>,
+    /// Keys of rotations, one track a joint, and the keys of translations and scales beside them.
+    pub set: TrackSet,
+    /// How the tracks hang together; empty for tracks that have nothing to do with each other.
+    pub skeleton: Vec<Joint>,
+    /// How each track is keyed; empty where rotations are keyed and the file names no method.
+    pub channels: Vec<Channels>,
+    /// The rate on whose frames all times lie, if there is one.
+    pub rate: Option<FrameRate>,
+    /// Rotations and translations are relative to the world instead of the parent.
+    pub is_world: bool,
+}
+
+/// A joint of a skeleton.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// The track of the joint that it hangs on; a root has none. Parents may come after their
+    /// children.
+    pub parent: Option<usize>,
+    /// Its transform, relative to the parent, where nothing moves it.
+    pub rest: Transform,
+}
+
+/// A scale, then a rotation, then a translation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transform {
+    /// Where the origin goes, in the file's units.
+    pub translation: Vec3,
+    /// A unit quaternion.
+    pub rotation: Quat,
+    /// Along the axes.
+    pub scale: Vec3,
+}
+
+impl Default for Transform {
+    /// Nothing moves.
+    fn default() -> Self {
+        Self {
+            translation: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
+            scale: Vec3::ONE,
+        }
+    }
+}
+
+/// How the channels of one track are interpolated; `None` for a channel without keys, which rests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Channels {
+    /// Of the rotation.
+    pub rotation: Option<Sampler>,
+    /// Of the translation.
+    pub translation: Option<Sampler>,
+    /// Of the scale.
+    pub scale: Option<Sampler>,
+}
+
+/// How a channel is interpolated between its keys, as glTF 2.0 defines it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Sampler {
+    /// The key at or before the time.
+    Step,
+    /// Straight lines; the shorter arc for rotations.
+    Linear,
+    /// Hermite cubics with given tangents; rotations are normalised.
+    Cubic,
+}
+
+/// What a clip is at each of its samples, ready to be written.
+///
+/// Lists are in the order `[sample][track]`.
+#[derive(Debug, Clone)]
+pub struct Sampled<'a> {
+    /// The clip.
+    pub clip: &'a Motion,
+    /// Times of the samples, seconds, increasing.
+    pub times: &'a [f64],
+    /// The rate, where the times are whole frames of one.
+    pub rate: Option<FrameRate>,
+    /// Unit quaternions, each with the sign that continues the one before it.
+    pub rotations: &'a [Quat],
+    /// Translations of all tracks; empty where no track has any.
+    pub translations: &'a [Vec3],
+    /// Scales of all tracks; empty where no track has any.
+    pub scales: &'a [Vec3],
+    /// What made them, for formats that have room for it: `("method", "slerp")`.
+    pub notes: &'a [(&'a str, String)],
+}

@@ -1,0 +1,42 @@
+//! Warnings of one input, one for each kind.
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+
+/// Collects what is remarkable about an input: the first of each code keeps its place and words,
+/// the others are counted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Warnings {
+    file: String,
+    list: Vec<Diagnostic>,
+}
+
+impl Warnings {
+    /// Of an input that messages call `file`.
+    pub(crate) fn new(file: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            list: Vec::new(),
+        }
+    }
+
+    /// Counts a warning; `place` and `message` are made only for the first of its code.
+    pub(crate) fn warn<M: Into<String>>(
+        &mut self,
+        code: Code,
+        describe: impl FnOnce() -> (Option<Place>, M),
+    ) {
+        if let Some(known) = self.list.iter_mut().find(|known| known.code == code) {
+            known.count += 1;
+            return;
+        }
+        let (place, message) = describe();
+        let mut warning = Diagnostic::new(&self.file, code, message);
+        warning.place = place;
+        self.list.push(warning);
+    }
+
+    /// All of them, in the order in which their kinds came up.
+    pub(crate) fn into_list(self) -> Vec<Diagnostic> {
+        self.list
+    }
+}

@@ -1,0 +1,14 @@
+//! What the tests of the files share.
+
+use std::path::PathBuf;
+
+/// The folder of sample files from elsewhere, which a clone does not bring. Where it is missing the
+/// test says so and compares nothing.
+pub(crate) fn shared_data() -> Option<PathBuf> {
+    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data"));
+    let found = folder.is_dir();
+    if !found {
+        eprintln!("{} is not there: nothing compared", folder.display());
+    }
+    found.then_some(folder)
+}
