@@ -152,7 +152,11 @@ impl Generate {
         let mut file = Vec::new();
         self.write(&mut file).expect("memory takes everything");
         let loaded = read_dat("generated", &*file, &ReadOptions::default());
-        Ok(loaded.expect("what is generated can be read").clips.remove(0).set)
+        Ok(loaded
+            .expect("what is generated can be read")
+            .clips
+            .remove(0)
+            .set)
     }
 }
 

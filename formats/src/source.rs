@@ -50,6 +50,35 @@ impl Source {
         })
     }
 
+    /// All bytes of a file that is at most so long.
+    ///
+    /// # Errors
+    /// When reading fails, or the file is longer or changes meanwhile.
+    pub(super) fn into_bytes(mut self, most: u64) -> Result<Vec<u8>, Diagnostic> {
+        let known = self.file.as_ref().map_or(0, |(_, metadata)| metadata.len());
+        let refuse = |code, message: String| Diagnostic::new(&self.name, code, message);
+        let too_long = || {
+            refuse(
+                Code::FileTooLong,
+                format!("the input is longer than {most} bytes"),
+            )
+        };
+        if known > most {
+            return Err(too_long());
+        }
+        let mut bytes = Vec::new();
+        let read = bytes
+            .try_reserve_exact(known as usize)
+            .map_err(io::Error::from)
+            .and_then(|()| self.reader.by_ref().take(most + 1).read_to_end(&mut bytes));
+        read.map_err(|error| refuse(Code::Open, format!("cannot be read: {error}")))?;
+        if bytes.len() as u64 > most {
+            return Err(too_long());
+        }
+        self.check_unchanged()?;
+        Ok(bytes)
+    }
+
     /// Refuses a file that was written to while it was read.
     pub(super) fn check_unchanged(&self) -> Result<(), Diagnostic> {
         let Some((file, before)) = &self.file else {

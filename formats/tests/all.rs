@@ -1,4 +1,5 @@
 //! Every test of the files.
 
 mod dat_fixtures;
+mod fixtures;
 mod support;

@@ -1,9 +1,8 @@
-//! Every kind of `.dat` file, good and bad, with what is said of it: the fixtures in
-//! `tests/fixtures/dat/`, each with its `.expected` beside it.
+//! `.dat` files beyond those in `tests/fixtures/dat/`: endless, unreadable, arbitrary, the widest.
 
+use std::io;
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::path::Path;
 
 use glam::Quat;
 use proptest::prelude::*;
@@ -12,86 +11,7 @@ use tumble_formats::Limits;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::{open_dat, read_dat, write_dat};
 use tumble_formats::times::read_times;
-use tumble_formats::{Code, Diagnostic, Severity};
-
-fn fixtures() -> Vec<PathBuf> {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/dat");
-    let entries = fs::read_dir(directory)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = entries
-        .filter(|path| path.extension().unwrap() == "dat")
-        .collect();
-    files.sort();
-    files
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().unwrap().to_str().unwrap().to_owned()
-}
-
-/// What a person would be told: the verdict, then each message.
-fn said(path: &Path) -> String {
-    let bytes = fs::read(path).unwrap();
-    match read_dat(&name(path), &*bytes, &ReadOptions::default()) {
-        Ok(loaded) => {
-            let (tracks, keys) = (loaded.clips[0].set.track_count(), loaded.clips[0].set.key_count());
-            let mut text = format!("accepted: {tracks} tracks, {keys} keys\n");
-            for warning in &loaded.warnings {
-                assert_eq!(warning.code.severity(), Severity::Warning);
-                text += &format!("{warning}\n");
-            }
-            text
-        }
-        Err(error) => {
-            assert_eq!(error.code.severity(), Severity::Error);
-            format!("refused\n{error}\n")
-        }
-    }
-}
-
-/// Set `UPDATE_EXPECTED=1` to write what is said now, then read the difference.
-#[test]
-fn every_fixture_gets_its_verdict_and_message() {
-    let files = fixtures();
-    assert!(files.len() >= 75, "{} fixtures", files.len());
-    let mut wrong = Vec::new();
-    for path in files {
-        let expected = path.with_extension("expected");
-        let said = said(&path);
-        if std::env::var_os("UPDATE_EXPECTED").is_some() {
-            fs::write(&expected, &said).unwrap();
-        }
-        let wanted = fs::read_to_string(&expected).unwrap_or_default();
-        if said != wanted {
-            wrong.push(format!("{}:\n{said}wanted:\n{wanted}", name(&path)));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-/// A code that no fixture shows is a code that nobody has seen.
-#[test]
-fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
-    let all: String = fixtures().iter().map(|path| said(path)).collect();
-    let elsewhere = [
-        Code::Open,
-        Code::NotAFile,
-        Code::Changed,
-        Code::LineTooLong,
-        Code::FileTooLong,
-        Code::Time,
-    ];
-    for &code in Code::ALL {
-        let shown = all.contains(&format!("[{code}]"));
-        assert!(
-            shown != elsewhere.contains(&code),
-            "{code}: {}",
-            code.title()
-        );
-        assert_eq!(Code::named(&code.name().to_lowercase()), Some(code));
-    }
-}
+use tumble_formats::{Code, Diagnostic};
 
 fn refusal(path: &Path) -> Diagnostic {
     open_dat(path, &ReadOptions::default()).unwrap_err()
@@ -183,7 +103,10 @@ fn the_widest_file_is_read() {
     let text = format!("# 65536 3\n0{row}\n1{row}\n");
     let loaded = read_dat("t", text.as_bytes(), &ReadOptions::default()).unwrap();
     assert_eq!(
-        (loaded.clips[0].set.track_count(), loaded.clips[0].set.key_count()),
+        (
+            loaded.clips[0].set.track_count(),
+            loaded.clips[0].set.key_count()
+        ),
         (65_536, 131_072)
     );
 }
@@ -224,32 +147,4 @@ proptest! {
         prop_assert_eq!(bits(&read), bits(&set));
         prop_assert_eq!(loaded.box_length, Some(0.1));
     }
-}
-
-/// `docs/codes.md`: every code, why, and what is said of a file that has it.
-/// `UPDATE_EXPECTED=1` writes it.
-#[test]
-fn the_page_of_codes_is_up_to_date() {
-    use std::fmt::Write;
-
-    let messages: Vec<String> = fixtures().iter().map(|path| said(path)).collect();
-    let mut page = String::from(
-        "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
-         Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \
-         `tumble explain CODE` says the same.\n",
-    );
-    for &code in Code::ALL {
-        let (title, text) = (code.title(), code.explanation());
-        write!(page, "\n## {code}: {title}\n\n{text}\n").unwrap();
-        let sign = format!("[{code}]");
-        let mut lines = messages.iter().flat_map(|message| message.lines());
-        if let Some(line) = lines.find(|line| line.contains(&sign)) {
-            write!(page, "\n```text\n{line}\n```\n").unwrap();
-        }
-    }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/codes.md");
-    if std::env::var_os("UPDATE_EXPECTED").is_some() {
-        fs::write(&file, &page).unwrap();
-    }
-    assert_eq!(fs::read_to_string(file).unwrap(), page);
 }

@@ -107,8 +107,12 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
                 }
             }
             let mut written = Vec::new();
-            write_dat(&mut written, &loaded.clips[0].set, loaded.box_length.unwrap_or(1.0))
-                .expect("memory takes everything");
+            write_dat(
+                &mut written,
+                &loaded.clips[0].set,
+                loaded.box_length.unwrap_or(1.0),
+            )
+            .expect("memory takes everything");
             let again = read_dat("fuzz", &*written, &ReadOptions::default()).expect("our own");
             assert_eq!(bits(&again.clips[0].set), bits(&loaded.clips[0].set));
             let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();

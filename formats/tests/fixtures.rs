@@ -1,0 +1,133 @@
+//! Every kind of file, good and bad, with what is said of it: the fixtures in
+//! `tests/fixtures/FORMAT/`, each with its `.expected` beside it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tumble_formats::{Code, FORMATS, Format, ReadOptions, Severity};
+
+/// The files in the folders of all formats, those that end in a format's name or extension.
+fn fixtures() -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for format in FORMATS {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/fixtures")
+            .join(format.name);
+        let Ok(entries) = fs::read_dir(&folder) else {
+            assert!(format.read.is_none(), "no fixtures for {}", format.name);
+            continue;
+        };
+        let paths = entries.map(|entry| entry.unwrap().path());
+        let own = paths.filter(|path| Format::of(path).is_some_and(|of| of.name == format.name));
+        let before = files.len();
+        files.extend(own);
+        files[before..].sort();
+    }
+    files
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// What a person would be told: the verdict, then each message.
+fn said(path: &Path) -> String {
+    let folder = path.parent().unwrap();
+    let format = Format::of(path).unwrap();
+    let read = format.open(path, &ReadOptions::default());
+    let mut text = String::new();
+    match read {
+        Ok(loaded) => {
+            for clip in &loaded.clips {
+                let (tracks, keys) = (clip.set.track_count(), clip.set.key_count());
+                text += &format!("accepted: {tracks} tracks, {keys} keys\n");
+            }
+            for error in &loaded.refused {
+                assert_eq!(error.code.severity(), Severity::Error);
+                text += &format!("refused\n{error}\n");
+            }
+            for warning in &loaded.warnings {
+                assert_eq!(warning.code.severity(), Severity::Warning);
+                text += &format!("{warning}\n");
+            }
+        }
+        Err(error) => {
+            assert_eq!(error.code.severity(), Severity::Error);
+            text = format!("refused\n{error}\n");
+        }
+    }
+    text.replace(&format!("{}/", folder.display()), "")
+}
+
+/// Set `UPDATE_EXPECTED=1` to write what is said now, then read the difference.
+#[test]
+fn every_fixture_gets_its_verdict_and_message() {
+    let files = fixtures();
+    assert!(files.len() >= 75, "{} fixtures", files.len());
+    let mut wrong = Vec::new();
+    for path in files {
+        let expected = path.with_extension("expected");
+        let said = said(&path);
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            fs::write(&expected, &said).unwrap();
+        }
+        let wanted = fs::read_to_string(&expected).unwrap_or_default();
+        if said != wanted {
+            wrong.push(format!("{}:\n{said}wanted:\n{wanted}", name(&path)));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A code that no fixture shows is a code that nobody has seen.
+#[test]
+fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
+    let all: String = fixtures().iter().map(|path| said(path)).collect();
+    // Those that need a system's fault, an option or a size that no fixture has; each has a test.
+    let elsewhere = [
+        Code::Open,
+        Code::NotAFile,
+        Code::Changed,
+        Code::LineTooLong,
+        Code::FileTooLong,
+        Code::Unrecognised,
+        Code::Time,
+    ];
+    for &code in Code::ALL {
+        let shown = all.contains(&format!("[{code}]"));
+        assert!(
+            shown != elsewhere.contains(&code),
+            "{code}: {}",
+            code.title()
+        );
+        assert_eq!(Code::named(&code.name().to_lowercase()), Some(code));
+    }
+}
+
+/// `docs/codes.md`: every code, why, and what is said of a file that has it.
+/// `UPDATE_EXPECTED=1` writes it.
+#[test]
+fn the_page_of_codes_is_up_to_date() {
+    use std::fmt::Write;
+
+    let messages: Vec<String> = fixtures().iter().map(|path| said(path)).collect();
+    let mut page = String::from(
+        "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
+         Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \
+         `tumble explain CODE` says the same.\n",
+    );
+    for &code in Code::ALL {
+        let (title, text) = (code.title(), code.explanation());
+        write!(page, "\n## {code}: {title}\n\n{text}\n").unwrap();
+        let sign = format!("[{code}]");
+        let mut lines = messages.iter().flat_map(|message| message.lines());
+        if let Some(line) = lines.find(|line| line.contains(&sign)) {
+            write!(page, "\n```text\n{line}\n```\n").unwrap();
+        }
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/codes.md");
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        fs::write(&file, &page).unwrap();
+    }
+    assert_eq!(fs::read_to_string(file).unwrap(), page);
+}
