@@ -101,6 +101,7 @@ pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 pub use crate::tracks::error::TrackError;
 pub use crate::tracks::key_data::Tcb;
 pub use crate::tracks::set::{Track, TrackSet};
+pub use crate::tracks::vectors::{Channel, VectorKeys};
 
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]

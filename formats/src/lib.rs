@@ -14,10 +14,12 @@ pub mod npy;
 pub mod output;
 pub mod poses;
 mod quaternion;
+pub mod sample;
 mod source;
 mod text;
 pub mod times;
 mod warnings;
+pub mod world;
 
 pub use crate::diagnostic::{Code, Diagnostic, Place, Severity};
 pub use crate::format::{FORMATS, Format, Loaded, ReadOptions};

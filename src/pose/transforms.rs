@@ -74,10 +74,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Transforms, Error> {
         let interpolation = interpolation.into();
-        let evaluate = |channel| {
-            let clip = self.upload_vectors(set, channel, vectors, &interpolation)?;
-            clip.evaluate_as(frames, layout).map(Vectors)
-        };
+        let evaluate = |channel| self.vectors(set, channel, vectors, interpolation, frames, layout);
         Ok(Transforms {
             translations: evaluate(Channel::Translation)?,
             rotations: self.evaluate_as(set, interpolation, frames, layout)?,
@@ -85,16 +82,24 @@ impl Engine {
         })
     }
 
-    fn upload_vectors(
+    /// Evaluates the translations or the scales alone; otherwise as [`Engine::transforms`].
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn vectors(
         &self,
         set: &TrackSet,
         channel: Channel,
         method: VectorMethod,
-        interpolation: &Interpolation,
-    ) -> Result<Clip, Error> {
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vectors, Error> {
+        let interpolation = interpolation.into();
         let group_bytes = self.backend.group_bytes();
-        let data = ClipData::of_vectors(set, channel, method, interpolation, group_bytes);
+        let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes);
         let uploaded = Uploaded::of_data(&self.backend, data, None)?;
-        Ok(Clip::new(self.clone(), uploaded))
+        let clip = Clip::new(self.clone(), uploaded);
+        clip.evaluate_as(frames, layout).map(Vectors)
     }
 }

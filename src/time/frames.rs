@@ -133,6 +133,18 @@ impl Frames {
         self
     }
 
+    /// The same frames for sets whose keys span another time: a start or an end that
+    /// [`Frames::between`] did not give is taken from here, instead of from the set's first and last
+    /// key.
+    #[must_use]
+    pub fn spanning(mut self, (first, last): (f64, f64)) -> Self {
+        if let Request::Rate { start, end, .. } = &mut self.request {
+            start.get_or_insert(first);
+            end.get_or_insert(last);
+        }
+        self
+    }
+
     /// Explicit times, seconds, the same for every track, in any order.
     #[must_use]
     pub fn at(times: Vec<f64>) -> Self {

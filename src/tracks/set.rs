@@ -298,14 +298,14 @@ impl TrackSet {
         self.span
     }
 
-    /// The tracks in `range` as a set of their own.
+    /// Some tracks as a set of their own, such as `0..10` or a list, in that order.
     ///
     /// # Panics
-    /// When the range passes [`TrackSet::track_count`].
+    /// When one of them passes [`TrackSet::track_count`].
     #[must_use]
-    pub fn select(&self, range: Range<usize>) -> Self {
+    pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Self {
         let mut set = Self::default();
-        for index in range {
+        for index in tracks {
             let track = self.track(index);
             let first_time = set.share_or_append(track.times);
             let first_key = set.keys.len();

@@ -23,10 +23,24 @@ pub(crate) struct VectorTrack {
 pub(crate) type VectorTracks = Vec<Option<Arc<VectorTrack>>>;
 
 /// Which of a track's vectors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Channel {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// Where the track's origin goes.
     Translation,
+    /// Along the axes.
     Scale,
+}
+
+/// The keys of one track's translation or scale, borrowed from its [`TrackSet`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VectorKeys<'a> {
+    /// Key times in seconds, strictly increasing.
+    pub times: &'a [f64],
+    /// One vector for each time.
+    pub keys: &'a [Vec3],
+    /// Tangents with which the curve arrives at each key and leaves it, units per second; empty
+    /// where none were given.
+    pub tangents: &'a [[Vec3; 2]],
 }
 
 impl TrackSet {
@@ -108,6 +122,17 @@ impl TrackSet {
             tangents: tangents.to_vec(),
         }));
         Ok(())
+    }
+
+    /// The keys of a track's translation or scale; `None` for a track without.
+    #[must_use]
+    pub fn vector_keys(&self, channel: Channel, track: usize) -> Option<VectorKeys<'_>> {
+        let vectors = self.vectors(channel, track)?;
+        Some(VectorKeys {
+            times: &vectors.times,
+            keys: &vectors.keys,
+            tangents: &vectors.tangents,
+        })
     }
 
     /// A track's translations or scales, if it has any.

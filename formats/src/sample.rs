@@ -1,0 +1,265 @@
+//! Sampling clips: each channel by its own sampler, or all by one method.
+
+use glam::{Quat, Vec3};
+use tumble::{
+    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, VectorMethod, method,
+};
+
+use crate::motion::{Channels, Motion, Sampled, Sampler};
+
+/// How clips are interpolated.
+#[derive(Clone, Copy)]
+pub struct Manner<'a> {
+    /// The method for all channels that are not STEP; `None`: as each channel's sampler says, and
+    /// [`method::BESSEL_OVERHAUSER`] where the file names none.
+    pub method: Option<Method>,
+    /// What else is said of the interpolation, such as ends and wrap modes, for a method.
+    pub with: &'a dyn Fn(Method) -> Interpolation,
+}
+
+/// The rotations, translations and scales of a clip, in the order `[sample][track]`.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    /// Seconds, increasing or in any order that was asked for.
+    pub times: Vec<f64>,
+    /// Unit quaternions.
+    pub rotations: Vec<Quat>,
+    /// Empty where no track has translations.
+    pub translations: Vec<Vec3>,
+    /// Empty where no track has scales.
+    pub scales: Vec<Vec3>,
+}
+
+impl Manner<'_> {
+    /// The one method for the rotations of all tracks; `None` where their samplers differ.
+    #[must_use]
+    pub fn method_of(&self, clip: &Motion) -> Option<Method> {
+        let first = self.rotation_method(clip, 0);
+        let same = |track| self.rotation_method(clip, track).name == first.name;
+        (0..clip.set.track_count()).all(same).then_some(first)
+    }
+
+    fn rotation_method(&self, clip: &Motion, track: usize) -> Method {
+        match clip.channel(track).rotation {
+            Some(Sampler::Step) => method::STEP,
+            Some(Sampler::Linear) => self.method.unwrap_or(method::SLERP),
+            Some(Sampler::Cubic) => self.method.unwrap_or(method::GLTF_CUBIC),
+            // A track at rest has one key, which every method holds: it goes with the others.
+            None => self.method.unwrap_or_else(|| clip.most_common_method()),
+        }
+    }
+
+    fn vector_method(&self, sampler: Option<Sampler>) -> VectorMethod {
+        match (sampler, self.method) {
+            (Some(Sampler::Step), _) => VectorMethod::Step,
+            (Some(Sampler::Linear), None) => VectorMethod::Linear,
+            (Some(Sampler::Cubic), None) => VectorMethod::GltfCubic,
+            (None, None) => VectorMethod::BesselOverhauser,
+            (_, Some(method)) => match method.name {
+                "step" => VectorMethod::Step,
+                "slerp" | "nlerp" => VectorMethod::Linear,
+                "gltf-cubic" => VectorMethod::GltfCubic,
+                "catmull-rom" => VectorMethod::CatmullRom,
+                _ => VectorMethod::BesselOverhauser,
+            },
+        }
+    }
+
+    /// Evaluates all channels of a clip.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn sample(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &Frames,
+    ) -> Result<Samples, Error> {
+        let tracks = clip.set.track_count();
+        // All tracks are sampled at the same times, whichever of them are evaluated together.
+        let frames = match clip.set.time_span() {
+            Some(span) => frames.clone().spanning(span),
+            None => frames.clone(),
+        };
+        let timeline = frames.resolve(tracks, None)?;
+        let times: Vec<f64> = (0..timeline.len()).map(|i| timeline.time(0, i)).collect();
+        let layout = Layout::FrameMajor;
+        let mut samples = Samples {
+            rotations: self.rotations(engine, clip, &frames, layout)?,
+            times,
+            ..Samples::default()
+        };
+        continue_signs(&mut samples.rotations, tracks);
+        samples.translations = self.vectors(engine, clip, &frames, Channel::Translation)?;
+        samples.scales = self.vectors(engine, clip, &frames, Channel::Scale)?;
+        Ok(samples)
+    }
+
+    /// Evaluates the rotations of a clip, each track by its own sampler.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn rotations(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vec<Quat>, Error> {
+        let tracks = clip.set.track_count();
+        let methods: Vec<Method> = (0..tracks).map(|t| self.rotation_method(clip, t)).collect();
+        let mut all = Vec::new();
+        for group in groups(tracks, |track| methods[track].name) {
+            let interpolation = (self.with)(methods[group[0]]);
+            let set = clip.set.select(group.iter().copied());
+            let found = engine.evaluate_as(&set, interpolation, frames, layout)?;
+            all.resize(tracks * found.samples(), Quat::IDENTITY);
+            scatter(found.as_quats(), &group, tracks, layout, &mut all);
+        }
+        Ok(all)
+    }
+
+    /// The vectors of all tracks; none where no track has keys of them and no rest matters.
+    fn vectors(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &Frames,
+        channel: Channel,
+    ) -> Result<Vec<Vec3>, Error> {
+        let tracks = clip.set.track_count();
+        let is_keyed = |track: usize| clip.set.vector_keys(channel, track).is_some();
+        let rests: Vec<Vec3> = (0..tracks).map(|track| clip.rest(channel, track)).collect();
+        let nothing = Motion::default().rest(channel, 0);
+        if !(0..tracks).any(is_keyed) && rests.iter().all(|&rest| rest == nothing) {
+            return Ok(Vec::new());
+        }
+        let samples = frames.resolve(tracks, None)?.len();
+        let mut all: Vec<Vec3> = (0..samples).flat_map(|_| rests.iter().copied()).collect();
+        let method = |track: usize| self.vector_method(clip.channel(track).of(channel));
+        for group in groups(tracks, |track| {
+            is_keyed(track).then(|| method(track).name())
+        }) {
+            if !is_keyed(group[0]) {
+                continue;
+            }
+            let set = clip.set.select(group.iter().copied());
+            let interpolation = (self.with)(method::SLERP);
+            let method = method(group[0]);
+            let layout = Layout::FrameMajor;
+            let found = engine.vectors(&set, channel, method, interpolation, frames, layout)?;
+            let found: Vec<Vec3> = found.as_slice().iter().map(|v| v.truncate()).collect();
+            scatter(&found, &group, tracks, layout, &mut all);
+        }
+        Ok(all)
+    }
+}
+
+impl Samples {
+    /// The samples as writers take them. `notes` say what made them.
+    #[must_use]
+    pub fn of<'a>(
+        &'a self,
+        clip: &'a Motion,
+        rate: Option<FrameRate>,
+        notes: &'a [(&'a str, String)],
+    ) -> Sampled<'a> {
+        Sampled {
+            clip,
+            times: &self.times,
+            rate,
+            rotations: &self.rotations,
+            translations: &self.translations,
+            scales: &self.scales,
+            notes,
+        }
+    }
+}
+
+impl Channels {
+    /// The sampler of a translation or scale.
+    #[must_use]
+    pub fn of(&self, channel: Channel) -> Option<Sampler> {
+        match channel {
+            Channel::Translation => self.translation,
+            Channel::Scale => self.scale,
+        }
+    }
+}
+
+impl Motion {
+    /// How a track is keyed; nothing where the file says nothing of it.
+    #[must_use]
+    pub fn channel(&self, track: usize) -> Channels {
+        self.channels.get(track).copied().unwrap_or_default()
+    }
+
+    /// Where a track rests that has no keys of its translation or scale.
+    #[must_use]
+    pub fn rest(&self, channel: Channel, track: usize) -> Vec3 {
+        let rest = self
+            .skeleton
+            .get(track)
+            .map(|joint| joint.rest)
+            .unwrap_or_default();
+        match channel {
+            Channel::Translation => rest.translation,
+            Channel::Scale => rest.scale,
+        }
+    }
+
+    /// What most of the rotations are keyed for.
+    fn most_common_method(&self) -> Method {
+        let count = |sampler| {
+            let own = self
+                .channels
+                .iter()
+                .filter(|own| own.rotation == Some(sampler));
+            own.count()
+        };
+        let samplers = [
+            (count(Sampler::Linear), method::SLERP),
+            (count(Sampler::Cubic), method::GLTF_CUBIC),
+            (count(Sampler::Step), method::STEP),
+        ];
+        let most = samplers.into_iter().rev().max_by_key(|(count, _)| *count);
+        match most {
+            Some((count, method)) if count > 0 => method,
+            _ => method::BESSEL_OVERHAUSER,
+        }
+    }
+}
+
+/// Tracks with the same property, in lists, by the first of each.
+fn groups<P: PartialEq>(tracks: usize, property: impl Fn(usize) -> P) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(P, Vec<usize>)> = Vec::new();
+    for track in 0..tracks {
+        let own = property(track);
+        match groups.iter_mut().find(|(known, _)| *known == own) {
+            Some((_, group)) => group.push(track),
+            None => groups.push((own, vec![track])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
+}
+
+/// Puts the values of a group of tracks where they belong among those of all.
+fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout, all: &mut [T]) {
+    let samples = values.len() / group.len();
+    for (place, &track) in group.iter().enumerate() {
+        for sample in 0..samples {
+            all[layout.index(track, sample, tracks, samples)] =
+                values[layout.index(place, sample, group.len(), samples)];
+        }
+    }
+}
+
+/// Gives each rotation the sign that is nearer to the one before it, so that players without a test
+/// of signs go the right way round.
+pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
+    for next in tracks..rotations.len() {
+        if rotations[next - tracks].dot(rotations[next]) < 0.0 {
+            rotations[next] = -rotations[next];
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Where the joints of a sampled clip are in the world.
+
+use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+
+use crate::motion::Motion;
+use crate::sample::Samples;
+
+/// A joint's pose in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorldPose {
+    /// Where its origin is.
+    pub position: Vec3,
+    /// How it is turned: the product of its ancestors' rotations and its own, without their scales.
+    pub rotation: Quat,
+}
+
+/// Why joints have no place in the world.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HierarchyError {
+    /// A joint hangs on itself.
+    #[error("joint {joint} hangs on itself")]
+    Circle {
+        /// One joint of the circle, from 0.
+        joint: usize,
+    },
+    /// A parent that does not exist.
+    #[error("joint {joint} hangs on joint {parent}, of {joints}")]
+    NoSuchParent {
+        /// The joint, from 0.
+        joint: usize,
+        /// Its parent.
+        parent: usize,
+        /// How many there are.
+        joints: usize,
+    },
+}
+
+/// The poses of all joints at all samples, `[sample][joint]`, computed in f64 along the hierarchy
+/// and rounded once. Joints of a clip without a skeleton are roots.
+///
+/// # Errors
+/// When the parents make no hierarchy.
+pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
+    let joints = clip.set.track_count();
+    let order = parents_first(clip, joints)?;
+    let mut poses = Vec::with_capacity(samples.rotations.len());
+    let mut done = vec![Accumulated::default(); joints];
+    for (sample, rotations) in samples.rotations.chunks_exact(joints.max(1)).enumerate() {
+        let at = |list: &[Vec3], joint: usize| list.get(sample * joints + joint).copied();
+        for &joint in &order {
+            let own = Accumulated {
+                rotation: rotations[joint].as_dquat(),
+                turned_and_scaled: DMat3::from_quat(rotations[joint].as_dquat())
+                    * DMat3::from_diagonal(at(&samples.scales, joint).unwrap_or(Vec3::ONE).into()),
+                position: at(&samples.translations, joint)
+                    .unwrap_or(Vec3::ZERO)
+                    .into(),
+            };
+            let parent = clip.skeleton.get(joint).and_then(|joint| joint.parent);
+            done[joint] = match parent {
+                Some(parent) if !clip.is_world => done[parent].then(&own),
+                _ => own,
+            };
+        }
+        poses.extend(done.iter().map(|pose| WorldPose {
+            position: pose.position.as_vec3(),
+            rotation: pose.rotation.normalize().as_quat(),
+        }));
+    }
+    Ok(poses)
+}
+
+/// The transform of a joint and its ancestors.
+#[derive(Clone, Default)]
+struct Accumulated {
+    rotation: DQuat,
+    turned_and_scaled: DMat3,
+    position: DVec3,
+}
+
+impl Accumulated {
+    /// A child of this joint, in the world.
+    fn then(&self, child: &Self) -> Self {
+        Self {
+            rotation: self.rotation * child.rotation,
+            turned_and_scaled: self.turned_and_scaled * child.turned_and_scaled,
+            position: self.position + self.turned_and_scaled * child.position,
+        }
+    }
+}
+
+/// All joints, each after the one that it hangs on.
+fn parents_first(clip: &Motion, joints: usize) -> Result<Vec<usize>, HierarchyError> {
+    let parent = |joint: usize| clip.skeleton.get(joint).and_then(|joint| joint.parent);
+    let mut order = Vec::with_capacity(joints);
+    let mut is_placed = vec![false; joints];
+    let mut line = Vec::new();
+    for joint in 0..joints {
+        let mut next = Some(joint);
+        while let Some(own) = next.filter(|&own| !is_placed[own]) {
+            if line.len() >= joints {
+                return Err(HierarchyError::Circle { joint });
+            }
+            line.push(own);
+            next = parent(own);
+            if let Some(parent) = next.filter(|&parent| parent >= joints) {
+                return Err(HierarchyError::NoSuchParent {
+                    joint: own,
+                    parent,
+                    joints,
+                });
+            }
+        }
+        while let Some(own) = line.pop() {
+            is_placed[own] = true;
+            order.push(own);
+        }
+    }
+    Ok(order)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::{Joint, Transform};
+
+    fn clip(parents: &[Option<usize>]) -> Motion {
+        let mut clip = Motion::default();
+        for &parent in parents {
+            clip.set.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
+            let rest = Transform::default();
+            clip.skeleton.push(Joint { parent, rest });
+        }
+        clip
+    }
+
+    #[test]
+    fn children_follow_what_moves_turns_and_scales_their_parents() {
+        // The child comes first; its parent moves up, turns a quarter about z and doubles.
+        let clip = clip(&[Some(1), None]);
+        let quarter = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let samples = Samples {
+            times: vec![0.0],
+            rotations: vec![Quat::IDENTITY, quarter],
+            translations: vec![Vec3::X, Vec3::Z],
+            scales: vec![Vec3::ONE, Vec3::splat(2.0)],
+        };
+        let found = world(&clip, &samples).unwrap();
+        assert!(found[0].position.distance(Vec3::new(0.0, 2.0, 1.0)) < 1e-6);
+        assert!(found[0].rotation.dot(quarter).abs() > 1.0 - 1e-6);
+        assert_eq!(found[1].position, Vec3::Z);
+    }
+
+    #[test]
+    fn circles_and_missing_parents_are_refused() {
+        let samples = Samples::default();
+        let found = |parents: &[_]| world(&clip(parents), &samples).unwrap_err();
+        assert!(matches!(
+            found(&[Some(1), Some(0)]),
+            HierarchyError::Circle { .. }
+        ));
+        let parent = 5;
+        assert!(matches!(
+            found(&[Some(parent)]),
+            HierarchyError::NoSuchParent {
+                joint: 0,
+                parent: 5,
+                joints: 1
+            }
+        ));
+    }
+}
