@@ -125,7 +125,7 @@ fn a_large_file_is_read_in_bounded_extra_memory() {
         let before = resident(true);
         let (loaded, _) = reading(&mut input);
         let peak = resident(false) - before;
-        let set = loaded.unwrap().set;
+        let set = loaded.unwrap().clips.remove(0).set;
         let own = set.key_count() * 16 + set.track(0).times.len() * 8;
         let extra = peak.saturating_sub(own);
         println!(

@@ -34,6 +34,7 @@ pub static FORMAT: Format = Format {
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),
     write_motion: None,
+    many_clips: false,
 };
 
 impl<W: Write> ResultWriter for CsvWriter<'_, W> {

@@ -40,6 +40,7 @@ pub static FORMAT: Format = Format {
     read: Some(open_dat),
     write: None,
     write_motion: None,
+    many_clips: false,
 };
 
 /// Reads a file; `-` is standard input.

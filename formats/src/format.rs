@@ -14,6 +14,7 @@ use crate::keys::Duplicates;
 use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
+use crate::source::Source;
 use crate::text::lines::Limits;
 use crate::{csv, dat, npy};
 
@@ -38,6 +39,8 @@ pub struct Format {
     pub write: Option<WriteResults>,
     /// How sampled clips are written.
     pub write_motion: Option<WriteMotion>,
+    /// Whether one file holds any number of clips.
+    pub many_clips: bool,
 }
 
 /// Reads the keyframes of a file.
@@ -125,7 +128,10 @@ pub trait Document: fmt::Debug + Send + Sync {
     /// When the file's type of times cannot tell frames of this rate apart.
     fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic>;
 
-    /// Writes the file in the format of that name, with the samples of some of its clips, each
+    /// Whether the file can be written again in that format.
+    fn writes(&self, format: &Format) -> bool;
+
+    /// Writes the file, as the one that `path` names, with the samples of some of its clips, each
     /// with the clip's place, instead of their keys. Gives warnings.
     ///
     /// # Errors
@@ -133,7 +139,7 @@ pub trait Document: fmt::Debug + Send + Sync {
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
-        format: &str,
+        path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError>;
 }
@@ -235,10 +241,17 @@ impl Format {
         formats.filter_map(|format| Some((format, format.read?)))
     }
 
-    /// The formats that results are written in.
-    pub fn writable() -> impl Iterator<Item = (&'static Self, &'static WriteResults)> {
-        let formats = FORMATS.into_iter();
-        formats.filter_map(|format| Some((format, format.write.as_ref()?)))
+    /// The formats that results are written in, those that hold them as they come first.
+    pub fn writable() -> impl Iterator<Item = &'static Self> {
+        let as_they_come = FORMATS.into_iter().filter(|format| format.write.is_some());
+        let whole = |format: &&Self| format.write.is_none() && format.write_motion.is_some();
+        as_they_come.chain(FORMATS.into_iter().filter(whole))
+    }
+
+    /// Whether results are written in it.
+    #[must_use]
+    pub fn is_writable(&self) -> bool {
+        self.write.is_some() || self.write_motion.is_some()
     }
 
     /// The format of a file that begins with these bytes; by its name where they tell nothing, and
@@ -247,6 +260,15 @@ impl Format {
     pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
         let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
         probed.or_else(|| Self::of(path)).unwrap_or(FORMATS[0])
+    }
+
+    /// Reads a file in the format that it is in: see [`Format::detect`].
+    ///
+    /// # Errors
+    /// The first fault that refuses the file.
+    pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        let start = Source::start(path);
+        Self::detect(path, &start).open(path, options)
     }
 
     /// Reads a file in this format.
@@ -282,9 +304,7 @@ mod tests {
                 Format::of(Path::new(&shouted)).unwrap(),
                 format
             ));
-            assert!(
-                format.read.is_some() || format.write.is_some() || format.write_motion.is_some()
-            );
+            assert!(format.read.is_some() || format.is_writable());
         }
         assert!(Format::of(Path::new("walk")).is_none());
         assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");

@@ -12,6 +12,8 @@ use tumble::{FrameRate, TrackSet};
 pub struct Motion {
     /// The clip's name, if the file gives it one.
     pub name: Option<String>,
+    /// Its place among the file's clips, from 0, those that cannot be read included.
+    pub place: usize,
     /// Keys of rotations, one track a joint, and the keys of translations and scales beside them.
     pub set: TrackSet,
     /// How the tracks hang together; empty for tracks that have nothing to do with each other.
@@ -76,6 +78,18 @@ pub enum Sampler {
     Linear,
     /// Hermite cubics with given tangents; rotations are normalised.
     Cubic,
+}
+
+impl Sampler {
+    /// Its name in glTF.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Step => "STEP",
+            Self::Linear => "LINEAR",
+            Self::Cubic => "CUBICSPLINE",
+        }
+    }
 }
 
 /// What a clip is at each of its samples, ready to be written.

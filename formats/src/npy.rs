@@ -35,6 +35,7 @@ pub static FORMAT: Format = Format {
         poses: |poses, mut out| poses.write_npy(&mut out),
     }),
     write_motion: None,
+    many_clips: false,
 };
 
 /// Rotations written at once, so that a signal is noticed soon: 4 MB.

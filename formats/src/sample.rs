@@ -7,9 +7,9 @@ use tumble::{
 
 use crate::motion::{Channels, Motion, Sampled, Sampler};
 
-/// How clips are interpolated.
+/// The methods by which the channels of clips are interpolated.
 #[derive(Clone, Copy)]
-pub struct Manner<'a> {
+pub struct ChannelMethods<'a> {
     /// The method for all channels that are not STEP; `None`: as each channel's sampler says, and
     /// [`method::BESSEL_OVERHAUSER`] where the file names none.
     pub method: Option<Method>,
@@ -30,7 +30,7 @@ pub struct Samples {
     pub scales: Vec<Vec3>,
 }
 
-impl Manner<'_> {
+impl ChannelMethods<'_> {
     /// The one method for the rotations of all tracks; `None` where their samplers differ.
     #[must_use]
     pub fn method_of(&self, clip: &Motion) -> Option<Method> {
@@ -206,6 +206,14 @@ impl Motion {
             Channel::Translation => rest.translation,
             Channel::Scale => rest.scale,
         }
+    }
+
+    /// Whether any track has keys of translations or scales.
+    #[must_use]
+    pub fn has_vectors(&self) -> bool {
+        let channels = [Channel::Translation, Channel::Scale];
+        let keyed = |track| channels.map(|it| self.set.vector_keys(it, track).is_some());
+        (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
     }
 
     /// What most of the rotations are keyed for.

@@ -50,6 +50,20 @@ impl Source {
         })
     }
 
+    /// The first bytes of a file, up to 64; none of what is no file or cannot be read, whose fault
+    /// shows when it is opened.
+    pub(super) fn start(path: &Path) -> Vec<u8> {
+        let mut start = Vec::new();
+        let is_file = std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file());
+        if is_file && let Ok(file) = File::open(path) {
+            let read = file.take(64).read_to_end(&mut start);
+            if read.is_err() {
+                start.clear();
+            }
+        }
+        start
+    }
+
     /// All bytes of a file that is at most so long.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! Arguments that say how to interpolate: method, path, ends.
 
+use std::fmt;
+
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -148,6 +150,26 @@ fn names() -> impl Iterator<Item = PossibleValue> {
 /// Parses a method's name; help, errors and completions list them all.
 pub(crate) fn method() -> impl TypedValueParser<Value = Method> {
     PossibleValuesParser::new(names()).try_map(|name| name.parse::<Method>())
+}
+
+/// A method for every channel, or each channel's own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted(pub(crate) Option<Method>);
+
+impl fmt::Display for Wanted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.map_or(AUTHORED, |method| method.name))
+    }
+}
+
+const AUTHORED: &str = "authored";
+
+/// As [`method`], and `authored`.
+pub(crate) fn wanted() -> impl TypedValueParser<Value = Wanted> {
+    let help = "as the file says of each channel; bessel-overhauser where it says nothing";
+    let authored = PossibleValue::new(AUTHORED).help(help);
+    PossibleValuesParser::new(std::iter::once(authored).chain(names()))
+        .map(|name| Wanted(Method::named(&name)))
 }
 
 /// One method, or all of them.

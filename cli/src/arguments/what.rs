@@ -14,9 +14,10 @@ pub(crate) struct What {
         default_value = "quaternion"
     )]
     output: Output,
-    /// euler: the axes, about turned ones (XYZ, ZXZ …) or about fixed ones (xyz, zxz …)
-    #[arg(long, value_name = "AXES", default_value = "XYZ", value_parser = sequence)]
-    sequence: EulerSequence,
+    /// euler, BVH: the axes, about turned ones (XYZ, ZXZ …) or about fixed ones (xyz, zxz …)
+    /// [default: XYZ; BVH: ZXY]
+    #[arg(long, value_name = "AXES", value_parser = sequence)]
+    sequence: Option<EulerSequence>,
     /// matrix: how it lies in memory
     #[arg(long, value_enum, default_value = "row")]
     major: Major,
@@ -98,7 +99,7 @@ impl What {
             Output::AxisAngle => Encoding::AxisAngle,
             Output::Matrix => Encoding::Matrix3x3(order),
             Output::Matrix3x4 => Encoding::Matrix3x4(order),
-            Output::Euler => Encoding::Euler(self.sequence),
+            Output::Euler => Encoding::Euler(self.sequence.unwrap_or(EulerSequence::XYZ)),
             Output::Velocity | Output::Acceleration => Encoding::Vector,
         }
     }
@@ -127,6 +128,16 @@ impl What {
         };
         let offsets = parents.iter().map(hung).collect();
         Skeleton::new(parents, offsets).map_err(|error| format!("--parents: {error}"))
+    }
+
+    /// Whether nothing else was asked for than the rotations themselves.
+    pub(crate) fn is_rotations(&self) -> bool {
+        matches!(self.output, Output::Quaternion)
+    }
+
+    /// The axes of Euler angles.
+    pub(crate) fn sequence(&self) -> Option<EulerSequence> {
+        self.sequence
     }
 
     /// Whether whole poses are written, and which.

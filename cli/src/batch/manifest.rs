@@ -39,6 +39,10 @@ pub(crate) struct Entry {
     pub(crate) tumble: String,
     /// Which device computed it; on every other the bits would be the same.
     pub(crate) device: String,
+    /// For a clip of a file with several: the result that all clips together would have been, and
+    /// how many clips there are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) one_of: Option<(String, usize)>,
 }
 
 impl Entry {
@@ -194,13 +198,29 @@ pub(crate) struct Previous {
 }
 
 impl Previous {
-    /// Whether the output is there, whole, and the result of the same request.
+    /// Whether the output, or the outputs of all clips that it would hold, are there, whole, and
+    /// the results of the same request.
     pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
-        self.entries.get(output).is_some_and(|entry| {
+        let is_whole = |entry: &Entry| {
             entry.is_made_from(input_sha256, options)
-                && digest::of_file(&self.folder.join(output))
+                && digest::of_file(&self.folder.join(&entry.output))
                     .is_ok_and(|hash| hash == entry.output_sha256)
-        })
+        };
+        if let Some(entry) = self.entries.get(output) {
+            return is_whole(entry);
+        }
+        // `fox.npy` would hold what `fox.Run.npy` and its like do.
+        let Some((stem, _)) = output.rsplit_once('.') else {
+            return false;
+        };
+        let beside = self.entries.range(format!("{stem}.")..);
+        let own = beside.take_while(|(name, _)| name.starts_with(stem));
+        let clips = own.filter_map(|(_, entry)| {
+            let (all, count) = entry.one_of.as_ref()?;
+            (all == output && is_whole(entry)).then_some(*count)
+        });
+        let counts: Vec<usize> = clips.collect();
+        counts.first().is_some_and(|&count| count == counts.len())
     }
 }
 
@@ -224,6 +244,7 @@ mod tests {
             kernels_sha256: kernels_sha256().to_owned(),
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),
+            one_of: None,
         }
     }
 

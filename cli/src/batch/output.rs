@@ -25,8 +25,8 @@ use crate::messages::signals;
 /// Where one result goes.
 pub(crate) struct Target {
     place: Place,
-    write: &'static WriteResults,
-    /// Below the directory of results.
+    format: &'static Format,
+    /// Below the directory of results; empty for a result in no such directory.
     name: String,
 }
 
@@ -59,7 +59,7 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
     // One file goes into one file, however it was found.
     let is_file = out.is_file() || of(out).is_some() || input::is_standard(out);
     let plan = match &*paths {
-        [_] if !inputs.many || is_file => {
+        [_] if is_file || !inputs.many && !out.is_dir() => {
             if wish.resume {
                 let message = "--resume is for a directory of results";
                 return Err(Failure::usage(message));
@@ -85,13 +85,13 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
 }
 
 /// The format asked for, else the one that the name says.
-fn choose(path: &Path, format: Option<&'static Format>) -> Result<Writable, Failure> {
-    let named = if input::is_standard(path) || path.is_dir() {
-        Format::writable().next() // a directory is refused later, for what it is
+fn choose(path: &Path, format: Option<&'static Format>) -> Result<&'static Format, Failure> {
+    let named = if input::is_standard(path) {
+        Format::writable().next()
     } else {
         of(path)
     };
-    format.and_then(writable).or(named).ok_or_else(|| {
+    format.or(named).ok_or_else(|| {
         let (path, extensions) = (path.display(), extensions(|name| format!(".{name}")));
         let extensions = extensions.join(" or ");
         Failure::usage(format!(
@@ -100,28 +100,20 @@ fn choose(path: &Path, format: Option<&'static Format>) -> Result<Writable, Fail
     })
 }
 
-/// A format, and how results are written in it.
-type Writable = (&'static Format, &'static WriteResults);
-
-fn writable(format: &'static Format) -> Option<Writable> {
-    Some((format, format.write.as_ref()?))
-}
-
 /// The format of results that a file's name tells.
-fn of(path: &Path) -> Option<Writable> {
-    Format::of(path).and_then(writable)
+fn of(path: &Path) -> Option<&'static Format> {
+    Format::of(path).filter(|format| format.is_writable())
 }
 
 /// The extensions of results, each as `show` has it.
 fn extensions(show: impl Fn(&str) -> String) -> Vec<String> {
-    let names = Format::writable().map(|(format, _)| format.name);
-    names.map(show).collect()
+    Format::writable().map(|format| show(format.name)).collect()
 }
 
 /// Reads the name of a format of results, for clap.
 pub(crate) fn format() -> impl TypedValueParser<Value = &'static Format> {
     let values =
-        Format::writable().map(|(format, _)| PossibleValue::new(format.name).help(format.summary));
+        Format::writable().map(|format| PossibleValue::new(format.name).help(format.summary));
     PossibleValuesParser::new(values)
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }
@@ -150,7 +142,7 @@ fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, F
     let mut owners: HashMap<PathBuf, &Path> = HashMap::new();
     let mut names = Vec::new();
     for Found { path, below } in &inputs.files {
-        let name = name_for(format.0, path, below);
+        let name = name_for(format, path, below);
         let target = folder.join(&name);
         if let Some(other) = owners.insert(target.clone(), path) {
             return Err(Failure::usage(format!(
@@ -216,13 +208,53 @@ fn name_for(format: &Format, input: &Path, below: &Path) -> PathBuf {
 }
 
 impl Target {
-    fn new(place: Place, (_, write): Writable, name: String) -> Self {
-        Self { place, write, name }
+    fn new(place: Place, format: &'static Format, name: String) -> Self {
+        Self {
+            place,
+            format,
+            name,
+        }
     }
 
-    /// How its format holds results.
-    pub(crate) fn results(&self) -> &'static WriteResults {
-        self.write
+    /// The format of the result.
+    pub(crate) fn format(&self) -> &'static Format {
+        self.format
+    }
+
+    /// Where it goes.
+    pub(crate) fn path(&self) -> &Path {
+        self.place.path()
+    }
+
+    /// How its format holds rotations as they come.
+    pub(crate) fn results(&self) -> Result<&'static WriteResults, Failure> {
+        self.format.write.as_ref().ok_or_else(|| {
+            let all = Format::writable().filter(|format| format.write.is_some());
+            let names: Vec<&str> = all.map(|format| format.name).collect();
+            Failure::usage(format!(
+                "{self}: {} holds poses of whole clips; for --output, --encoding, --layout and \
+                 --order give {}",
+                self.format.name,
+                names.join(" or ")
+            ))
+        })
+    }
+
+    /// Where the result of one of several clips of an input goes, beside the place where that of
+    /// all would: `fox.npy` becomes `fox.Run.npy`. Nothing where one file was asked for.
+    pub(crate) fn of_clip(&self, clip: &str) -> Option<Result<Self, Failure>> {
+        if self.name.is_empty() {
+            return None;
+        }
+        let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
+        let clip: String = clip
+            .chars()
+            .map(|c| if is_plain(c) { c } else { '_' })
+            .collect();
+        let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
+        let name = with(Path::new(&self.name));
+        let place = self.place.renamed(&with(self.place.path()));
+        Some(place.map(|place| Self::new(place, self.format, name.display().to_string())))
     }
 
     /// Refuses a result for which the disk has no room.
@@ -236,7 +268,7 @@ impl Target {
         if self.place.is_standard() {
             return Ok(());
         }
-        let bytes = tracks as f64 * samples as f64 * (self.write.rotation_bytes)(encoding);
+        let bytes = tracks as f64 * samples as f64 * (self.results()?.rotation_bytes)(encoding);
         let folder = match self.place.path().parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -257,6 +289,20 @@ impl Target {
         self.place.prepare(None, write)
     }
 
+    /// Writes one result that is in memory.
+    pub(crate) fn write_whole(
+        &self,
+        result: &ResultShape<'_>,
+        rotations: &[Quat],
+    ) -> Result<Written, Failure> {
+        let begin = self.results()?.rotations;
+        self.prepare(|out| {
+            let mut writer = begin(out, result)?;
+            writer.write(rotations)?;
+            writer.finish()
+        })
+    }
+
     /// Writes one result, chunk by chunk, while `evaluate` makes the next.
     pub(crate) fn write_rotations(
         &self,
@@ -264,7 +310,8 @@ impl Target {
         evaluate: impl FnOnce(&mut Sink<'_>) -> Result<(), Ended>,
     ) -> Result<Written, Failure> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
-        let (progress, measure): (_, fn(&[u8]) -> u64) = if self.write.is_text {
+        let write = self.results()?;
+        let (progress, measure): (_, fn(&[u8]) -> u64) = if write.is_text {
             (Progress::new("writing", samples as u64 + 1), lines)
         } else {
             let total = (tracks * samples * result.encoding.bytes()) as u64;
@@ -273,7 +320,7 @@ impl Target {
         let mut unevaluated = None;
         let written = self.place.prepare(Some((progress, measure)), |out| {
             let mut writer = LateWriter {
-                rotations: self.write.rotations,
+                rotations: write.rotations,
                 result: *result,
                 state: State::Waiting(out),
             };

@@ -53,6 +53,15 @@ impl Place {
         })
     }
 
+    /// The same for a file of another name.
+    pub(crate) fn renamed(&self, path: &Path) -> Result<Self, Failure> {
+        let place = Self::new(path, self.overwrite, &self.inputs)?;
+        Ok(Self {
+            hashed: self.hashed,
+            ..place
+        })
+    }
+
     /// The same place, its bytes hashed on their way.
     pub(crate) fn hashed(self) -> Self {
         Self {

@@ -40,12 +40,15 @@ pub(crate) struct Evaluated {
     pub(crate) told: String,
 }
 
+/// Takes each result as it is whole, with the name that the manifest gives it.
+pub(crate) type Done<'a> = dyn FnMut(&str, Evaluated) -> Result<(), Failure> + 'a;
+
 impl Batch<'_> {
     pub(crate) fn run(
         &self,
         jobs: &[(PathBuf, Target)],
         mut manifest: Manifest,
-        mut evaluate: impl FnMut(&Path, &Loaded, &Target) -> Result<Evaluated, Failure>,
+        mut evaluate: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let previous = manifest.previous();
         let mut skipped = 0;
@@ -61,22 +64,25 @@ impl Batch<'_> {
                     skipped += 1;
                     return Ok(());
                 };
-                let mut evaluated = evaluate(path, &loaded, target)?;
-                let digest = evaluated.written.digest.take().unwrap_or_default();
-                manifest.add(Entry {
-                    output: target.name().to_owned(),
-                    output_bytes: digest.bytes(),
-                    output_sha256: digest.finish(),
-                    input: input::name(path),
-                    input_sha256: sha256,
-                    options: self.options.clone(),
-                    kernels_sha256: kernels_sha256().to_owned(),
-                    tumble: env!("CARGO_PKG_VERSION").to_owned(),
-                    device: evaluated.device,
-                })?;
-                evaluated.written.commit()?;
-                words::note(&evaluated.told);
-                Ok(())
+                let clips = loaded.clips.len();
+                evaluate(path, &loaded, target, &mut |name, mut evaluated| {
+                    let digest = evaluated.written.digest.take().unwrap_or_default();
+                    manifest.add(Entry {
+                        output: name.to_owned(),
+                        output_bytes: digest.bytes(),
+                        output_sha256: digest.finish(),
+                        input: input::name(path),
+                        input_sha256: sha256.clone(),
+                        options: self.options.clone(),
+                        kernels_sha256: kernels_sha256().to_owned(),
+                        tumble: env!("CARGO_PKG_VERSION").to_owned(),
+                        device: evaluated.device,
+                        one_of: (name != target.name()).then(|| (target.name().to_owned(), clips)),
+                    })?;
+                    evaluated.written.commit()?;
+                    words::note(&evaluated.told);
+                    Ok(())
+                })
             })
         });
         if skipped > 0 {
@@ -121,7 +127,7 @@ fn taken(inputs: &Receiver<Input>) -> Result<Option<(Option<String>, Loaded)>, F
         return Ok(None);
     };
     let loaded = loaded?;
-    for warning in &loaded.warnings {
+    for warning in loaded.warnings.iter().chain(&loaded.refused) {
         words::note(&warning.to_string());
     }
     Ok(Some((sha256, loaded)))

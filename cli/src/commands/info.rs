@@ -1,12 +1,14 @@
 //! `tumble info`: what is in a keyframe file.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::TrackSet;
 use tumble::reference::angle_between;
+use tumble::{Channel, TrackSet};
 use tumble_formats::Loaded;
+use tumble_formats::motion::Motion;
 
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
@@ -35,7 +37,16 @@ pub(crate) struct Arguments {
 #[derive(Serialize)]
 struct Summary {
     input: String,
+    /// The name or the place of one of several animations in the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    animation: Option<String>,
     tracks: usize,
+    /// Of each track that has one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    names: Vec<String>,
+    /// The track that each track hangs on, for files with a skeleton.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    parents: Vec<Option<usize>>,
     /// Of all tracks together.
     keys: usize,
     /// Seconds.
@@ -47,7 +58,19 @@ struct Summary {
     uniform: bool,
     /// Between neighbouring keys, the shorter way.
     largest_rotation_degrees: f64,
-    box_length: f64,
+    /// Tracks with keys of their translations, and of their scales.
+    #[serde(skip_serializing_if = "is_zero")]
+    moved: usize,
+    #[serde(skip_serializing_if = "is_zero")]
+    scaled: usize,
+    /// The rate on whose frames all key times lie: a number or a ratio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate: Option<String>,
+    /// How many channels each of glTF's samplers interpolates.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    samplers: BTreeMap<&'static str, usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    box_length: Option<f64>,
     /// `FILE:LINE:COLUMN: warning[CODE]: …`
     warnings: Vec<String>,
 }
@@ -57,7 +80,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.distinct(false)?;
     let outcome = for_each(&inputs, |path| {
         let loaded = arguments.inputs.load_quietly(path)?;
-        summaries.push(Summary::new(input::name(path), &loaded));
+        let several = loaded.clips.len() + loaded.refused.len() > 1;
+        for clip in &loaded.clips {
+            let animation = several.then(|| input::clip_name(clip));
+            summaries.push(Summary::new(input::name(path), animation, clip, &loaded));
+        }
+        for refused in &loaded.refused {
+            words::note(&refused.to_string());
+        }
         Ok(())
     });
     if arguments.json {
@@ -96,13 +126,21 @@ impl Steps {
 }
 
 impl Summary {
-    fn new(input: String, loaded: &Loaded) -> Self {
-        let Loaded {
-            set,
-            box_length,
-            warnings,
-            ..
-        } = loaded;
+    fn new(input: String, animation: Option<String>, clip: &Motion, loaded: &Loaded) -> Self {
+        let set = &clip.set;
+        let with = |channel| {
+            let tracks = 0..set.track_count();
+            tracks
+                .filter(move |&track| set.vector_keys(channel, track).is_some())
+                .count()
+        };
+        let mut samplers = BTreeMap::new();
+        for channels in &clip.channels {
+            let all = [channels.rotation, channels.translation, channels.scale];
+            for sampler in all.into_iter().flatten() {
+                *samplers.entry(sampler.name()).or_default() += 1;
+            }
+        }
         let steps = Steps::of(set);
         let (first_time, last_time) = set.time_span().unwrap_or_default();
         let rotation = set
@@ -112,7 +150,13 @@ impl Summary {
             .fold(0.0, f64::max);
         Self {
             input,
+            animation,
             tracks: set.track_count(),
+            names: set
+                .tracks()
+                .filter_map(|track| track.name.map(str::to_owned))
+                .collect(),
+            parents: clip.skeleton.iter().map(|joint| joint.parent).collect(),
             keys: set.key_count(),
             first_time,
             last_time,
@@ -120,13 +164,21 @@ impl Summary {
             longest_step: steps.map(|steps| steps.longest),
             uniform: steps.is_none_or(Steps::are_even),
             largest_rotation_degrees: rotation.to_degrees(),
-            box_length: *box_length,
-            warnings: warnings.iter().map(ToString::to_string).collect(),
+            moved: with(Channel::Translation),
+            scaled: with(Channel::Scale),
+            rate: clip.rate.map(|rate| rate.to_string()),
+            samplers,
+            box_length: loaded.box_length,
+            warnings: loaded.warnings.iter().map(ToString::to_string).collect(),
         }
     }
 
     fn text(&self) -> String {
-        let mut text = format!("{}\n", self.input);
+        let mut text = self.input.clone();
+        if let Some(animation) = &self.animation {
+            let _ = write!(text, ", animation {animation}");
+        }
+        text.push('\n');
         let mut line = |what: &str, value: String| {
             let _ = writeln!(text, "  {what:18} {value}");
         };
@@ -149,10 +201,44 @@ impl Summary {
             "largest rotation",
             format!("{:.3}° between keys", self.largest_rotation_degrees),
         );
-        line("box length", self.box_length.to_string());
+        if self.moved + self.scaled > 0 {
+            let (moved, scaled) = (self.moved, self.scaled);
+            line(
+                "also",
+                format!("{moved} with translations, {scaled} with scales"),
+            );
+        }
+        if let Some(rate) = &self.rate {
+            line("on frames of", format!("{rate} fps"));
+        }
+        if !self.samplers.is_empty() {
+            let samplers = self
+                .samplers
+                .iter()
+                .map(|(name, count)| format!("{count} {name}"));
+            line("samplers", samplers.collect::<Vec<_>>().join(", "));
+        }
+        if !self.parents.is_empty() {
+            let roots = self
+                .parents
+                .iter()
+                .filter(|parent| parent.is_none())
+                .count();
+            line(
+                "skeleton",
+                format!("{} joints, {roots} roots", self.parents.len()),
+            );
+        }
+        if let Some(length) = self.box_length {
+            line("box length", length.to_string());
+        }
         for warning in &self.warnings {
             line("warning", warning.clone());
         }
         text
     }
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }

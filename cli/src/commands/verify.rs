@@ -66,8 +66,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
-        let set = progress.suspend(|| arguments.inputs.load(path))?.set;
-        lines.extend(arguments.compare(&device, &samples, &name, &set, &mut progress)?);
+        let loaded = progress.suspend(|| arguments.inputs.load(path))?;
+        for clip in &loaded.clips {
+            let name = match loaded.clips.len() {
+                1 => name.clone(),
+                _ => format!("{name} {}", input::clip_name(clip)),
+            };
+            lines.extend(arguments.compare(&device, &samples, &name, &clip.set, &mut progress)?);
+        }
         Ok(())
     });
     drop(progress);

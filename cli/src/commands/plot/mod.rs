@@ -181,7 +181,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
-        let set = arguments.inputs.load(path)?.set;
+        let set = arguments.inputs.load_one(path)?.set;
         let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, &name)?;
         let pictures = match &out {

@@ -49,7 +49,7 @@ pub(crate) fn write(
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
     for path in &inputs {
-        let set = progress.suspend(|| arguments.inputs.load(path))?.set;
+        let set = progress.suspend(|| arguments.inputs.load_one(path))?.set;
         let chapter = Chapter {
             title: input::file_name(path),
             facts: facts(&set),

@@ -167,7 +167,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
     }
     let name = input::name(path);
-    let set = arguments.inputs.load(path)?.set;
+    let set = arguments.inputs.load_one(path)?.set;
     let mut frames = samples.of(&set, &name);
     let mut timeline = frames
         .resolve(set.track_count(), set.time_span())

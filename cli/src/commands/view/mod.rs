@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tumble::{Axes, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Quantity, TrackSet};
-use tumble_formats::Loaded;
+use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
@@ -96,9 +96,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut shown = Vec::new();
     for path in &inputs {
         let name = input::name(path);
-        let Loaded {
-            set, box_length, ..
-        } = arguments.inputs.load(path)?;
+        let loaded = arguments.inputs.load(path)?;
+        let box_length = loaded.box_length.unwrap_or(1.0);
+        if loaded.clips.len() > 1 {
+            return Err(input::several(path, &loaded));
+        }
+        let Some(Motion { set, .. }) = loaded.clips.into_iter().next() else {
+            continue;
+        };
         let times = arguments.times(&set, &name)?;
         let name = input::file_name(path);
         shown.push(Shown {

@@ -1,26 +1,29 @@
-//! `tumble eval`: keyframe files in, rotations at every frame out.
+//! `tumble eval`: keyframe files in, rotations and whole poses at every frame out.
+
+mod motion;
+mod rotations;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use tumble::{Encoding, Error, Frames, Interpolation, Layout, Method};
+use tumble::{Encoding, Interpolation, Method};
 use tumble_formats::Loaded;
-use tumble_formats::format::{Format, ResultShape};
+use tumble_formats::format::Format;
+use tumble_formats::motion::Motion;
 use tumble_formats::npy::ComponentOrder;
-use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, method};
+use crate::arguments::interpolation::{Manner, Wanted, wanted};
 use crate::arguments::time::{Samples, Sampling};
-use crate::arguments::what::{PoseKind, What};
+use crate::arguments::what::What;
 use crate::batch::output::{Plan, Target, Wish};
 use crate::batch::place::Written;
-use crate::batch::run::{Batch, Evaluated};
-use crate::batch::{digest, output, room};
-use crate::messages::exit::{Failure, for_each};
+use crate::batch::run::{Batch, Done, Evaluated};
+use crate::batch::{digest, output};
+use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
 use crate::messages::words;
 
 /// Evaluate keyframe tracks at every frame
@@ -51,15 +54,16 @@ pub(crate) struct Arguments {
     /// in the same way
     #[arg(long)]
     resume: bool,
-    /// How to interpolate (`tumble methods`)
+    /// How to interpolate (`tumble methods`); channels that hold each key until the next one stay
+    /// as they are
     #[arg(
         short,
         long,
         value_name = "METHOD",
-        default_value = "bessel-overhauser",
-        value_parser = method()
+        default_value = "authored",
+        value_parser = wanted()
     )]
-    method: Method,
+    method: Wanted,
     #[command(flatten)]
     sampling: Sampling,
     #[command(flatten)]
@@ -81,7 +85,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     explain_route: bool,
     /// The format of the result [default: by the name of the output, else npy]
-    #[arg(long, value_parser = output::format())]
+    #[arg(long, alias = "to", value_parser = output::format())]
     format: Option<&'static Format>,
 }
 
@@ -141,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         resume: arguments.resume,
     };
     let Plan { targets, manifest } = output::plan(&inputs, wish)?;
-    let is_text = |target: &Target| target.results().is_text;
+    let is_text = |target: &Target| target.format().write.as_ref().is_some_and(|it| it.is_text);
     let short = arguments.encoding != EncodingArgument::F32;
     if short && targets.iter().any(is_text) {
         return Err(Failure::usage(
@@ -154,8 +158,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut device = arguments.device.open()?;
     let jobs: Vec<(PathBuf, Target)> = inputs.paths().into_iter().zip(targets).collect();
-    let mut evaluate = |path: &Path, loaded: &_, target: &_| {
-        arguments.evaluate(&mut device, &samples, path, loaded, target)
+    let mut evaluate = |path: &Path, loaded: &_, target: &_, done: &mut Done<'_>| {
+        arguments.evaluate(&mut device, &samples, (path, loaded), target, done)
     };
     if let Some(manifest) = manifest {
         let batch = Batch {
@@ -167,10 +171,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     for_each(&jobs, |(path, target)| {
         let loaded = arguments.inputs.load(path)?;
-        let evaluated = evaluate(path, &loaded, target)?;
-        evaluated.written.commit()?;
-        words::note(&evaluated.told);
-        Ok(())
+        evaluate(path, &loaded, target, &mut |_, evaluated: Evaluated| {
+            evaluated.written.commit()?;
+            words::note(&evaluated.told);
+            Ok(())
+        })
     })
 }
 
@@ -196,151 +201,110 @@ impl Arguments {
         )
     }
 
-    /// One input, from its keys to its result.
+    /// One input, from its keys to its results.
     fn evaluate(
         &self,
         device: &mut Opened,
         samples: &Samples,
-        path: &Path,
-        loaded: &Loaded,
+        input: (&Path, &Loaded),
+        target: &Target,
+        done: &mut Done<'_>,
+    ) -> Result<(), Failure> {
+        let (path, loaded) = input;
+        let name = input::name(path);
+        let started = Instant::now();
+        let mut job = Job {
+            arguments: self,
+            device,
+            samples,
+            loaded,
+            started,
+        };
+        if target.format().many_clips || loaded.clips.len() == 1 {
+            let clips: Vec<&Motion> = loaded.clips.iter().collect();
+            let evaluated = job.evaluate(&name, &clips, target)?;
+            done(target.name(), evaluated)?;
+        } else {
+            for clip in &loaded.clips {
+                let clip_name = input::clip_name(clip);
+                let target = target.of_clip(&clip_name);
+                let target = target.ok_or_else(|| input::several(path, loaded))??;
+                let evaluated = job.evaluate(&format!("{name} {clip_name}"), &[clip], &target)?;
+                done(target.name(), evaluated)?;
+            }
+        }
+        match loaded.refused.len() {
+            0 => Ok(()),
+            refused => {
+                let all = refused + loaded.clips.len();
+                let message = format!("{name}: {refused} of {all} animations failed");
+                Err(Failure::new(SOME_INPUTS, message))
+            }
+        }
+    }
+}
+
+/// What the results of one input are made with.
+struct Job<'a> {
+    arguments: &'a Arguments,
+    device: &'a mut Opened,
+    samples: &'a Samples,
+    loaded: &'a Loaded,
+    started: Instant,
+}
+
+impl Job<'_> {
+    /// Some clips, into one file.
+    fn evaluate(
+        &mut self,
+        name: &str,
+        clips: &[&Motion],
         target: &Target,
     ) -> Result<Evaluated, Failure> {
-        let (name, set) = (input::name(path), &loaded.set);
-        let frames = samples.of(set, &name);
-        let timeline = frames
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
-        target.has_room(
-            &name,
-            set.track_count(),
-            timeline.len(),
-            self.what.encoding(self.encoding.into()),
-        )?;
-        let wished = match self.layout {
-            LayoutArgument::Track => Layout::TrackMajor,
-            LayoutArgument::Frame => Layout::FrameMajor,
-        };
-        let layout = target.results().layout.unwrap_or(wished);
-        let result = ResultShape {
-            name: &name,
-            set,
-            timeline: &timeline,
-            layout,
-            order: self.order.into(),
-            encoding: self.what.encoding(self.encoding.into()),
-        };
-        if let Some(kind) = self.what.poses() {
-            return self.poses(device, &result, loaded.box_length, &frames, kind, target);
+        if self.is_baked(target) {
+            return self.bake(name, clips, target);
         }
-        let started = Instant::now();
-        let interpolation = Interpolation {
-            quantity: self.what.quantity(),
-            ..self.manner.with(self.method)
-        };
-        if self.explain_route {
-            let route = device
-                .choose(set.track_count() * timeline.len())
-                .and_then(|()| {
-                    device.work(|engine| engine.explain_route(set, interpolation, &frames, layout))
-                })
-                .map_err(|error| Failure::evaluating(&name, &error))?;
-            words::note(&format!("{name}: {route}"));
+        if self.is_motion(clips, target) {
+            return self.motion(name, clips, target);
         }
-        let written = target.write_rotations(&result, |sink| {
-            device.stream(set, interpolation, &frames, layout, sink)
-        })?;
-        Ok(self.evaluated(written, device, &result, target, started))
+        let [clip] = clips else {
+            let message = format!(
+                "{name}: --output and its like are of one animation; choose one with --animation"
+            );
+            return Err(Failure::usage(message));
+        };
+        self.rotations(name, clip, target)
     }
 
-    /// Whole poses, `[frame][track]`: of the boxes of a chain, each of which hangs at the
-    /// end of the one before it.
-    fn poses(
-        &self,
-        device: &mut Opened,
-        result: &ResultShape<'_>,
-        box_length: f64,
-        frames: &Frames,
-        kind: PoseKind,
-        target: &Target,
-    ) -> Result<Evaluated, Failure> {
-        let ResultShape {
-            name,
-            set,
-            timeline,
-            ..
-        } = *result;
-        // The rotations, and twice what becomes of them.
-        room::in_memory(name, set, frames, 5)?;
-        let started = Instant::now();
-        let interpolation = self.manner.with(self.method);
-        let skeleton = self
-            .what
-            .skeleton(set.track_count(), box_length)
-            .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
-        let evaluated = device
-            .choose(set.track_count() * timeline.len())
-            .and_then(|()| {
-                device.work(|engine| {
-                    let local =
-                        engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
-                    match kind {
-                        PoseKind::World => {
-                            let world = engine.world(&local, &skeleton)?;
-                            let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
-                                let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
-                                [px, py, pz, x, y, z, w]
-                            });
-                            Ok(numbers.collect::<Vec<f32>>())
-                        }
-                        PoseKind::Transform => {
-                            let hung = |place: usize| match place % set.track_count() {
-                                0 => 0.0,
-                                _ => -box_length as f32,
-                            };
-                            let quats = local.as_quats().iter().enumerate();
-                            let numbers = quats.flat_map(|(place, q)| {
-                                [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
-                            });
-                            Ok(numbers.collect())
-                        }
-                    }
-                })
-            });
-        let numbers = evaluated.map_err(|error: Error| Failure::evaluating(name, &error))?;
-        let components: &[&str] = match kind {
-            PoseKind::World => &WORLD,
-            PoseKind::Transform => &TRANSFORM,
+    /// Which method interpolates each channel.
+    fn methods(&self) -> (Option<Method>, impl Fn(Method) -> Interpolation + use<>) {
+        let quantity = self.arguments.what.quantity();
+        let manner = self.arguments.manner;
+        let with = move |method| Interpolation {
+            quantity,
+            ..manner.with(method)
         };
-        let poses = Poses {
-            set,
-            timeline,
-            components,
-            numbers: &numbers,
-        };
-        let written = target.prepare(|out| (target.results().poses)(&poses, out))?;
-        Ok(self.evaluated(written, device, result, target, started))
+        (self.arguments.method.0, with)
     }
 
     fn evaluated(
         &self,
+        name: &str,
+        (tracks, frames): (usize, usize),
+        method: &str,
         written: Written,
-        device: &Opened,
-        result: &ResultShape<'_>,
         target: &Target,
-        started: Instant,
     ) -> Evaluated {
         let told = format!(
-            "{}: {} × {}, {}, on {} in {} → {target}",
-            result.name,
-            words::count(result.set.track_count(), "track"),
-            words::count(result.timeline.len(), "frame"),
-            self.method,
-            device.label,
-            words::duration(started.elapsed()),
+            "{name}: {} × {}, {method}, on {} in {} → {target}",
+            words::count(tracks, "track"),
+            words::count(frames, "frame"),
+            self.device.label,
+            words::duration(self.started.elapsed()),
         );
         Evaluated {
             written,
-            device: device.label.clone(),
+            device: self.device.label.clone(),
             told,
         }
     }

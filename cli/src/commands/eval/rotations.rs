@@ -1,0 +1,238 @@
+//! Results of numbers: rotations in any representation, streamed as they come, and whole poses.
+
+use glam::Vec3;
+use tumble::method::SLERP;
+use tumble::{Engine, Error, Frames, Layout};
+use tumble_formats::format::ResultShape;
+use tumble_formats::motion::Motion;
+use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
+use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::{HierarchyError, world};
+
+use crate::arguments::what::PoseKind;
+use crate::batch::output::Target;
+use crate::batch::room;
+use crate::batch::run::Evaluated;
+use crate::commands::eval::{Job, LayoutArgument};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+impl Job<'_> {
+    /// One clip's rotations, or what is made of them, or whole poses.
+    pub(super) fn rotations(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        target: &Target,
+    ) -> Result<Evaluated, Failure> {
+        let (arguments, set) = (self.arguments, &clip.set);
+        let frames = self.samples.of(set, name);
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let encoding = arguments.what.encoding(arguments.encoding.into());
+        target.has_room(name, set.track_count(), timeline.len(), encoding)?;
+        let wished = match arguments.layout {
+            LayoutArgument::Track => Layout::TrackMajor,
+            LayoutArgument::Frame => Layout::FrameMajor,
+        };
+        let result = ResultShape {
+            name,
+            set,
+            timeline: &timeline,
+            layout: target.results()?.layout.unwrap_or(wished),
+            order: arguments.order.into(),
+            encoding,
+        };
+        if let Some(kind) = arguments.what.poses() {
+            return self.poses(&result, clip, &frames, kind, target);
+        }
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let size = (set.track_count(), timeline.len());
+        let Some(method) = methods.method_of(clip) else {
+            // Tracks of different samplers are evaluated apart, and put together in memory.
+            room::in_memory(name, set, &frames, 2)?;
+            let found = self
+                .device
+                .choose(size.0 * size.1)
+                .and_then(|()| {
+                    let work =
+                        |engine: &Engine| methods.rotations(engine, clip, &frames, result.layout);
+                    self.device.work(work)
+                })
+                .map_err(|error| Failure::evaluating(name, &error))?;
+            let written = target.write_whole(&result, &found)?;
+            return Ok(self.evaluated(name, size, "each channel's own method", written, target));
+        };
+        let interpolation = with(method);
+        if arguments.explain_route {
+            let explain =
+                |engine: &Engine| engine.explain_route(set, interpolation, &frames, result.layout);
+            let route = self
+                .device
+                .choose(size.0 * size.1)
+                .and_then(|()| self.device.work(explain))
+                .map_err(|error| Failure::evaluating(name, &error))?;
+            words::note(&format!("{name}: {route}"));
+        }
+        let written = target.write_rotations(&result, |sink| {
+            self.device
+                .stream(set, interpolation, &frames, result.layout, sink)
+        })?;
+        Ok(self.evaluated(name, size, method.name, written, target))
+    }
+
+    /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each
+    /// of which hangs at the end of the one before it.
+    fn poses(
+        &mut self,
+        result: &ResultShape<'_>,
+        clip: &Motion,
+        frames: &Frames,
+        kind: PoseKind,
+        target: &Target,
+    ) -> Result<Evaluated, Failure> {
+        let ResultShape {
+            name,
+            set,
+            timeline,
+            ..
+        } = *result;
+        let size = (set.track_count(), timeline.len());
+        // The rotations, and twice what becomes of them.
+        room::in_memory(name, set, frames, 8)?;
+        let numbers = if clip.skeleton.is_empty() && !clip.has_vectors() {
+            self.chain(name, clip, frames, kind)?
+        } else {
+            let samples = self.sample(name, clip, frames)?;
+            numbers_of(clip, &samples, kind)
+                .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?
+        };
+        let components: &[&str] = match kind {
+            PoseKind::World => &WORLD,
+            PoseKind::Transform => &TRANSFORM,
+        };
+        let poses = Poses {
+            set,
+            timeline,
+            components,
+            numbers: &numbers,
+        };
+        let write = target.results()?.poses;
+        let written = target.prepare(|out| write(&poses, out))?;
+        let method = self.arguments.method.to_string();
+        Ok(self.evaluated(name, size, &method, written, target))
+    }
+
+    /// The poses of boxes that hang at the ends of others.
+    fn chain(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &Frames,
+        kind: PoseKind,
+    ) -> Result<Vec<f32>, Failure> {
+        let set = &clip.set;
+        let (tracks, length) = (set.track_count(), self.loaded.box_length.unwrap_or(1.0));
+        let skeleton = self
+            .arguments
+            .what
+            .skeleton(tracks, length)
+            .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let interpolation = with(methods.method_of(clip).unwrap_or(SLERP));
+        let samples = frames.resolve(tracks, set.time_span());
+        let evaluated = samples.map_err(Error::from).and_then(|timeline| {
+            self.device.choose(tracks * timeline.len())?;
+            self.device.work(|engine| {
+                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+                match kind {
+                    PoseKind::World => {
+                        let world = engine.world(&local, &skeleton)?;
+                        let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
+                            let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
+                            [px, py, pz, x, y, z, w]
+                        });
+                        Ok(numbers.collect::<Vec<f32>>())
+                    }
+                    PoseKind::Transform => {
+                        let hung = |place: usize| match place % tracks {
+                            0 => 0.0,
+                            _ => -length as f32,
+                        };
+                        let quats = local.as_quats().iter().enumerate();
+                        let numbers = quats.flat_map(|(place, q)| {
+                            [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
+                        });
+                        Ok(numbers.collect())
+                    }
+                }
+            })
+        });
+        evaluated.map_err(|error| Failure::evaluating(name, &error))
+    }
+
+    /// All channels of a clip.
+    pub(super) fn sample(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &Frames,
+    ) -> Result<Samples, Failure> {
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let tracks = clip.set.track_count();
+        let samples = frames.resolve(tracks, clip.set.time_span());
+        let found = samples.map_err(Error::from).and_then(|timeline| {
+            self.device.choose(tracks * timeline.len())?;
+            self.device
+                .work(|engine| methods.sample(engine, clip, frames))
+        });
+        found.map_err(|error| Failure::evaluating(name, &error))
+    }
+}
+
+/// The numbers of the poses of a clip with a skeleton, or with translations or scales.
+fn numbers_of(
+    clip: &Motion,
+    samples: &Samples,
+    kind: PoseKind,
+) -> Result<Vec<f32>, HierarchyError> {
+    Ok(match kind {
+        PoseKind::World => world(clip, samples)?
+            .iter()
+            .flat_map(|pose| {
+                let ([px, py, pz], [x, y, z, w]) =
+                    (pose.position.to_array(), pose.rotation.to_array());
+                [px, py, pz, x, y, z, w]
+            })
+            .collect(),
+        PoseKind::Transform => {
+            let at = |list: &[Vec3], place: usize| list.get(place).copied();
+            let numbers = samples
+                .rotations
+                .iter()
+                .enumerate()
+                .flat_map(|(place, rotation)| {
+                    let [tx, ty, tz] = at(&samples.translations, place)
+                        .unwrap_or(Vec3::ZERO)
+                        .to_array();
+                    let [sx, sy, sz] = at(&samples.scales, place).unwrap_or(Vec3::ONE).to_array();
+                    let [x, y, z, w] = rotation.to_array();
+                    [tx, ty, tz, x, y, z, w, sx, sy, sz]
+                });
+            numbers.collect()
+        }
+    })
+}
