@@ -1,0 +1,408 @@
+//! Entry points, each beside the function in Rust that does the same work.
+
+use bytemuck::Zeroable as _;
+use glam::Vec4;
+
+use crate::cpu::evaluate::{Affine, distances, frames, one};
+use crate::from_keys::arcs::TwoKeyBlock;
+use crate::from_keys::cubics::CubicBlock;
+use crate::math::canonical::canonical;
+use crate::shader::{
+    ArcSegment, Form, IS_CONSTANT, IS_KEY, KEY_INNER, Link, PolynomialSegment, Probe, ROOT,
+    ROWS_PER_INVOCATION, Reply,
+};
+use crate::simd::dispatch::in_lanes;
+use crate::twin::evaluate::Evaluate;
+use crate::twin::self_test::reply;
+use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
+
+use super::random::Random;
+use super::stores::StoredKey;
+use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+
+/// A form of segments: what its kernels read.
+trait Segment: Evaluate + 'static {
+    const KERNELS: [&str; 3];
+    fn random(random: &mut Random) -> Self;
+    fn cells(&self) -> Vec<[f32; 4]>;
+}
+
+fn canonical_vector(random: &mut Random) -> [f32; 4] {
+    random.vector().map(canonical)
+}
+
+impl Segment for ArcSegment {
+    const KERNELS: [&str; 3] = ["arc_frames_f32", "arc_times_f32", "arc_samples_f32"];
+
+    fn random(random: &mut Random) -> Self {
+        let (middle, tangent) = (canonical_vector(random), canonical_vector(random));
+        Self { middle, tangent }
+    }
+
+    fn cells(&self) -> Vec<[f32; 4]> {
+        vec![self.middle, self.tangent]
+    }
+}
+
+impl Segment for PolynomialSegment {
+    const KERNELS: [&str; 3] = [
+        "polynomial_frames_f32",
+        "polynomial_times_f32",
+        "polynomial_samples_f32",
+    ];
+
+    fn random(random: &mut Random) -> Self {
+        let coefficients = std::array::from_fn(|_| canonical_vector(random));
+        Self { coefficients }
+    }
+
+    fn cells(&self) -> Vec<[f32; 4]> {
+        self.coefficients.to_vec()
+    }
+}
+
+/// Everything that a dispatch over two segments and two constants reads but its work.
+struct Scene<S> {
+    segments: [S; 2],
+    constants: [[f32; 4]; 2],
+    /// The one of both that the work uses, and whether it is a constant.
+    source: usize,
+    is_constant: bool,
+    /// The invocation, of two rows of workgroups, and the first item.
+    index: u32,
+    first_item: u32,
+}
+
+impl<S: Segment> Scene<S> {
+    fn new(random: &mut Random, trial: &mut Trial) -> Self {
+        let scene = Self {
+            segments: [S::random(random), S::random(random)],
+            constants: [random.rotation(), random.rotation()],
+            source: random.below(2) as usize,
+            is_constant: random.once_in(8),
+            index: 64 + random.below(2),
+            first_item: random.below(3),
+        };
+        // One workgroup in each row.
+        trial.argument([scene.index - 64, 1, 0]);
+        trial.argument([1u32, 2, 1]);
+        let segments = [scene.segments[0].cells(), scene.segments[1].cells()];
+        trial.global("segments", segments.concat());
+        trial.global("constants", scene.constants);
+        trial.output("rotations");
+        scene
+    }
+
+    /// Where the item of this invocation lies among all.
+    fn place(&self) -> usize {
+        (self.first_item + self.index) as usize
+    }
+
+    fn source_with_bit(&self) -> (u32, u32) {
+        let bit = if self.is_constant { IS_CONSTANT } else { 0 };
+        (self.source as u32, bit)
+    }
+
+    fn dispatch(&self, trial: &mut Trial, stride: u32, first_output: u32) {
+        let count = self.index + 1;
+        let dispatch = [self.first_item, count, stride, 0, first_output];
+        trial.global("dispatch", dispatch);
+    }
+}
+
+/// Runs of up to four samples, at frames or at listed distances.
+fn runs<S: Segment>(is_listed: bool) -> Twin {
+    let kernel = S::KERNELS[usize::from(is_listed)];
+    with_globals(kernel, "main", move |random, trial| {
+        let scene = Scene::<S>::new(random, trial);
+        let (output, stride, count) = (random.below(2), 1 + random.below(3), 1 + random.below(4));
+        trial.samples(count);
+        scene.dispatch(trial, stride, 0);
+        let affine = Affine {
+            scale: random.number() * 0.25,
+            offset: random.parameter(),
+        };
+        let first = random.below(9) as i32 - if is_listed { 0 } else { 4 };
+        let listed: [f32; 32] = std::array::from_fn(|_| random.number() * 4.0);
+        if is_listed {
+            trial.global("distances", listed);
+        }
+        let (source, bit) = scene.source_with_bit();
+        let mut items = vec![(0, 0, 0, 0, 0.0, 0.0); scene.place()];
+        items.push((
+            source,
+            output,
+            count | bit,
+            first,
+            affine.scale,
+            affine.offset,
+        ));
+        trial.global("items", items);
+        let mut found = [[0.0; 4]; 4];
+        let segment = &scene.segments[scene.source];
+        match (scene.is_constant, is_listed) {
+            (true, _) => found = [scene.constants[scene.source]; 4],
+            (_, true) => {
+                let own = &listed[first as usize..];
+                distances::<Vec4, S>(segment, affine, own, count as usize, &mut found);
+            }
+            _ => frames::<Vec4, S>(segment, affine, first as f32, count as usize, &mut found),
+        }
+        trial.expect(vec![[UNTOUCHED; 4]; output as usize]);
+        for rotation in &found[..count as usize - 1] {
+            trial.expect(*rotation);
+            trial.expect(vec![[UNTOUCHED; 4]; stride as usize - 1]);
+        }
+        trial.expect(found[count as usize - 1]);
+    })
+}
+
+fn samples<S: Segment>() -> Twin {
+    with_globals(S::KERNELS[2], "main", |random, trial| {
+        let scene = Scene::<S>::new(random, trial);
+        let first_output = random.below(2);
+        scene.dispatch(trial, 0, first_output);
+        let parameter = random.parameter();
+        let (source, bit) = scene.source_with_bit();
+        let mut list = vec![(0, 0.0); scene.place()];
+        list.push((source | bit, parameter));
+        trial.global("samples", list);
+        trial.expect(vec![[UNTOUCHED; 4]; (first_output + scene.index) as usize]);
+        // A scale of 1 and an offset of 0 keep the parameter.
+        let affine = Affine {
+            scale: 1.0,
+            offset: 0.0,
+        };
+        trial.expect(match scene.is_constant {
+            true => scene.constants[scene.source],
+            false => one(&scene.segments[scene.source], affine, parameter),
+        });
+    })
+}
+
+/// The rows of the second invocation of its sample: those after the first four.
+struct Rows {
+    rows: Vec<Vec<StoredKey>>,
+    is_key: bool,
+    parameter: f32,
+}
+
+impl Rows {
+    /// One row or two, each of so many keys; the sample lies after the key `before`, or is it.
+    fn new(
+        random: &mut Random,
+        trial: &mut Trial,
+        before: u32,
+        mut keys: impl FnMut(&mut Random) -> Vec<StoredKey>,
+    ) -> Self {
+        const SAMPLES: u32 = 2;
+        let count = 1 + random.below(2);
+        trial.samples(count);
+        let rows: Vec<_> = (0..count).map(|_| keys(random)).collect();
+        let each = rows[0].len();
+        let (is_key, parameter) = (random.once_in(8), random.parameter());
+        let own = random.below(SAMPLES);
+        trial.argument([own, 1, 0]);
+        trial.global("rows", [SAMPLES, each as u32, ROWS_PER_INVOCATION + count]);
+        let mut samples = [(0, 0.0); SAMPLES as usize];
+        samples[own as usize] = (before | if is_key { IS_KEY } else { 0 }, parameter);
+        trial.global("samples", samples);
+        let mut stored = vec![[0; 4]; ROWS_PER_INVOCATION as usize * each];
+        stored.extend(rows.iter().flatten().map(|key| key.stored));
+        trial.global("keys", stored);
+        trial.output("rotations");
+        trial.expect(vec![
+            [UNTOUCHED; 4];
+            (ROWS_PER_INVOCATION * SAMPLES + own) as usize
+        ]);
+        Self {
+            rows,
+            is_key,
+            parameter,
+        }
+    }
+
+    /// What the rows give, one after another, with the other sample between them.
+    fn expect(&self, trial: &mut Trial, rotations: &[[f32; 4]]) {
+        for (row, rotation) in rotations[..self.rows.len()].iter().enumerate() {
+            trial.expect(vec![[UNTOUCHED; 4]; usize::from(row > 0)]);
+            trial.expect(*rotation);
+        }
+    }
+}
+
+fn from_two_keys(kernel: &'static str, form: Form) -> Twin {
+    with_globals(kernel, "main", move |random, trial| {
+        let before = random.below(2) as usize;
+        let rows = Rows::new(random, trial, before as u32, |random| {
+            let is_turned = random.once_in(2);
+            let mut keys = vec![StoredKey::new(random.unit(), false)];
+            let pair = random.pair().map(|key| StoredKey::new(key, is_turned));
+            keys.splice(before..before, pair);
+            keys
+        });
+        let mut block = TwoKeyBlock::new(form);
+        for (row, keys) in rows.rows.iter().enumerate() {
+            let [from, to] = &keys[before..before + 2] else {
+                unreachable!("three keys");
+            };
+            (block.from[row], block.to[row]) = match rows.is_key {
+                true => (from.given, from.given),
+                false => (from.continued, to.continued),
+            };
+            block.parameters[row] = rows.parameter;
+        }
+        block.count = rows.rows.len();
+        in_lanes(&mut block);
+        rows.expect(trial, &block.rotations);
+    })
+}
+
+fn from_four_keys() -> Twin {
+    with_globals("from_keys_cubics", "main", |random, trial| {
+        let rows = Rows::new(random, trial, 1, |random| {
+            let keys = random.four_keys();
+            keys.map(|key| StoredKey::new(key, random.once_in(2)))
+                .into()
+        });
+        let weights = [0; 4].map(|_| random.weights());
+        trial.global("weights", weights);
+        let [_, first, last, _] = weights;
+        // A key without a neighbour takes its place.
+        let before = usize::from(first.kind != KEY_INNER);
+        let after = 3 - usize::from(last.kind != KEY_INNER);
+        let mut block = CubicBlock::new();
+        for (row, keys) in rows.rows.iter().enumerate() {
+            for (place, key) in [before, 1, 2, after].into_iter().enumerate() {
+                block.keys[place][row] = keys[key].continued;
+            }
+            if rows.is_key {
+                block.keys[1][row] = keys[1].given;
+                block.held[row] = 1.0;
+            }
+            (block.weights[0][row], block.weights[1][row]) = (first, last);
+            block.parameters[row] = rows.parameter;
+        }
+        block.count = rows.rows.len();
+        in_lanes(&mut block);
+        rows.expect(trial, &block.rotations);
+    })
+}
+
+pub(super) fn evaluation() -> Vec<Twin> {
+    vec![
+        runs::<ArcSegment>(false),
+        runs::<ArcSegment>(true),
+        samples::<ArcSegment>(),
+        runs::<PolynomialSegment>(false),
+        runs::<PolynomialSegment>(true),
+        samples::<PolynomialSegment>(),
+        from_two_keys("from_keys_arcs", Form::Arc),
+        from_two_keys("from_keys_two_keys", Form::Polynomial),
+        from_four_keys(),
+    ]
+}
+
+pub(super) fn self_test() -> Twin {
+    with_globals("self_test", "main", |random, trial| {
+        let n = (random.word() as i32) >> random.below(32);
+        let [a, b, c] = [random.finite(), random.finite(), random.finite()];
+        trial.argument([0u32; 3]);
+        trial.global("probes", (a, b, c, n));
+        trial.output("replies");
+        let reply = reply(Probe { a, b, c, n });
+        trial.expect(bytemuck::cast::<Reply, [f32; 10]>(reply));
+    })
+}
+
+/// Rotations for layers, some of them opposite or nearly so.
+fn layer(random: &mut Random) -> [f32; 4] {
+    match random.once_in(4) {
+        true => [0.0, 0.0, 0.0, 1.0],
+        false => random.rotation(),
+    }
+}
+
+/// Mixes the rotations at `place`.
+fn mix(random: &mut Random, trial: &mut Trial, place: usize) {
+    let (pair, weight) = (random.pair(), random.number());
+    let [from, to] = pair.map(|own| {
+        let mut layer = vec![[0.0; 4]; place];
+        layer.push(own);
+        layer
+    });
+    trial.global("from_layer", from);
+    trial.global("to_layer", to);
+    trial.global("weights", weight);
+    trial.output("mixed");
+    trial.expect(vec![[UNTOUCHED; 4]; place]);
+    trial.expect(pose_mix::pose(pair[0], pair[1], weight));
+}
+
+pub(super) fn poses() -> Vec<Twin> {
+    vec![
+        with_globals("poses_mix", "pose", |random, trial| {
+            trial.argument(1u32);
+            mix(random, trial, 1);
+        }),
+        with_globals("poses_mix", "main", |random, trial| {
+            // The second row of workgroups, of one each.
+            trial.argument([1, 1, 0]);
+            trial.argument([1u32, 2, 1]);
+            trial.global("dispatch", [66u32, 0]);
+            mix(random, trial, 65);
+        }),
+        with_globals("poses_add", "pose", |random, trial| {
+            let [base, own, reference] = [0; 3].map(|_| layer(random));
+            let weight = random.number();
+            trial.argument(0u32);
+            trial.global("base", base);
+            trial.global("layer", own);
+            trial.global("reference", [reference, [weight, 0.0, 0.0, 0.0]]);
+            trial.global("dispatch", [1u32, 0]);
+            trial.output("added");
+            trial.expect(pose_add::pose(base, own, reference, weight));
+        }),
+        with_globals("poses_blend", "pose", |random, trial| {
+            const COUNT: usize = 2;
+            let (layers, place) = (1 + random.below(3), random.below(COUNT as u32));
+            let mut all = vec![[0.0; 4]; layers as usize * COUNT];
+            all.fill_with(|| layer(random));
+            let weights: Vec<f32> = (0..layers).map(|_| random.number()).collect();
+            trial.argument(place);
+            trial.global("dispatch", [COUNT as u32, layers]);
+            trial.output("blended");
+            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
+            trial.expect(pose_blend::pose(&all, &weights, COUNT, place as usize));
+            trial.global("layers", all);
+            trial.global("weights", weights);
+        }),
+        with_globals("poses_world", "pose", |random, trial| {
+            const TRACKS: usize = 3;
+            // A root, then its child and a second root or a grandchild; their tracks in any order.
+            let order = [[0, 1, 2], [2, 0, 1], [1, 2, 0]][random.below(3) as usize];
+            let parents = [ROOT, order[0], [ROOT, order[1]][random.below(2) as usize]];
+            let links: [Link; TRACKS] = std::array::from_fn(|i| Link {
+                offset: random.vector(),
+                track: order[i],
+                parent: parents[i],
+                ..Link::zeroed()
+            });
+            let local: [[f32; 4]; 2 * TRACKS] = std::array::from_fn(|_| random.rotation());
+            let frame = random.below(2);
+            trial.argument(frame);
+            trial.global("local", local);
+            trial.global(
+                "links",
+                links.map(|own| (own.offset, own.track, own.parent)),
+            );
+            trial.global("dispatch", [2, TRACKS as u32]);
+            trial.output("world");
+            let first = frame as usize * TRACKS;
+            let mut world = [[0.0; 4]; 2 * TRACKS];
+            pose_world::pose(&local[first..][..TRACKS], &links, &mut world);
+            trial.expect(vec![[UNTOUCHED; 4]; 2 * first]);
+            trial.expect(world);
+        }),
+    ]
+}
