@@ -248,7 +248,10 @@ pub(super) fn conversions() -> Vec<Twin> {
         twin(
             "arc_frames_euler",
             "wrapped",
-            |random| 4.0 * angle(random),
+            |random| match random.once_in(2) {
+                true => random.finite(),
+                false => 4.0 * angle(random),
+            },
             wrapped,
         ),
         twin(

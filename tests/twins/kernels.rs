@@ -368,7 +368,12 @@ pub(super) fn poses() -> Vec<Twin> {
             let (layers, place) = (1 + random.below(3), random.below(COUNT as u32));
             let mut all = vec![[0.0; 4]; layers as usize * COUNT];
             all.fill_with(|| layer(random));
-            let weights: Vec<f32> = (0..layers).map(|_| random.number()).collect();
+            let mut weights: Vec<f32> = (0..layers).map(|_| random.number()).collect();
+            if layers == 2 && random.once_in(4) {
+                // They cancel, but for a rest near 2^-20, the border of what has a direction.
+                all.copy_within(..COUNT, COUNT);
+                weights = vec![1.0, -1.0 + (16.0 + random.number()) / (1 << 24) as f32];
+            }
             trial.argument(place);
             trial.global("dispatch", [COUNT as u32, layers]);
             trial.output("blended");

@@ -19,7 +19,7 @@ mod trial;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use naga::{BinaryOperator, Expression};
+use naga::{BinaryOperator, Expression, Literal, Module};
 
 use program::Checked;
 use trial::Twin;
@@ -110,11 +110,15 @@ fn functions_of_kernels() -> BTreeMap<(String, String), &'static str> {
 #[test]
 fn every_shader_function_is_compared() {
     let twins = twins();
-    let of = |kernel: &str| source(kernel);
-    for ((name, text), kernel) in functions_of_kernels() {
+    let functions = functions_of_kernels();
+    for (listed, _) in WITHOUT {
+        let is_function = functions.keys().any(|(name, _)| name == listed);
+        assert!(is_function, "no kernel has a function {listed}");
+    }
+    for ((name, text), kernel) in functions {
         let is_compared = twins
             .iter()
-            .any(|twin| twin.function == name && of(twin.kernel).contains(&text));
+            .any(|twin| twin.function == name && source(twin.kernel).contains(&text));
         let is_listed = WITHOUT.iter().any(|(listed, _)| *listed == name);
         assert!(
             is_compared || is_listed,
@@ -127,35 +131,49 @@ fn every_shader_function_is_compared() {
     }
 }
 
-/// What a mistake is likely to be: a sign, and a constant's last digit.
-fn mistake(expression: &Expression) -> Option<Expression> {
+/// What a mistake is likely to be: a sum for a difference or for a product, a difference for a sum,
+/// a constant that is a thousandth too large.
+fn mistake(module: &Module, expression: &Expression) -> Option<Expression> {
+    use BinaryOperator::{Add, Multiply, Subtract};
     match *expression {
-        Expression::Binary {
-            op: BinaryOperator::Add,
-            left,
-            right,
-        } => Some(Expression::Binary {
-            op: BinaryOperator::Subtract,
-            left,
-            right,
-        }),
-        Expression::Binary {
-            op: BinaryOperator::Subtract,
-            left,
-            right,
-        } => Some(Expression::Binary {
-            op: BinaryOperator::Add,
-            left,
-            right,
-        }),
+        Expression::Binary { op, left, right } => {
+            let op = match op {
+                Add => Subtract,
+                Subtract | Multiply => Add,
+                _ => return None,
+            };
+            Some(Expression::Binary { op, left, right })
+        }
+        Expression::Literal(Literal::F32(value)) if value != 0.0 => {
+            Some(Expression::Literal(Literal::F32(value * 1.001)))
+        }
+        Expression::Constant(named) => {
+            let init = module.constants[named].init;
+            mistake(module, &module.global_expressions[init])
+        }
         _ => None,
     }
 }
 
-/// The samples reach every part of every function: a sum in the place of any difference is found,
-/// and a difference in the place of any sum.
+/// Constants, and a part of their lines, of which a thousandth does not count, and why.
+const COARSE: [(&str, &str, &str); 4] = [
+    (
+        "HALF_PI_LOW",
+        "HALF_PI - flat",
+        "less than a rounding of the sum",
+    ),
+    ("PI_LOW", "PI - acute", "less than a rounding of the sum"),
+    ("1.0", "large == 0.0", "the divisor of 0"),
+    (
+        "LONGEST_STEP",
+        "norm_squared(chord)",
+        "SMALL_SQUARED_EXTENT is reached first",
+    ),
+];
+
+/// Nothing in any function is beyond the samples' reach: a mistake anywhere is found.
 #[test]
-fn a_wrong_sign_anywhere_is_found() {
+fn a_mistake_anywhere_is_found() {
     let twins = twins();
     let kernels = kernels(&twins);
     // Where there is one to be found, and whether it was. The entry point of all kernels that read
@@ -167,7 +185,7 @@ fn a_wrong_sign_anywhere_is_found() {
         let index = twin.index(&program);
         let (function, info) = checked.functions()[index];
         for (at, expression) in function.expressions.iter() {
-            let Some(wrong) = mistake(expression) else {
+            let Some(wrong) = mistake(&checked.module, expression) else {
                 continue;
             };
             let mut changed = function.clone();
@@ -175,16 +193,20 @@ fn a_wrong_sign_anywhere_is_found() {
             program.functions[index] = checked.compiled(&changed, info);
             let span = function.expressions.get_span(at);
             let line = span.location(&text).line_number as usize;
-            let line = text.lines().nth(line - 1).map(str::to_owned);
-            let own = span.to_range().map(|own| text[own].to_owned());
-            let key = (twin.function, line, own);
-            *mistakes.entry(key).or_insert(false) |= twin.compare(&program, 2_000).is_err();
+            let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
+            let own = span.to_range().map_or("", |own| &text[own]).to_owned();
+            *mistakes.entry((line, own)).or_insert(false) |=
+                twin.compare(&program, SAMPLES / 10).is_err();
         }
     }
-    assert!(mistakes.len() > 300, "only {} were tried", mistakes.len());
-    let unseen: Vec<_> = mistakes
-        .iter()
-        .filter(|(_, is_found)| !**is_found)
-        .collect();
-    assert!(unseen.is_empty(), "{unseen:#?}");
+    assert!(mistakes.len() > 850, "only {} were tried", mistakes.len());
+    for ((line, own), is_found) in mistakes {
+        let is_coarse = COARSE
+            .iter()
+            .any(|(constant, part, _)| own == *constant && line.contains(part));
+        assert!(
+            is_found != is_coarse,
+            "`{own}` in `{line}`: found is {is_found}"
+        );
+    }
 }

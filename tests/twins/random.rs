@@ -1,12 +1,16 @@
 //! Random inputs, always the same ones: ordinary values, and hostile ones among them.
 
 use fastrand::Rng;
+use glam::Vec4;
 
 use crate::math::canonical::canonical;
 use crate::shader::{
-    FLUSHED_BITS, GIMBAL, KEY_AT_END, KEY_INNER, KEY_UNKNOWN, LEAST_NORMAL, PI, TINY_BITS,
-    TangentWeights,
+    FLUSHED_BITS, GIMBAL, KEY_AT_END, KEY_INNER, KEY_UNKNOWN, LEAST_NORMAL, LONGEST_STEP,
+    LONGEST_TANGENT_PART, PI, TINY_BITS, TangentWeights,
 };
+
+/// An angle in R⁴ between two keys, well within what the small-angle series takes.
+const ORDINARY_STEP: f32 = 0.02;
 
 pub(super) struct Random(Rng);
 
@@ -111,13 +115,13 @@ impl Random {
         }
     }
 
-    /// A unit quaternion at an angle of about `angle` in R⁴ from another.
+    /// A unit quaternion at an angle in R⁴ from another.
     pub(super) fn near(&mut self, q: [f32; 4], angle: f32) -> [f32; 4] {
-        let toward = self.unit();
-        let moved: [f64; 4] =
-            std::array::from_fn(|c| f64::from(q[c]) + f64::from(angle) * f64::from(toward[c]));
-        let length = moved.iter().map(|c| c * c).sum::<f64>().sqrt();
-        moved.map(|c| canonical((c / length) as f32))
+        let (q, toward) = (Vec4::from(q).as_dvec4(), Vec4::from(self.unit()).as_dvec4());
+        let across = (toward - q * toward.dot(q)).normalize_or_zero();
+        let (sine, cosine) = f64::from(angle).sin_cos();
+        let moved = q * cosine + across * sine;
+        moved.to_array().map(|c| canonical(c as f32))
     }
 
     /// Two keys that are at most about pi/2 apart in R⁴, some equal and some hardly apart.
@@ -171,30 +175,52 @@ impl Random {
         }
     }
 
-    /// Four keys around an interval. Some are equal, most are near enough for the small-angle
-    /// series, some at its limits, and some beyond.
-    pub(super) fn four_keys(&mut self) -> [[f32; 4]; 4] {
-        let angle = match self.0.u32(..8) {
+    /// An angle in R⁴ between two keys: mostly within the small-angle series, at one of its limits, or
+    /// beyond.
+    fn step(&mut self) -> f32 {
+        match self.0.u32(..12) {
             0 => 0.0,
             1 => self.scaled(-40..-6).abs(),
-            2 => 0.0583 + 2e-4 * self.uniform(), // the longest chord
-            3 => 0.4 * self.0.f32(),
+            2 => LONGEST_STEP.sqrt() * (1.0 + 1e-3 * self.uniform()),
+            3 | 4 => 0.03 + 0.03 * self.0.f32(), // the extents on both sides of the limit
+            5 => 0.4 * self.0.f32(),
+            6 => ORDINARY_STEP * (1.0 + 1e-3 * self.uniform()),
             _ => 0.03 * self.0.f32(),
-        };
-        let first = self.unit();
-        let second = self.near(first, angle);
-        let spread = if self.once_in(2) { 1.0 } else { self.0.f32() };
-        let third = self.near(second, angle * spread);
-        [first, second, third, self.near(third, angle)]
+        }
+    }
+
+    /// Four keys around an interval.
+    pub(super) fn four_keys(&mut self) -> [[f32; 4]; 4] {
+        let mut key = self.unit();
+        let same = self.once_in(2).then(|| self.step());
+        [0; 4].map(|_| {
+            let own = key;
+            let step = same.unwrap_or_else(|| self.step());
+            key = self.near(key, step);
+            own
+        })
+    }
+
+    /// The weight of a step in a tangent; one in four makes an [`ORDINARY_STEP`] as long as the
+    /// small-angle series allows.
+    fn weight(&mut self) -> f32 {
+        let most = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
+        match self.0.u32(..4) {
+            0 => most * (1.0 + 1e-3 * self.uniform()),
+            1 => 2.0 * most * self.uniform(),
+            _ => self.uniform(),
+        }
     }
 
     pub(super) fn weights(&mut self) -> TangentWeights {
         let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
-        let size = if self.once_in(8) { 8.0 } else { 1.0 };
+        // Steps between keys at even times count alike.
+        let even = self.once_in(4).then_some(0.5);
+        let most = if self.once_in(2) { 0.33 } else { 0.05 };
         TangentWeights {
-            before: size * self.uniform(),
-            after: size * self.uniform(),
-            outgoing: 0.33 * self.0.f32(),
+            before: even.unwrap_or_else(|| self.weight()),
+            after: even.unwrap_or_else(|| self.weight()),
+            outgoing: most * self.0.f32(),
             kind: kinds[self.0.usize(..kinds.len())],
         }
     }
