@@ -87,10 +87,8 @@ pub(super) enum Step {
     Loop {
         body: Vec<Step>,
         continuing: Vec<Step>,
-        break_if: Option<Place>,
     },
     Break,
-    Continue,
     Return {
         from: Place,
     },
@@ -106,7 +104,6 @@ pub(super) enum Step {
 enum End {
     Whole,
     Break,
-    Continue,
     /// Where the result lies in the stack.
     Return(usize),
 }
@@ -310,20 +307,15 @@ impl<'a> Machine<'a> {
                 Step::Loop {
                     ref body,
                     ref continuing,
-                    break_if,
                 } => loop {
                     match self.run(body, base, top) {
-                        End::Whole | End::Continue => {}
+                        End::Whole => {}
                         End::Break => break,
                         end => return end,
                     }
                     self.run(continuing, base, top);
-                    if break_if.is_some_and(|condition| self.stack[base + condition] != 0) {
-                        break;
-                    }
                 },
                 Step::Break => return End::Break,
-                Step::Continue => return End::Continue,
                 Step::Return { from } => return End::Return(base + from),
                 Step::Call {
                     function,

@@ -7,10 +7,13 @@
 //! it.
 
 mod cells;
+mod frame;
 mod functions;
 mod kernels;
+mod layout;
 mod machine;
 mod operations;
+mod poses;
 mod program;
 mod random;
 mod stores;
@@ -36,8 +39,8 @@ fn twins() -> Vec<Twin> {
     all.extend(stores::readers());
     all.extend(stores::keys());
     all.extend(kernels::evaluation());
-    all.extend(kernels::poses());
-    all.push(kernels::self_test());
+    all.extend(poses::poses());
+    all.push(poses::self_test());
     all
 }
 

@@ -43,64 +43,58 @@ pub(super) fn unary(operator: UnaryOperator, of: Scalar) -> Unary {
     }
 }
 
+/// Integers have no bits above their width, and a bool is 0 or 1.
 pub(super) fn binary(operator: BinaryOperator, of: Scalar) -> &'static dyn Binary {
     use BinaryOperator as Operator;
+    /// A closure of two cells, or of what they hold.
+    macro_rules! on {
+        ($a:ident $b:ident => $result:expr) => {
+            &|$a: u64, $b: u64| $result
+        };
+        (f32 $a:ident $b:ident => $result:expr) => {
+            &|a: u64, b: u64| {
+                let ($a, $b) = (as_f32(a), as_f32(b));
+                $result
+            }
+        };
+    }
     match (operator, of) {
-        (Operator::Add, Scalar::F32) => &|a: u64, b: u64| of_f32(as_f32(a) + as_f32(b)),
-        (Operator::Subtract, Scalar::F32) => &|a: u64, b: u64| of_f32(as_f32(a) - as_f32(b)),
-        (Operator::Multiply, Scalar::F32) => &|a: u64, b: u64| of_f32(as_f32(a) * as_f32(b)),
-        (Operator::Equal, Scalar::F32) => &|a: u64, b: u64| u64::from(as_f32(a) == as_f32(b)),
-        (Operator::NotEqual, Scalar::F32) => &|a: u64, b: u64| u64::from(as_f32(a) != as_f32(b)),
-        (Operator::Less, Scalar::F32) => &|a: u64, b: u64| u64::from(as_f32(a) < as_f32(b)),
-        (Operator::LessEqual, Scalar::F32) => &|a: u64, b: u64| u64::from(as_f32(a) <= as_f32(b)),
-        (Operator::Greater, Scalar::F32) => &|a: u64, b: u64| u64::from(as_f32(a) > as_f32(b)),
-        (Operator::GreaterEqual, Scalar::F32) => {
-            &|a: u64, b: u64| u64::from(as_f32(a) >= as_f32(b))
-        }
-        // Two's complement adds, subtracts and multiplies signed and unsigned numbers alike.
+        (Operator::Add, Scalar::F32) => on!(f32 a b => of_f32(a + b)),
+        (Operator::Subtract, Scalar::F32) => on!(f32 a b => of_f32(a - b)),
+        (Operator::Multiply, Scalar::F32) => on!(f32 a b => of_f32(a * b)),
+        (Operator::Equal, Scalar::F32) => on!(f32 a b => (a == b).into()),
+        (Operator::NotEqual, Scalar::F32) => on!(f32 a b => (a != b).into()),
+        (Operator::Less, Scalar::F32) => on!(f32 a b => (a < b).into()),
+        (Operator::LessEqual, Scalar::F32) => on!(f32 a b => (a <= b).into()),
+        (Operator::Greater, Scalar::F32) => on!(f32 a b => (a > b).into()),
+        // Two's complement adds and subtracts signed and unsigned numbers alike.
         (Operator::Add, Scalar::U32 | Scalar::I32) => {
-            &|a: u64, b: u64| word((a as u32).wrapping_add(b as u32))
+            on!(a b => word((a as u32).wrapping_add(b as u32)))
         }
         (Operator::Subtract, Scalar::U32 | Scalar::I32) => {
-            &|a: u64, b: u64| word((a as u32).wrapping_sub(b as u32))
+            on!(a b => word((a as u32).wrapping_sub(b as u32)))
         }
-        (Operator::Multiply, Scalar::U32 | Scalar::I32) => {
-            &|a: u64, b: u64| word((a as u32).wrapping_mul(b as u32))
-        }
+        (Operator::Multiply, Scalar::U32) => on!(a b => word((a as u32).wrapping_mul(b as u32))),
         // The only divisors are constants.
-        (Operator::Divide, Scalar::U32) => &|a: u64, b: u64| a / b,
-        (Operator::Less, Scalar::U32) => &|a: u64, b: u64| u64::from(a < b),
-        (Operator::LessEqual, Scalar::U32) => &|a: u64, b: u64| u64::from(a <= b),
-        (Operator::Greater, Scalar::U32) => &|a: u64, b: u64| u64::from(a > b),
-        (Operator::GreaterEqual, Scalar::U32) => &|a: u64, b: u64| u64::from(a >= b),
-        (Operator::Equal, Scalar::U32 | Scalar::I32 | Scalar::BOOL) => {
-            &|a: u64, b: u64| u64::from(a == b)
-        }
-        (Operator::NotEqual, Scalar::U32 | Scalar::I32 | Scalar::BOOL) => {
-            &|a: u64, b: u64| u64::from(a != b)
-        }
-        // Integers have no bits above their width, and a bool is 0 or 1.
-        (Operator::And, Scalar::U32 | Scalar::I32 | Scalar::U64 | Scalar::BOOL) => {
-            &|a: u64, b: u64| a & b
-        }
-        (Operator::InclusiveOr, Scalar::U32 | Scalar::I32 | Scalar::U64 | Scalar::BOOL) => {
-            &|a: u64, b: u64| a | b
-        }
-        (Operator::ExclusiveOr, Scalar::U32 | Scalar::I32) => &|a: u64, b: u64| a ^ b,
-        (Operator::LogicalAnd, Scalar::BOOL) => &|a: u64, b: u64| a & b,
-        (Operator::LogicalOr, Scalar::BOOL) => &|a: u64, b: u64| a | b,
-        (Operator::ShiftLeft, Scalar::U32) => &|a: u64, b: u64| word((a as u32) << (b & 31)),
-        (Operator::ShiftLeft, Scalar::U64) => &|a: u64, b: u64| a << (b & 63),
-        (Operator::ShiftRight, Scalar::U32) => &|a: u64, b: u64| a >> (b & 31),
+        (Operator::Divide, Scalar::U32) => on!(a b => a / b),
+        (Operator::Equal, Scalar::U32) => on!(a b => (a == b).into()),
+        (Operator::NotEqual, Scalar::U32) => on!(a b => (a != b).into()),
+        (Operator::Less, Scalar::U32) => on!(a b => (a < b).into()),
+        (Operator::GreaterEqual, Scalar::U32) => on!(a b => (a >= b).into()),
+        (Operator::And, Scalar::U32 | Scalar::I32 | Scalar::BOOL) => on!(a b => a & b),
+        (Operator::InclusiveOr, Scalar::U32 | Scalar::U64) => on!(a b => a | b),
+        (Operator::ExclusiveOr, Scalar::U32) => on!(a b => a ^ b),
+        (Operator::ShiftLeft, Scalar::U32) => on!(a b => word((a as u32) << (b & 31))),
+        (Operator::ShiftLeft, Scalar::U64) => on!(a b => a << (b & 63)),
+        (Operator::ShiftRight, Scalar::U32) => on!(a b => a >> (b & 31)),
         _ => panic!("{operator:?} of {of:?} has no evaluation"),
     }
 }
 
-/// A conversion; `None` where the bits stay.
+/// A conversion; `None` where the cell stays as it is.
 pub(super) fn conversion(from: Scalar, to: Scalar) -> Option<Unary> {
     match (from, to) {
         (Scalar::I32, Scalar::F32) => Some(|a| of_f32(a as u32 as i32 as f32)),
-        (Scalar::U32, Scalar::F32) => Some(|a| of_f32(a as u32 as f32)),
         (Scalar::U32, Scalar::I32 | Scalar::U64) | (Scalar::I32, Scalar::U32) => None,
         _ => panic!("a conversion from {from:?} to {to:?} has no evaluation"),
     }

@@ -51,11 +51,14 @@ impl Trial {
     }
 }
 
+/// Makes up one call.
+type Fill = dyn Fn(&mut Random, &mut Trial);
+
 /// A function of a kernel beside its twin.
 pub(super) struct Twin {
     pub(super) kernel: &'static str,
     pub(super) function: &'static str,
-    trial: Box<dyn Fn(&mut Random, &mut Trial)>,
+    trial: Box<Fill>,
 }
 
 /// A function that takes all that it needs as arguments, and the one in Rust.
