@@ -42,7 +42,7 @@ fn main() {
         };
         let module = parse(&name, &source);
         declared.collect(&name, &module);
-        write(&out, &name, &compile(&name, &source, &module));
+        write(&out, &name, &source, &compile(&name, &source, &module));
         if has_texels {
             let name = format!("{name}_texels");
             let wide = files.iter().flat_map(|&file| match file {
@@ -52,7 +52,7 @@ fn main() {
             let joined: String = wide.map(read_shader).collect();
             let source = readers::texels(&reads, &module) + &joined;
             let module = parse(&name, &source);
-            write(&out, &name, &compile(&name, &source, &module));
+            write(&out, &name, &source, &compile(&name, &source, &module));
         }
         let bindings = module.global_variables.iter();
         compiled.push(Compiled {
@@ -96,7 +96,9 @@ fn compile(name: &str, source: &str, module: &naga::Module) -> Vec<u32> {
     spirv::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-fn write(out: &Path, name: &str, words: &[u32]) {
+/// Writes a kernel, and the text that it is made of: `tests/twins` evaluates its functions.
+fn write(out: &Path, name: &str, source: &str, words: &[u32]) {
     let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
     fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR is writable");
+    fs::write(out.join(format!("{name}.wgsl")), source).expect("OUT_DIR is writable");
 }

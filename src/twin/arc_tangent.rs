@@ -15,12 +15,12 @@ pub(crate) fn flushed(x: f32) -> f32 {
 }
 
 #[inline(always)]
-fn magnitude(x: f32) -> f32 {
+pub(super) fn magnitude(x: f32) -> f32 {
     f32::from_bits(x.to_bits() & 0x7fff_ffff)
 }
 
 #[inline(always)]
-fn reciprocal(x: f32) -> f32 {
+pub(super) fn reciprocal(x: f32) -> f32 {
     let seed = f32::from_bits(RECIPROCAL_SEED.wrapping_sub(x.to_bits()));
     let first = seed * (2.0 - x * seed);
     let second = first * (2.0 - x * first);

@@ -11,7 +11,7 @@ fn select<T>(otherwise: T, value: T, condition: bool) -> T {
 }
 
 #[inline(always)]
-fn wrapped(angle: f32) -> f32 {
+pub(super) fn wrapped(angle: f32) -> f32 {
     let low = select(angle, (angle + 2.0 * PI) + 2.0 * PI_LOW, angle < -PI);
     select(low, (low - 2.0 * PI) - 2.0 * PI_LOW, low > PI)
 }

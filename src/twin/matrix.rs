@@ -2,8 +2,14 @@
 
 use crate::math::canonical::canonical;
 
+/// The rows as they are stored.
 #[inline(always)]
 pub(crate) fn rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
+    matrix_rows(rotation, detail).map(|row| row.map(canonical))
+}
+
+#[inline(always)]
+pub(super) fn matrix_rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
     let [x, y, z, w] = rotation;
     let along = if detail == 1 { [-x, -y, -z] } else { [x, y, z] };
     let double = along.map(|c| c + c);
@@ -21,5 +27,4 @@ pub(crate) fn rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
         [xy + wz, 1.0 - (xx + zz), yz - wx],
         [zx - wy, yz + wx, 1.0 - (xx + yy)],
     ]
-    .map(|row| row.map(canonical))
 }

@@ -19,3 +19,7 @@ pub(crate) mod self_test;
 pub(crate) mod sine_cosine;
 pub(crate) mod small_angle;
 pub(crate) mod snorm16;
+
+#[cfg(test)]
+#[path = "../../tests/twins/mod.rs"]
+mod tests;

@@ -65,14 +65,14 @@ pub(crate) fn step_vector<N: Arithmetic>(a: [N; 4], chord: [N; 4]) -> [N; 3] {
 }
 
 #[inline(always)]
-fn small_log(v: Vector) -> Vector {
+pub(super) fn small_log(v: Vector) -> Vector {
     let x = dot3(v, v);
     let tail = ((LOG_4 * x + LOG_3) * x + LOG_2) * x + LOG_1;
     sum(scaled(v, tail * x), v)
 }
 
 #[inline(always)]
-fn small_exp(v: Vector) -> FromIdentity<f32> {
+pub(super) fn small_exp(v: Vector) -> FromIdentity<f32> {
     let x = dot3(v, v);
     let sinc = (SINC_2 * x + SINC_1) * x;
     FromIdentity {
@@ -100,7 +100,7 @@ pub(crate) fn inverse_rotated<N: Arithmetic>(v: [N; 3], r: FromIdentity<N>) -> [
 }
 
 #[inline(always)]
-fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
+pub(super) fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
     [
         canonical(m[3] * v[0] + m[0] * w + m[1] * v[2] - m[2] * v[1]),
         canonical(m[3] * v[1] - m[0] * v[2] + m[1] * w + m[2] * v[0]),

@@ -1,0 +1,361 @@
+//! A function made into steps: every expression gets a place in the function's frame, and everything
+//! that is known before it runs is worked out once.
+//!
+//! Types and the order of evaluation are naga's own, as its validator reports them. An expression or a
+//! statement that is not known here panics with its text.
+
+use naga::valid::FunctionInfo;
+use naga::{Block, Expression, Function, Handle, Module, Scalar, Statement, TypeInner};
+
+use super::layout::{cells, cells_of, constant, element};
+use super::machine::{Step, pointer_to_global};
+use super::operations::{Operand, Place, binary, conversion, unary};
+use super::program::Compiled;
+
+/// Makes a function of a module into steps; `info` is what the validator found out about it, or about
+/// a function whose expressions have the same types.
+pub(super) fn compiled(module: &Module, function: &Function, info: &FunctionInfo) -> Compiled {
+    let mut own = Frame {
+        module,
+        function,
+        info,
+        start: Vec::new(),
+        size: 0,
+        places: vec![None; function.expressions.len()],
+        steps: Vec::new(),
+    };
+    own.begin();
+    let body = own.block(&function.body);
+    let mut steps = own.steps;
+    steps.extend(body);
+    let result = function.result.as_ref();
+    Compiled {
+        name: function.name.clone().unwrap_or_else(|| "main".to_owned()),
+        start: own.start,
+        size: own.size,
+        result: result.map_or(0, |result| cells_of(module, result.ty)),
+        steps,
+    }
+}
+
+/// A function while it is made into steps.
+struct Frame<'a> {
+    module: &'a Module,
+    function: &'a Function,
+    info: &'a FunctionInfo,
+    start: Vec<u64>,
+    size: usize,
+    /// The place of each expression, once it has been evaluated.
+    places: Vec<Option<Place>>,
+    steps: Vec<Step>,
+}
+
+impl Frame<'_> {
+    fn ty(&self, at: Handle<Expression>) -> &TypeInner {
+        self.info[at].ty.inner_with(&self.module.types)
+    }
+
+    fn cells(&self, at: Handle<Expression>) -> usize {
+        cells(self.module, self.ty(at))
+    }
+
+    fn scalar(&self, at: Handle<Expression>) -> Scalar {
+        let ty = self.ty(at);
+        ty.scalar()
+            .unwrap_or_else(|| panic!("{ty:?} is no scalar or vector"))
+    }
+
+    fn place(&self, at: Handle<Expression>) -> Place {
+        let place = self.places[at.index()];
+        place.unwrap_or_else(|| panic!("used first: {:?}", self.function.expressions[at]))
+    }
+
+    /// A place for each of the cells of an expression.
+    fn each(&self, at: Handle<Expression>) -> impl Iterator<Item = Place> + use<> {
+        let first = self.place(at);
+        first..first + self.cells(at)
+    }
+
+    fn operand(&self, at: Handle<Expression>) -> Operand {
+        let step = usize::from(self.cells(at) > 1);
+        Operand {
+            place: self.place(at),
+            step,
+        }
+    }
+
+    /// Arguments, and whatever has a value before the first statement.
+    fn begin(&mut self) {
+        let (module, function) = (self.module, self.function);
+        let mut arguments = Vec::new();
+        for argument in &function.arguments {
+            arguments.push(self.start.len());
+            let count = cells_of(module, argument.ty);
+            self.start.resize(self.start.len() + count, 0);
+        }
+        let mut variables = Vec::new();
+        for (_, variable) in function.local_variables.iter() {
+            variables.push(self.start.len());
+            match variable.init {
+                Some(value) => self
+                    .start
+                    .extend(constant(module, &function.expressions, value)),
+                None => {
+                    let count = cells_of(module, variable.ty);
+                    self.start.resize(self.start.len() + count, 0);
+                }
+            }
+        }
+        for (at, expression) in function.expressions.iter() {
+            let mut place = self.start.len();
+            match *expression {
+                Expression::Literal(_) | Expression::Constant(_) | Expression::ZeroValue(_) => {
+                    self.start
+                        .extend(constant(module, &function.expressions, at));
+                }
+                Expression::GlobalVariable(global) => {
+                    self.start.push(pointer_to_global(global.index()));
+                }
+                Expression::LocalVariable(variable) => {
+                    self.start.push(0);
+                    let variable = variables[variable.index()];
+                    self.steps.push(Step::Local {
+                        place: variable,
+                        to: place,
+                    });
+                }
+                Expression::FunctionArgument(index) => place = arguments[index as usize],
+                _ => continue,
+            }
+            self.places[at.index()] = Some(place);
+        }
+        self.size = self.start.len();
+    }
+
+    fn block(&mut self, block: &Block) -> Vec<Step> {
+        let outer = std::mem::take(&mut self.steps);
+        for statement in block {
+            self.statement(statement);
+        }
+        std::mem::replace(&mut self.steps, outer)
+    }
+
+    fn statement(&mut self, statement: &Statement) {
+        let step = match *statement {
+            Statement::Emit(ref range) => {
+                for at in range.clone() {
+                    self.expression(at);
+                }
+                return;
+            }
+            Statement::Block(ref inner) => {
+                let steps = self.block(inner);
+                self.steps.extend(steps);
+                return;
+            }
+            Statement::If {
+                condition,
+                ref accept,
+                ref reject,
+            } => Step::If {
+                condition: self.place(condition),
+                accept: self.block(accept),
+                reject: self.block(reject),
+            },
+            Statement::Loop {
+                ref body,
+                ref continuing,
+                break_if: None,
+            } => Step::Loop {
+                body: self.block(body),
+                continuing: self.block(continuing),
+            },
+            Statement::Break => Step::Break,
+            Statement::Return { value } => Step::Return {
+                from: value.map_or(0, |value| self.place(value)),
+            },
+            Statement::Store { pointer, value } => Step::Store {
+                pointer: self.place(pointer),
+                from: self.place(value),
+                count: self.cells(value),
+            },
+            Statement::Call {
+                function,
+                ref arguments,
+                result,
+            } => {
+                let arguments = arguments.iter().flat_map(|&own| self.each(own)).collect();
+                let (to, count) = match result {
+                    Some(result) => (self.new_place(result), self.cells(result)),
+                    None => (0, 0),
+                };
+                Step::Call {
+                    function: function.index(),
+                    arguments,
+                    to,
+                    count,
+                }
+            }
+            ref other => panic!("{other:?} has no evaluation"),
+        };
+        self.steps.push(step);
+    }
+
+    fn new_place(&mut self, at: Handle<Expression>) -> Place {
+        let place = self.size;
+        self.places[at.index()] = Some(place);
+        self.size += self.cells(at);
+        place
+    }
+
+    fn expression(&mut self, at: Handle<Expression>) {
+        let function = self.function;
+        let expression = &function.expressions[at];
+        let count = self.cells(at);
+        // A fixed part of a value lies within it.
+        if let Expression::AccessIndex { base, index } = *expression
+            && self.ty(base).pointer_space().is_none()
+        {
+            let (offset, ..) = element(self.module, self.ty(base), index as usize);
+            self.places[at.index()] = Some(self.place(base) + offset);
+            return;
+        }
+        let to = self.new_place(at);
+        let step = match *expression {
+            Expression::Compose { ref components, .. } => Step::Compose {
+                from: components
+                    .iter()
+                    .flat_map(|&part| self.each(part))
+                    .collect(),
+                to,
+            },
+            Expression::Splat { value, .. } => Step::Compose {
+                from: vec![self.place(value); count],
+                to,
+            },
+            Expression::Swizzle {
+                vector, pattern, ..
+            } => {
+                let first = self.place(vector);
+                let from = pattern[..count].iter().map(|&own| first + own as usize);
+                Step::Compose {
+                    from: from.collect(),
+                    to,
+                }
+            }
+            Expression::AccessIndex { base, index } => {
+                let (by, ..) = element(self.module, self.pointee(base), index as usize);
+                Step::Advance {
+                    base: self.place(base),
+                    by,
+                    to,
+                }
+            }
+            Expression::Access { base, index } => {
+                let is_value = self.ty(base).pointer_space().is_none();
+                let ty = if is_value {
+                    self.ty(base)
+                } else {
+                    self.pointee(base)
+                };
+                let (_, count, of) = element(self.module, ty, 0);
+                let (base, index) = (self.place(base), self.place(index));
+                match is_value {
+                    true => Step::Element {
+                        base,
+                        index,
+                        of,
+                        to,
+                        count,
+                    },
+                    false => Step::Point {
+                        base,
+                        index,
+                        of,
+                        to,
+                        count,
+                    },
+                }
+            }
+            Expression::Load { pointer } => Step::Load {
+                pointer: self.place(pointer),
+                to,
+                count,
+            },
+            Expression::ImageLoad {
+                image,
+                coordinate,
+                array_index: None,
+                sample: None,
+                ..
+            } => Step::Texel {
+                buffer: self.place(image),
+                index: self.place(coordinate),
+                to,
+            },
+            Expression::Unary { op, expr } => {
+                let work = unary(op, self.scalar(expr));
+                Step::Unary {
+                    work,
+                    from: self.place(expr),
+                    to,
+                    count,
+                }
+            }
+            Expression::Binary { op, left, right } => {
+                let work = binary(op, self.scalar(left));
+                Step::Binary {
+                    work,
+                    operands: [self.operand(left), self.operand(right)],
+                    to,
+                    count,
+                }
+            }
+            Expression::Select {
+                condition,
+                accept,
+                reject,
+            } => Step::Select {
+                condition: self.operand(condition),
+                accept: self.place(accept),
+                reject: self.place(reject),
+                to,
+                count,
+            },
+            Expression::As { expr, convert, .. } => {
+                let from = self.place(expr);
+                let work = convert.and_then(|_| conversion(self.scalar(expr), self.scalar(at)));
+                match work {
+                    Some(work) => Step::Unary {
+                        work,
+                        from,
+                        to,
+                        count,
+                    },
+                    None => Step::Compose {
+                        from: (from..from + count).collect(),
+                        to,
+                    },
+                }
+            }
+            Expression::ArrayLength(pointer) => {
+                let (_, stride, _) = element(self.module, self.pointee(pointer), 0);
+                Step::ArrayLength {
+                    pointer: self.place(pointer),
+                    to,
+                    stride,
+                }
+            }
+            ref other => panic!("{other:?} has no evaluation"),
+        };
+        self.steps.push(step);
+    }
+
+    /// What a pointer points to.
+    fn pointee(&self, pointer: Handle<Expression>) -> &TypeInner {
+        match *self.ty(pointer) {
+            TypeInner::Pointer { base, .. } => &self.module.types[base].inner,
+            ref vector => vector,
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Every function of the shaders against its twin, without a device: the functions are evaluated as
+//! naga reads them from the text that the build compiles, an operation at a time, and every bit of
+//! every result has to be the twin's. `tests/bit_identity.rs` compares whole results on devices; here
+//! a function that differs is named, with the arguments that show it.
+//!
+//! The twins are private to the engine, so this is a test of the library: `src/twin/mod.rs` includes
+//! it.
+
+mod cells;
+mod frame;
+mod functions;
+mod kernels;
+mod layout;
+mod machine;
+mod operations;
+mod poses;
+mod program;
+mod random;
+mod stores;
+mod trial;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+
+use naga::{BinaryOperator, Expression, Literal, Module};
+
+use program::Checked;
+use trial::Twin;
+
+/// Samples of each function.
+const SAMPLES: usize = 200_000;
+
+fn twins() -> Vec<Twin> {
+    let mut all = functions::math();
+    all.extend(functions::forms());
+    all.extend(functions::from_keys());
+    all.extend(functions::conversions());
+    all.extend(stores::stores());
+    all.extend(stores::readers());
+    all.extend(stores::keys());
+    all.extend(kernels::evaluation());
+    all.extend(poses::poses());
+    all.push(poses::self_test());
+    all
+}
+
+/// Functions without a twin of their own, and why.
+const WITHOUT: [(&str, &str); 3] = [
+    (
+        "invocation_index",
+        "tells invocations apart; `main` calls it",
+    ),
+    (
+        "hoisted",
+        "gathers the arguments of `rotation_between`; `main` calls it",
+    ),
+    (
+        "rotation_between",
+        "one step of a block of lanes; `main` calls it",
+    ),
+];
+
+/// The text of a kernel as the build compiled it.
+fn source(kernel: &str) -> String {
+    let path = format!("{}/{kernel}.wgsl", env!("OUT_DIR"));
+    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// The kernels of the table, each read once.
+fn kernels(twins: &[Twin]) -> BTreeMap<&'static str, Checked> {
+    let names: BTreeSet<&str> = twins.iter().map(|twin| twin.kernel).collect();
+    names
+        .into_iter()
+        .map(|name| (name, Checked::parse(&source(name))))
+        .collect()
+}
+
+#[test]
+fn every_shader_function_has_the_bits_of_its_twin() {
+    let twins = twins();
+    let programs: BTreeMap<_, _> = (kernels(&twins).iter())
+        .map(|(&name, checked)| (name, checked.program()))
+        .collect();
+    for twin in &twins {
+        if let Err(why) = twin.compare(&programs[twin.kernel], SAMPLES) {
+            panic!("{why}");
+        }
+    }
+}
+
+/// Every function of every kernel, as it is named and as it is written. Kernels share most.
+fn functions_of_kernels() -> BTreeMap<(String, String), &'static str> {
+    let mut all = BTreeMap::new();
+    for (kernel, _) in crate::shader::kernels() {
+        let text = source(kernel);
+        let module = naga::front::wgsl::parse_str(&text).expect("the build parses it too");
+        for (handle, function) in module.functions.iter() {
+            let name = function.name.clone().expect("functions in WGSL have names");
+            let own = module
+                .functions
+                .get_span(handle)
+                .to_range()
+                .expect("parsed from text");
+            all.insert((name, text[own].to_owned()), kernel);
+        }
+        let (_, entry) = text.split_once("\nfn main").expect("an entry point");
+        let (entry, _) = entry.split_once("\n}").expect("it ends");
+        all.insert(("main".to_owned(), entry.to_owned()), kernel);
+    }
+    all
+}
+
+#[test]
+fn every_shader_function_is_compared() {
+    let twins = twins();
+    let functions = functions_of_kernels();
+    for (listed, _) in WITHOUT {
+        let is_function = functions.keys().any(|(name, _)| name == listed);
+        assert!(is_function, "no kernel has a function {listed}");
+    }
+    for ((name, text), kernel) in functions {
+        let is_compared = twins
+            .iter()
+            .any(|twin| twin.function == name && source(twin.kernel).contains(&text));
+        let is_listed = WITHOUT.iter().any(|(listed, _)| *listed == name);
+        assert!(
+            is_compared || is_listed,
+            "{name} of {kernel} has no twin in the table"
+        );
+        assert!(
+            !(is_compared && is_listed),
+            "{name} of {kernel} is compared and listed"
+        );
+    }
+}
+
+/// What a mistake is likely to be: a sum for a difference or for a product, a difference for a sum,
+/// a constant that is a thousandth too large.
+fn mistake(module: &Module, expression: &Expression) -> Option<Expression> {
+    use BinaryOperator::{Add, Multiply, Subtract};
+    match *expression {
+        Expression::Binary { op, left, right } => {
+            let op = match op {
+                Add => Subtract,
+                Subtract | Multiply => Add,
+                _ => return None,
+            };
+            Some(Expression::Binary { op, left, right })
+        }
+        Expression::Literal(Literal::F32(value)) if value != 0.0 => {
+            Some(Expression::Literal(Literal::F32(value * 1.001)))
+        }
+        Expression::Constant(named) => {
+            let init = module.constants[named].init;
+            mistake(module, &module.global_expressions[init])
+        }
+        _ => None,
+    }
+}
+
+/// Constants, and a part of their lines, of which a thousandth does not count, and why.
+const COARSE: [(&str, &str, &str); 4] = [
+    (
+        "HALF_PI_LOW",
+        "HALF_PI - flat",
+        "less than a rounding of the sum",
+    ),
+    ("PI_LOW", "PI - acute", "less than a rounding of the sum"),
+    ("1.0", "large == 0.0", "the divisor of 0"),
+    (
+        "LONGEST_STEP",
+        "norm_squared(chord)",
+        "SMALL_SQUARED_EXTENT is reached first",
+    ),
+];
+
+/// Nothing in any function is beyond the samples' reach: a mistake anywhere is found.
+#[test]
+fn a_mistake_anywhere_is_found() {
+    let twins = twins();
+    let kernels = kernels(&twins);
+    // Where there is one to be found, and whether it was. The entry point of all kernels that read
+    // keys is the same, and has arguments that only one of them uses.
+    let mut mistakes = BTreeMap::new();
+    for twin in &twins {
+        let checked = &kernels[twin.kernel];
+        let (mut program, text) = (checked.program(), source(twin.kernel));
+        let index = twin.index(&program);
+        let (function, info) = checked.functions()[index];
+        for (at, expression) in function.expressions.iter() {
+            let Some(wrong) = mistake(&checked.module, expression) else {
+                continue;
+            };
+            let mut changed = function.clone();
+            *changed.expressions.get_mut(at) = wrong;
+            program.functions[index] = checked.compiled(&changed, info);
+            let span = function.expressions.get_span(at);
+            let line = span.location(&text).line_number as usize;
+            let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
+            let own = span.to_range().map_or("", |own| &text[own]).to_owned();
+            *mistakes.entry((line, own)).or_insert(false) |=
+                twin.compare(&program, SAMPLES / 10).is_err();
+        }
+    }
+    assert!(mistakes.len() > 850, "only {} were tried", mistakes.len());
+    for ((line, own), is_found) in mistakes {
+        let is_coarse = COARSE
+            .iter()
+            .any(|(constant, part, _)| own == *constant && line.contains(part));
+        assert!(
+            is_found != is_coarse,
+            "`{own}` in `{line}`: found is {is_found}"
+        );
+    }
+}

@@ -1,0 +1,101 @@
+//! The operations on scalars that shaders use, each of one IEEE 754 operation or of integers. What is
+//! not here is refused by name.
+
+use naga::{BinaryOperator, Scalar, UnaryOperator};
+
+use super::cells::{as_f32, of_f32};
+
+/// Where the cells of a value lie in the frame of its function.
+pub(super) type Place = usize;
+
+/// An operand of an operation on several cells; `step` is 0 where all of them use the same one.
+#[derive(Clone, Copy)]
+pub(super) struct Operand {
+    pub(super) place: Place,
+    pub(super) step: usize,
+}
+
+pub(super) type Unary = fn(u64) -> u64;
+
+/// An operation on two scalars, done for so many cells of a frame: one call for all of them.
+pub(super) trait Binary {
+    fn run(&self, frame: &mut [u64], operands: [Operand; 2], to: Place, count: usize);
+}
+
+impl<F: Fn(u64, u64) -> u64> Binary for F {
+    fn run(&self, frame: &mut [u64], [a, b]: [Operand; 2], to: Place, count: usize) {
+        for i in 0..count {
+            frame[to + i] = self(frame[a.place + a.step * i], frame[b.place + b.step * i]);
+        }
+    }
+}
+
+fn word(value: u32) -> u64 {
+    value.into()
+}
+
+pub(super) fn unary(operator: UnaryOperator, of: Scalar) -> Unary {
+    match (operator, of) {
+        (UnaryOperator::Negate, Scalar::F32) => |a| of_f32(-as_f32(a)),
+        (UnaryOperator::BitwiseNot, Scalar::U32) => |a| word(!(a as u32)),
+        (UnaryOperator::LogicalNot, Scalar::BOOL) => |a| 1 - a,
+        _ => panic!("{operator:?} of {of:?} has no evaluation"),
+    }
+}
+
+/// Integers have no bits above their width, and a bool is 0 or 1.
+pub(super) fn binary(operator: BinaryOperator, of: Scalar) -> &'static dyn Binary {
+    use BinaryOperator as Operator;
+    /// A closure of two cells, or of what they hold.
+    macro_rules! on {
+        ($a:ident $b:ident => $result:expr) => {
+            &|$a: u64, $b: u64| $result
+        };
+        (f32 $a:ident $b:ident => $result:expr) => {
+            &|a: u64, b: u64| {
+                let ($a, $b) = (as_f32(a), as_f32(b));
+                $result
+            }
+        };
+    }
+    match (operator, of) {
+        (Operator::Add, Scalar::F32) => on!(f32 a b => of_f32(a + b)),
+        (Operator::Subtract, Scalar::F32) => on!(f32 a b => of_f32(a - b)),
+        (Operator::Multiply, Scalar::F32) => on!(f32 a b => of_f32(a * b)),
+        (Operator::Equal, Scalar::F32) => on!(f32 a b => (a == b).into()),
+        (Operator::NotEqual, Scalar::F32) => on!(f32 a b => (a != b).into()),
+        (Operator::Less, Scalar::F32) => on!(f32 a b => (a < b).into()),
+        (Operator::LessEqual, Scalar::F32) => on!(f32 a b => (a <= b).into()),
+        (Operator::Greater, Scalar::F32) => on!(f32 a b => (a > b).into()),
+        // Two's complement adds and subtracts signed and unsigned numbers alike.
+        (Operator::Add, Scalar::U32 | Scalar::I32) => {
+            on!(a b => word((a as u32).wrapping_add(b as u32)))
+        }
+        (Operator::Subtract, Scalar::U32 | Scalar::I32) => {
+            on!(a b => word((a as u32).wrapping_sub(b as u32)))
+        }
+        (Operator::Multiply, Scalar::U32) => on!(a b => word((a as u32).wrapping_mul(b as u32))),
+        // The only divisors are constants.
+        (Operator::Divide, Scalar::U32) => on!(a b => a / b),
+        (Operator::Equal, Scalar::U32) => on!(a b => (a == b).into()),
+        (Operator::NotEqual, Scalar::U32) => on!(a b => (a != b).into()),
+        (Operator::Less, Scalar::U32) => on!(a b => (a < b).into()),
+        (Operator::GreaterEqual, Scalar::U32) => on!(a b => (a >= b).into()),
+        (Operator::And, Scalar::U32 | Scalar::I32 | Scalar::BOOL) => on!(a b => a & b),
+        (Operator::InclusiveOr, Scalar::U32 | Scalar::U64) => on!(a b => a | b),
+        (Operator::ExclusiveOr, Scalar::U32) => on!(a b => a ^ b),
+        (Operator::ShiftLeft, Scalar::U32) => on!(a b => word((a as u32) << (b & 31))),
+        (Operator::ShiftLeft, Scalar::U64) => on!(a b => a << (b & 63)),
+        (Operator::ShiftRight, Scalar::U32) => on!(a b => a >> (b & 31)),
+        _ => panic!("{operator:?} of {of:?} has no evaluation"),
+    }
+}
+
+/// A conversion; `None` where the cell stays as it is.
+pub(super) fn conversion(from: Scalar, to: Scalar) -> Option<Unary> {
+    match (from, to) {
+        (Scalar::I32, Scalar::F32) => Some(|a| of_f32(a as u32 as i32 as f32)),
+        (Scalar::U32, Scalar::I32 | Scalar::U64) | (Scalar::I32, Scalar::U32) => None,
+        _ => panic!("a conversion from {from:?} to {to:?} has no evaluation"),
+    }
+}

@@ -1,0 +1,227 @@
+//! Random inputs, always the same ones: ordinary values, and hostile ones among them.
+
+use fastrand::Rng;
+use glam::Vec4;
+
+use crate::math::canonical::canonical;
+use crate::shader::{
+    FLUSHED_BITS, GIMBAL, KEY_AT_END, KEY_INNER, KEY_UNKNOWN, LEAST_NORMAL, LONGEST_STEP,
+    LONGEST_TANGENT_PART, PI, TINY_BITS, TangentWeights,
+};
+
+/// An angle in R⁴ between two keys, well within what the small-angle series takes.
+const ORDINARY_STEP: f32 = 0.02;
+
+pub(super) struct Random(Rng);
+
+impl Random {
+    pub(super) fn new() -> Self {
+        Self(Rng::with_seed(1))
+    }
+
+    /// True once in `times`.
+    pub(super) fn once_in(&mut self, times: u32) -> bool {
+        self.0.u32(..times) == 0
+    }
+
+    pub(super) fn below(&mut self, end: u32) -> u32 {
+        self.0.u32(..end)
+    }
+
+    pub(super) fn word(&mut self) -> u32 {
+        self.0.u32(..)
+    }
+
+    fn signed(&mut self, magnitude: f32) -> f32 {
+        if self.0.bool() { -magnitude } else { magnitude }
+    }
+
+    fn uniform(&mut self) -> f32 {
+        2.0 * self.0.f32() - 1.0
+    }
+
+    /// Of a magnitude between two powers of 2, each as often as the others.
+    fn scaled(&mut self, powers: std::ops::Range<i32>) -> f32 {
+        let magnitude = (1.0 + self.0.f64()) * 2.0f64.powi(self.0.i32(powers));
+        self.signed(magnitude as f32)
+    }
+
+    /// A number at which a shader branches, or the one before or after it.
+    fn border(&mut self) -> f32 {
+        let borders = [
+            0.0,
+            f32::from_bits(TINY_BITS),
+            f32::from_bits(FLUSHED_BITS),
+            f32::from_bits(LEAST_NORMAL),
+            GIMBAL,
+            0.5,
+            1.0,
+            PI,
+            f32::MIN_POSITIVE,
+        ];
+        let border = borders[self.0.usize(..borders.len())];
+        let near = [border.next_down(), border, border.next_up()];
+        let near = near[self.0.usize(..3)];
+        self.signed(near)
+    }
+
+    /// From -1 to 1, or hostile: near a border, tiny or subnormal.
+    pub(super) fn number(&mut self) -> f32 {
+        match self.0.u32(..10) {
+            0 => self.border(),
+            1 => self.scaled(-149..-20),
+            2 => self.scaled(-20..0),
+            _ => self.uniform(),
+        }
+    }
+
+    /// As [`Random::number`], or of any magnitude whatsoever, but finite.
+    pub(super) fn finite(&mut self) -> f32 {
+        match self.once_in(4) {
+            true => self.scaled(-149..127),
+            false => self.number(),
+        }
+    }
+
+    pub(super) fn positive(&mut self) -> f32 {
+        self.finite().abs()
+    }
+
+    /// A vector of ordinary length; rarely a hostile or a huge one.
+    pub(super) fn vector<const N: usize>(&mut self) -> [f32; N] {
+        match self.0.u32(..12) {
+            0 => std::array::from_fn(|_| self.finite()),
+            1 => std::array::from_fn(|_| self.number()),
+            2 => {
+                let scale = self.scaled(-70..20).abs();
+                std::array::from_fn(|_| scale * self.uniform())
+            }
+            _ => std::array::from_fn(|_| self.uniform()),
+        }
+    }
+
+    /// A unit quaternion; some have components that are 0 or tiny.
+    pub(super) fn unit(&mut self) -> [f32; 4] {
+        loop {
+            let raw: [f64; 4] = std::array::from_fn(|_| match self.0.u32(..8) {
+                0 => self.scaled(-70..-10).into(),
+                1 => 0.0,
+                _ => self.uniform().into(),
+            });
+            let length = raw.iter().map(|c| c * c).sum::<f64>().sqrt();
+            if length > 1e-25 {
+                return raw.map(|c| canonical((c / length) as f32));
+            }
+        }
+    }
+
+    /// A unit quaternion at an angle in R⁴ from another.
+    pub(super) fn near(&mut self, q: [f32; 4], angle: f32) -> [f32; 4] {
+        let (q, toward) = (Vec4::from(q).as_dvec4(), Vec4::from(self.unit()).as_dvec4());
+        let across = (toward - q * toward.dot(q)).normalize_or_zero();
+        let (sine, cosine) = f64::from(angle).sin_cos();
+        let moved = q * cosine + across * sine;
+        moved.to_array().map(|c| canonical(c as f32))
+    }
+
+    /// Two keys that are at most about pi/2 apart in R⁴, some equal and some hardly apart.
+    pub(super) fn pair(&mut self) -> [[f32; 4]; 2] {
+        let from = self.unit();
+        match self.0.u32(..8) {
+            0 => [from, from],
+            1 => [from, from.map(|c| -c)],
+            2 | 3 => {
+                let angle = self.scaled(-40..0).abs();
+                [from, self.near(from, angle)]
+            }
+            _ => {
+                let to = self.unit();
+                let dot: f32 = (0..4).map(|c| from[c] * to[c]).sum();
+                [from, if dot < 0.0 { to.map(|c| -c) } else { to }]
+            }
+        }
+    }
+
+    /// A rotation as it is stored: a unit quaternion, or one that is not quite.
+    pub(super) fn rotation(&mut self) -> [f32; 4] {
+        match self.0.u32(..8) {
+            0 => std::array::from_fn(|_| canonical(self.number())),
+            1 => {
+                let off = 1.0 + self.uniform() * 1e-6;
+                self.unit().map(|c| canonical(c * off))
+            }
+            2 => {
+                let identity = [0.0, 0.0, 0.0, self.signed(1.0)];
+                let angle = self.scaled(-60..0).abs();
+                self.near(identity, angle)
+            }
+            // Half of a gimbal lock: two of the components of one angle are small.
+            3 => {
+                let [x, _, z, w] = self.unit();
+                let off = self.scaled(-30..-20);
+                [x, w + off, z, w]
+            }
+            _ => self.unit(),
+        }
+    }
+
+    /// The parameter of a sample, from -1/2 to 1/2.
+    pub(super) fn parameter(&mut self) -> f32 {
+        match self.0.u32(..8) {
+            0 => self.signed(0.5),
+            1 => 0.0,
+            2 => self.scaled(-40..-2),
+            _ => 0.5 * self.uniform(),
+        }
+    }
+
+    /// An angle in R⁴ between two keys: mostly within the small-angle series, at one of its limits, or
+    /// beyond.
+    fn step(&mut self) -> f32 {
+        match self.0.u32(..12) {
+            0 => 0.0,
+            1 => self.scaled(-40..-6).abs(),
+            2 => LONGEST_STEP.sqrt() * (1.0 + 1e-3 * self.uniform()),
+            3 | 4 => 0.03 + 0.03 * self.0.f32(), // the extents on both sides of the limit
+            5 => 0.4 * self.0.f32(),
+            6 => ORDINARY_STEP * (1.0 + 1e-3 * self.uniform()),
+            _ => 0.03 * self.0.f32(),
+        }
+    }
+
+    /// Four keys around an interval.
+    pub(super) fn four_keys(&mut self) -> [[f32; 4]; 4] {
+        let mut key = self.unit();
+        let same = self.once_in(2).then(|| self.step());
+        [0; 4].map(|_| {
+            let own = key;
+            let step = same.unwrap_or_else(|| self.step());
+            key = self.near(key, step);
+            own
+        })
+    }
+
+    /// The weight of a step in a tangent; one in four makes an [`ORDINARY_STEP`] as long as the
+    /// small-angle series allows.
+    fn weight(&mut self) -> f32 {
+        let most = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
+        match self.0.u32(..4) {
+            0 => most * (1.0 + 1e-3 * self.uniform()),
+            1 => 2.0 * most * self.uniform(),
+            _ => self.uniform(),
+        }
+    }
+
+    pub(super) fn weights(&mut self) -> TangentWeights {
+        let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
+        // Steps between keys at even times count alike.
+        let even = self.once_in(4).then_some(0.5);
+        let most = if self.once_in(2) { 0.33 } else { 0.05 };
+        TangentWeights {
+            before: even.unwrap_or_else(|| self.weight()),
+            after: even.unwrap_or_else(|| self.weight()),
+            outgoing: most * self.0.f32(),
+            kind: kinds[self.0.usize(..kinds.len())],
+        }
+    }
+}

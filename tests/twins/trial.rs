@@ -1,0 +1,156 @@
+//! What is compared: a function of a kernel, inputs for it, and its twin.
+
+use super::cells::{Cells, as_f32};
+use super::machine::Machine;
+use super::program::Program;
+use super::random::Random;
+
+/// One call of a function: what goes in, and what its twin makes of it.
+#[derive(Default)]
+pub(super) struct Trial {
+    arguments: Vec<u64>,
+    buffers: Vec<(&'static str, Vec<u64>)>,
+    /// The buffer that holds the result; without it, the function returns the result.
+    output: Option<&'static str>,
+    expected: Vec<u64>,
+    samples: usize,
+}
+
+/// What cells of an output hold before the call. A twin expects it where nothing is stored.
+pub(super) const UNTOUCHED: u64 = u64::MAX;
+
+impl Trial {
+    pub(super) fn argument(&mut self, value: impl Cells) {
+        value.put(&mut self.arguments);
+    }
+
+    /// Fills a global variable: a buffer, or what comes with a dispatch.
+    pub(super) fn global(&mut self, name: &'static str, value: impl Cells) {
+        let place = self.buffers.iter().position(|(own, _)| *own == name);
+        let place = place.unwrap_or_else(|| {
+            self.buffers.push((name, Vec::new()));
+            self.buffers.len() - 1
+        });
+        let (_, cells) = &mut self.buffers[place];
+        cells.clear();
+        value.put(cells);
+    }
+
+    /// Takes the result from a buffer.
+    pub(super) fn output(&mut self, name: &'static str) {
+        self.output = Some(name);
+    }
+
+    /// Says that the call evaluates so many samples; without it, it is one.
+    pub(super) fn samples(&mut self, count: u32) {
+        self.samples = count as usize;
+    }
+
+    pub(super) fn expect(&mut self, value: impl Cells) {
+        value.put(&mut self.expected);
+    }
+}
+
+/// Makes up one call.
+type Fill = dyn Fn(&mut Random, &mut Trial);
+
+/// A function of a kernel beside its twin.
+pub(super) struct Twin {
+    pub(super) kernel: &'static str,
+    pub(super) function: &'static str,
+    trial: Box<Fill>,
+}
+
+/// A function that takes all that it needs as arguments, and the one in Rust.
+pub(super) fn twin<A: Cells, R: Cells>(
+    kernel: &'static str,
+    function: &'static str,
+    arguments: impl Fn(&mut Random) -> A + 'static,
+    twin: impl Fn(A) -> R + 'static,
+) -> Twin {
+    with_globals(kernel, function, move |random, trial| {
+        let arguments = arguments(random);
+        arguments.put(&mut trial.arguments);
+        trial.expect(twin(arguments));
+    })
+}
+
+/// A function that reads or writes global variables: `trial` fills them and says what it expects.
+pub(super) fn with_globals(
+    kernel: &'static str,
+    function: &'static str,
+    trial: impl Fn(&mut Random, &mut Trial) + 'static,
+) -> Twin {
+    Twin {
+        kernel,
+        function,
+        trial: Box::new(trial),
+    }
+}
+
+impl Twin {
+    pub(super) fn index(&self, program: &Program) -> usize {
+        let mut all = program.functions.iter();
+        let index = all.position(|own| own.name == self.function);
+        index.unwrap_or_else(|| panic!("{} has no function {}", self.kernel, self.function))
+    }
+
+    /// Compares every bit of so many samples; else the first sample that differs.
+    pub(super) fn compare(&self, program: &Program, samples: usize) -> Result<(), String> {
+        let function = self.index(program);
+        let (mut random, mut trial) = (Random::new(), Trial::default());
+        let mut machine = Machine::new(program);
+        let mut sample = 0;
+        while sample < samples {
+            trial.arguments.clear();
+            trial.samples = 1;
+            trial.expected.clear();
+            (self.trial)(&mut random, &mut trial);
+            let global = |name: &str| {
+                let place = program.globals.iter().position(|own| own == name);
+                place.unwrap_or_else(|| panic!("{} has no global {name}", self.kernel))
+            };
+            for (name, cells) in &trial.buffers {
+                machine.globals[global(name)].clone_from(cells);
+            }
+            let count = trial.expected.len();
+            if let Some(name) = trial.output {
+                let output = &mut machine.globals[global(name)];
+                output.clear();
+                output.resize(count, UNTOUCHED);
+            }
+            let Some(returned) = machine.call(function, &trial.arguments) else {
+                let Self {
+                    kernel, function, ..
+                } = self;
+                return Err(format!(
+                    "{function} of {kernel} reads or writes outside a buffer"
+                ));
+            };
+            let found = match trial.output {
+                Some(name) => &machine.globals[global(name)],
+                None => returned,
+            };
+            assert_eq!(found.len(), count, "{}", self.function);
+            if *found != trial.expected {
+                let place = (0..count)
+                    .find(|&i| found[i] != trial.expected[i])
+                    .unwrap_or(0);
+                let [found, expected] = [found, &trial.expected].map(|all| all[place]);
+                return Err(format!(
+                    "{} of {}, sample {sample}, cell {place} of {count}: \
+                     {found:#x} ({:e}), but the twin has {expected:#x} ({:e})\n\
+                     arguments: {:x?}\nglobals: {:x?}",
+                    self.function,
+                    self.kernel,
+                    as_f32(found),
+                    as_f32(expected),
+                    trial.arguments,
+                    trial.buffers,
+                ));
+            }
+            sample += trial.samples;
+        }
+        Ok(())
+    }
+}
