@@ -15,7 +15,7 @@ use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, method};
 use crate::arguments::time::{Samples, Sampling};
-use crate::arguments::what::{PoseKind, What};
+use crate::arguments::what::{PoseKind, What, quaternions};
 use crate::batch::output::{Plan, Target, Wish};
 use crate::batch::place::Written;
 use crate::batch::run::{Batch, Evaluated};
@@ -73,8 +73,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "xyzw")]
     order: OrderArgument,
     /// What a component of NPY results is stored as
-    #[arg(long, value_enum, default_value = "f32")]
-    encoding: EncodingArgument,
+    #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
+    encoding: Encoding,
     #[command(flatten)]
     what: What,
     /// Also say which way each input takes to its rotations; all ways give the same bits
@@ -97,26 +97,6 @@ enum LayoutArgument {
 enum OrderArgument {
     Xyzw,
     Wxyz,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum EncodingArgument {
-    /// float32
-    F32,
-    /// float16: half the size, within 2.5e-4 of each component
-    F16,
-    /// int16, to be divided by 32767: half the size, within 1.6e-5
-    Snorm16,
-}
-
-impl From<EncodingArgument> for Encoding {
-    fn from(encoding: EncodingArgument) -> Self {
-        match encoding {
-            EncodingArgument::F32 => Self::F32,
-            EncodingArgument::F16 => Self::F16,
-            EncodingArgument::Snorm16 => Self::Snorm16,
-        }
-    }
 }
 
 impl From<OrderArgument> for ComponentOrder {
@@ -142,14 +122,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let Plan { targets, manifest } = output::plan(&inputs, wish)?;
     let is_text = |target: &Target| target.results().is_text;
-    let short = arguments.encoding != EncodingArgument::F32;
+    let short = arguments.encoding != Encoding::F32;
     if short && targets.iter().any(is_text) {
         return Err(Failure::usage(
             "--encoding is for binary results (NPY); text holds every digit",
         ));
     }
-    let encoding = arguments.what.encoding(arguments.encoding.into());
-    if short && encoding != arguments.encoding.into() {
+    let encoding = arguments.what.encoding(arguments.encoding);
+    if short && encoding != arguments.encoding {
         return Err(Failure::usage("--encoding is for quaternions"));
     }
     let mut device = arguments.device.open()?;
@@ -214,7 +194,7 @@ impl Arguments {
             &name,
             set.track_count(),
             timeline.len(),
-            self.what.encoding(self.encoding.into()),
+            self.what.encoding(self.encoding),
         )?;
         let wished = match self.layout {
             LayoutArgument::Track => Layout::TrackMajor,
@@ -227,7 +207,7 @@ impl Arguments {
             timeline: &timeline,
             layout,
             order: self.order.into(),
-            encoding: self.what.encoding(self.encoding.into()),
+            encoding: self.what.encoding(self.encoding),
         };
         if let Some(kind) = self.what.poses() {
             return self.poses(device, &result, loaded.box_length, &frames, kind, target);
