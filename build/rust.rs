@@ -9,7 +9,7 @@ use naga::{
     VectorSize,
 };
 
-use crate::table::{FORMS, LISTS, STORES};
+use crate::table::{FORMS, LISTS, stores};
 
 /// Everything that the kernels declare, once each. Two declarations of one name that differ are a
 /// build error.
@@ -226,7 +226,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
         ),
         (
             "What a kernel stores a rotation as.",
-            ("Store", STORES.map(|store| store.0).to_vec()),
+            ("Store", stores().iter().map(|store| store.0).collect()),
         ),
     ] {
         let (name, variants) = names;
@@ -248,7 +248,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
     .unwrap();
     for (form, _) in FORMS {
         for (list, _, _) in LISTS {
-            for (store, _) in STORES {
+            for (store, _) in stores() {
                 writeln!(
                     text,
                     "            (Form::{}, List::{}, Store::{}) => Self::{},",

@@ -1,8 +1,10 @@
 //! The table of kernels: which files of `shaders/` each is joined from, and what it reads.
 //!
-//! To add a kernel, write its file and name it in [`kernels`]. The rest of the build walks the
-//! table: it writes the bindings and the functions that read them, compiles each kernel, and
-//! gives Rust an enum of them, their layouts and their constants.
+//! To add a kernel, write its file and name it in [`kernels`]; a store needs no more than its file.
+//! The rest of the build walks the table: it writes the bindings and the functions that read them,
+//! compiles each kernel, and gives Rust an enum of them, their layouts and their constants.
+
+use std::fs;
 
 /// A buffer that a kernel reads, and the WGSL function that reads one element of it.
 pub(crate) struct Read {
@@ -63,17 +65,28 @@ pub(crate) const LISTS: [(&str, &[&str], &[Read]); 3] = [
     ),
 ];
 
-/// What a rotation is stored as: a file of `shaders/stores` each, with what it needs.
-pub(crate) const STORES: [(&str, &[&str]); 8] = [
-    ("f32", &[]),
-    ("f16", &[]),
-    ("snorm16", &[]),
-    ("axis_angle", &["math/arc_tangent"]),
-    ("matrix3x3", &["stores/matrix"]),
-    ("matrix3x4", &["stores/matrix"]),
-    ("euler", &["math/arc_tangent"]),
-    ("vector", &[]),
-];
+/// What a rotation is stored as: the name of each file of `shaders/stores` that has a function
+/// `store`, and the file that its line `// Needs: FILE.` names.
+pub(crate) fn stores() -> Vec<(&'static str, Option<&'static str>)> {
+    let mut stores = Vec::new();
+    for entry in fs::read_dir("shaders/stores").expect("the stores lie there") {
+        let path = entry.expect("a file").path();
+        let text = fs::read_to_string(&path).expect("WGSL").leak();
+        let name = path
+            .file_stem()
+            .expect("a file's name")
+            .display()
+            .to_string();
+        let is_wide = WIDE_STORE.contains(&&*format!("stores/{name}"));
+        if text.contains("\nfn store(") && !is_wide {
+            let mut lines = text.lines();
+            let needed = lines.find_map(|line| line.strip_prefix("// Needs: "));
+            stores.push((&*name.leak(), needed.map(|file| file.trim_end_matches('.'))));
+        }
+    }
+    stores.sort_unstable();
+    stores
+}
 
 static CLIP: [Read; 2] = [
     read("segments", "Segment", "segment_at"),
@@ -130,10 +143,11 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
-            for (store, needed) in STORES {
+            for (store, needed) in stores() {
                 let mut files = vec!["math/canonical", "lists/dispatch"];
-                files.extend([formula, entry, needed].concat());
-                files.push(Box::leak(format!("stores/{store}").into_boxed_str()));
+                files.extend([formula, entry].concat());
+                files.extend(needed);
+                files.push(format!("stores/{store}").leak());
                 kernels.push(Kernel {
                     name: format!("{form}_{list}_{store}"),
                     files,
@@ -143,7 +157,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         }
     }
     for (name, needed, reads) in FROM_KEYS {
-        let own = Box::leak(format!("from_keys/{name}").into_boxed_str());
+        let own = format!("from_keys/{name}").leak();
         let mut files = vec!["math/canonical", "from_keys"];
         files.extend(needed);
         files.extend([&*own, "stores/f32"]);

@@ -113,7 +113,7 @@ impl Clip {
 
     pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {
         let of_rotations = self.uploaded.data.interpolation.quantity == Quantity::Rotation;
-        if encoding.needs_rotations() && !of_rotations {
+        if !encoding.row().takes_vectors && !of_rotations {
             return Err(Error::NotRotations { encoding });
         }
         Ok(())

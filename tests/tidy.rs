@@ -66,12 +66,10 @@ fn every_shader_function_has_its_twin() {
                 "dispatch",
                 "frame_distance",
                 "time_distance",
-                // Stores that move bits alone, and a matrix's columns.
+                // Stores that move bits alone.
                 "f32",
                 "f32_wide",
                 "wide",
-                "matrix3x3",
-                "matrix3x4",
                 "vector",
             ];
             assert!(glue.contains(&name), "{name}.wgsl names no twin");

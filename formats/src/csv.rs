@@ -119,8 +119,8 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         self.csv.write_field("time")?;
         for track in 0..set.track_count() {
             let name = set.track_name(track);
-            let mut components = self.encoding.components();
-            if self.is_quaternion() {
+            let mut components = self.encoding.components().to_vec();
+            if self.encoding.is_quaternion() {
                 components.rotate_right(1);
             }
             for component in components {
@@ -130,23 +130,15 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         self.csv.write_record(None::<&[u8]>)
     }
 
-    /// Those are written `w` first, as in `.dat` files, and never rounded.
-    fn is_quaternion(&self) -> bool {
-        matches!(
-            self.encoding,
-            Encoding::F32 | Encoding::F16 | Encoding::Snorm16
-        )
-    }
-
     fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
         self.csv.write_field(self.frame.to_string())?;
         let time = self.timeline.time(0, self.frame);
         self.csv.write_field(time.to_string())?;
         let mut bytes = vec![0; self.encoding.bytes()];
-        let is_quaternion = self.is_quaternion();
         for q in frame {
             let mut numbers = q.to_array().to_vec();
-            if is_quaternion {
+            if self.encoding.is_quaternion() {
+                // `w` first, as in `.dat` files, and never rounded.
                 numbers.rotate_right(1);
             } else {
                 self.encoding.encode(&[q.to_array()], &mut bytes);

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use glam::Quat;
 use npyz::WriterBuilder;
 
-use tumble::{Encoding, Layout};
+use tumble::{ComponentType, Encoding, Layout};
 
 use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
 
@@ -97,11 +97,10 @@ impl<W: Write> NpyWriter<W> {
             .collect();
         let mut header = Vec::new();
         // The values are written below, whole slices at a time.
-        match encoding {
-            Encoding::F32 => write_header::<f32>(&mut header, "<f4", &shape)?,
-            Encoding::F16 => write_header::<half::f16>(&mut header, "<f2", &shape)?,
-            Encoding::Snorm16 => write_header::<i16>(&mut header, "<i2", &shape)?,
-            _ => write_header::<f32>(&mut header, "<f4", &shape)?,
+        match encoding.component_type() {
+            ComponentType::F32 => write_header::<f32>(&mut header, "<f4", &shape)?,
+            ComponentType::F16 => write_header::<half::f16>(&mut header, "<f2", &shape)?,
+            ComponentType::Snorm16 => write_header::<i16>(&mut header, "<i2", &shape)?,
         }
         writer.write_all(&header)?;
         Ok(Self {
@@ -128,22 +127,20 @@ impl<W: Write> NpyWriter<W> {
         if self.order == ComponentOrder::Xyzw && self.encoding == Encoding::F32 && little {
             return self.writer.write_all(bytemuck::cast_slice(rotations));
         }
+        let w_first = self.order == ComponentOrder::Wxyz && self.encoding.is_quaternion();
         const BLOCK: usize = 4096;
         let mut ordered = Vec::with_capacity(BLOCK);
         let mut bytes = Vec::new();
         for block in rotations.chunks(BLOCK) {
             ordered.clear();
-            ordered.extend(block.iter().map(|q| match (self.order, self.encoding) {
-                (ComponentOrder::Wxyz, Encoding::F32 | Encoding::F16 | Encoding::Snorm16) => {
-                    [q.w, q.x, q.y, q.z]
-                }
-                _ => [q.x, q.y, q.z, q.w],
+            ordered.extend(block.iter().map(|q| match w_first {
+                true => [q.w, q.x, q.y, q.z],
+                false => q.to_array(),
             }));
             bytes.resize(block.len() * self.encoding.bytes(), 0);
             self.encoding.encode(&ordered, &mut bytes);
             if !little {
-                let numbers: usize = self.encoding.shape().iter().product();
-                let component = self.encoding.bytes() / numbers;
+                let component = self.encoding.component_type().bytes();
                 bytes.chunks_exact_mut(component).for_each(<[u8]>::reverse);
             }
             self.writer.write_all(&bytes)?;

@@ -1,6 +1,7 @@
 // Stores rotations as axis and angle: a unit vector, and degrees from 0 to 360. The axis of the
 // identity is x.
 // Twin: src/twin/axis_angle.rs.
+// Needs: math/arc_tangent.
 
 alias Stored = vec4f;
 

@@ -1,6 +1,7 @@
 // Stores rotations as three angles about axes, in degrees. Formula: Bernardes, Viollet 2022,
 // Quaternion to Euler angles conversion: a direct, general and computationally efficient method.
 // Twin: src/twin/euler.rs.
+// Needs: math/arc_tangent.
 
 alias Stored = f32;
 

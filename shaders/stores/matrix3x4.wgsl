@@ -1,4 +1,6 @@
 // Stores rotations as 3 × 4 matrices whose translation is 0, twelve numbers each.
+// Twin: src/twin/matrix.rs.
+// Needs: stores/matrix.
 
 fn store(place: u32, rotation: vec4f) {
     let detail = dispatch.detail;

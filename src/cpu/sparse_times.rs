@@ -10,7 +10,7 @@ use crate::shader::{ArcSegment, PolynomialSegment};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
 use crate::time::runs::{Distance, RunSource};
-use crate::twin::evaluate_arc::{on_arc, square};
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Samples that are evaluated together.
 const LANES: usize = 64;
@@ -99,7 +99,7 @@ impl Block {
             let middle = L::load_rotations(&self.middles[j..]);
             let tangent = L::load_rotations(&self.tangents[j..]);
             let parameter = L::load(&self.parameters[j..]);
-            let found = on_arc(middle, tangent, square(tangent), parameter);
+            let found = on_arc(middle, tangent, norm_squared(tangent), parameter);
             L::store_rotations(canonical(found), &mut rotations[j..j + L::COUNT]);
         }
         for (&place, rotation) in self.places[..self.count].iter().zip(rotations) {

@@ -13,7 +13,7 @@ use crate::shader::KeySample;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{self, Lanes, Number};
 use crate::twin::arc_between::arc_between;
-use crate::twin::evaluate_arc::{on_arc, square};
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
 /// Samples that are evaluated together.
@@ -142,7 +142,7 @@ impl<L: Lanes> Arcs<L> {
 /// The rotation on an arc, times `sign`, which is 1 or -1.
 #[inline(always)]
 fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
-    let [x, y, z, w] = on_arc(middle, tangent, square(tangent), parameter);
+    let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
     // Keys of the other sign would only flip the sign of every intermediate result, so the sign
     // may come last.
     lanes::canonical([x * sign, y * sign, z * sign, w * sign])

@@ -171,7 +171,8 @@ impl VulkanEngine {
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let form = clip.interpolation.form();
-        let pipeline = self.pipeline(Kernel::over_segments(form, work.list, encoding.store()))?;
+        let pipeline =
+            self.pipeline(Kernel::over_segments(form, work.list, encoding.row().store))?;
         evaluation.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let mut first_item = 0;
         for own in work.groups {
@@ -193,7 +194,7 @@ impl VulkanEngine {
                 first_item,
                 item_count,
                 stride: window.stride() as u32,
-                detail: encoding.detail(),
+                detail: encoding.row().detail,
                 first_output: own.first_output,
             };
             let groups = self.workgroups(item_count);
@@ -214,12 +215,11 @@ impl VulkanEngine {
             }
             (Target::External(buffer), ..) => {
                 evaluation.submission.barrier(Access::Kernel, Access::Copy);
-                let mut bytes = [0; Encoding::MOST_BYTES];
-                let bytes = &mut bytes[..encoding.bytes()];
+                let mut bytes = vec![0; encoding.bytes()];
                 for (place, value) in patches.drain(..) {
-                    encoding.encode(&[value], bytes);
+                    encoding.encode(&[value], &mut bytes);
                     let offset = start + place as u64 * rotation;
-                    evaluation.submission.update(buffer.raw, offset, bytes);
+                    evaluation.submission.update(buffer.raw, offset, &bytes);
                 }
                 evaluation.submission.barrier(Access::Kernel, Access::Any);
                 evaluation.submission.barrier(Access::Copy, Access::Any);

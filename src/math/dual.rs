@@ -4,13 +4,11 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::math::quaternion::{Real, arc_tangent, sine_cosine};
+use crate::math::quaternion::{Arithmetic, Real, arc_tangent, full_waves};
 use crate::math::ranges::{near_arc_square, near_waves};
 
 /// A number that depends on the curve's parameter.
-pub(crate) trait Scalar:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
+pub(crate) trait Scalar: Arithmetic {
     /// A number that does not depend on it: f64, or a vector of f64.
     type Constant: Real;
     /// Makes a number of a constant.
@@ -38,10 +36,7 @@ impl Scalar for f64 {
 
     #[inline(always)]
     fn waves(self) -> (f64, f64) {
-        let angle = self.sqrt();
-        let (sine, cosine) = sine_cosine(angle);
-        // sin(x)/x is 1 to f64 rounding below 1e-9.
-        (if angle > 1e-9 { sine / angle } else { 1.0 }, cosine)
+        full_waves(self)
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::quaternion::{
-    Quaternion, Real, Vector, exp, log, log_near, log_toward, scaled, square,
+    Quaternion, Real, Vector, exp, exp_by, log, log_near, log_toward, scaled, square,
 };
 
 /// The exponentials and logarithms that a method's rule is made of. There are two: [`PrincipalRange`] for the
@@ -257,8 +257,7 @@ impl<R: Real> Algebra for PrincipalRange<R> {
     fn exp(&mut self, a: [R; 3]) -> [R; 4] {
         let z = square(a);
         self.check(z, LONG_SQUARE);
-        let (sinc, cosine) = long_waves(z);
-        [sinc * a[0], sinc * a[1], sinc * a[2], cosine]
+        exp_by(a, long_waves(z))
     }
 
     #[inline(always)]

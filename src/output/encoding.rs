@@ -1,154 +1,318 @@
-//! The representations in which rotations are stored, and the conversions on the CPU.
+//! The representations in which rotations are stored: one table, which says of each what it is
+//! called, what it looks like in memory, and how it is made and read on the CPU.
 
 use glam::{Mat3, Quat, Vec3};
 
-use crate::math::canonical::canonical;
+use crate::output::component_type::ComponentType;
 use crate::output::euler::EulerSequence;
 use crate::shader::Store;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::twin::axis_angle::axis_angle;
-use crate::twin::euler::euler;
-use crate::twin::f16::to_half;
-use crate::twin::matrix::rows;
-use crate::twin::snorm16::to_snorm;
+use crate::twin::{axis_angle, euler, f16, matrix, snorm16};
 
-/// The representation in which a rotation is stored. It is converted on the device that evaluates
-/// it, so that only the converted numbers are moved; every device gives the same bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[non_exhaustive]
-pub enum Encoding {
+/// A row of the table of representations. What [`Encoding`] tells of it is documented there.
+pub(crate) struct Representation {
+    name: &'static str,
+    summary: &'static str,
+    component_type: ComponentType,
+    shape: &'static [usize],
+    components: &'static [&'static str],
+    /// The largest angle between a rotation and what is read of it, radians; `None` if no rotations
+    /// can be stored.
+    pub(crate) error_bound: Option<f64>,
+    /// Whether velocities and accelerations can be stored.
+    pub(crate) takes_vectors: bool,
+    /// The store of the kernels for it, and that store's parameter.
+    pub(crate) store: Store,
+    pub(crate) detail: u32,
+    /// Stores rotations, given the parameter.
+    encode: fn(&[[f32; 4]], u32, &mut [u8]),
+    /// Makes a rotation of its numbers, given the parameter.
+    decode: fn(&Numbers, u32) -> [f32; 4],
+}
+
+/// The numbers of one rotation, by their places.
+type Numbers<'a> = dyn Fn(usize) -> f32 + 'a;
+
+/// Quaternions in f32.
+const QUATERNION: Representation = Representation {
+    name: "f32",
+    summary: "float32",
+    component_type: ComponentType::F32,
+    shape: &[4],
+    components: &["x", "y", "z", "w"],
+    error_bound: Some(0.0),
+    takes_vectors: true,
+    store: Store::F32,
+    detail: 0,
+    encode: |rotations, _, output| output.copy_from_slice(bytemuck::cast_slice(rotations)),
+    decode: |number, _| [0, 1, 2, 3].map(number),
+};
+
+/// What representations of rotations in f32 have in common.
+const OF_ROTATIONS: Representation = Representation {
+    error_bound: Some(4e-6), // most of which is the error of decoding
+    takes_vectors: false,
+    ..QUATERNION
+};
+
+/// A function that stores rotations by the twin of a kernel's store, which takes whole rotations or
+/// single components. Each has a loop of its own, as no compiler inlines a large function that is
+/// given to a loop.
+macro_rules! by {
+    ($store:path) => {
+        |rotations, detail, output| {
+            struct Each<'a>(&'a [[f32; 4]], u32, &'a mut [u8]);
+
+            impl InLanes for Each<'_> {
+                #[inline(always)]
+                fn run<L: Lanes>(&mut self) {
+                    let (rotations, detail, output) = (self.0, self.1, &mut *self.2);
+                    let (numbers, _) = rotations.as_flattened().as_chunks();
+                    let places = output.chunks_exact_mut(stored_bytes($store));
+                    for (&own, place) in numbers.iter().zip(places) {
+                        place.copy_from_slice(bytemuck::bytes_of(&$store(own, detail)));
+                    }
+                }
+            }
+            in_lanes(&mut Each(rotations, detail, output));
+        }
+    };
+}
+
+/// Bytes of what the twin of a store returns.
+#[inline(always)]
+fn stored_bytes<const N: usize, S>(_: impl Fn([f32; N], u32) -> S) -> usize {
+    size_of::<S>()
+}
+
+/// The twin of the store for vectors.
+#[inline(always)]
+fn xyz([x, y, z, _]: [f32; 4], _: u32) -> [f32; 3] {
+    [x, y, z]
+}
+
+/// Declares [`Encoding`]: a variant for each representation, with an option if it has one, and its
+/// row of the table. In the row the option goes by the name that it has in [`EncodingOptions`].
+macro_rules! representations {
+    ($(
+        $(#[$attribute:meta])*
+        $variant:ident $(($option:ident: $type:ty))? {
+            kinds: [$($kind:expr),+],
+            $($row:tt)*
+        }
+    )*) => {
+        /// The representation in which a rotation is stored. It is converted on the device that
+        /// evaluates it, so that only the converted numbers are moved; every device gives the same
+        /// bits.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+        #[non_exhaustive]
+        pub enum Encoding {
+            $($(#[$attribute])* $variant $(($type))?,)*
+        }
+
+        impl Encoding {
+            /// One of every kind.
+            pub const KINDS: [Self; [$($(stringify!($kind)),+),*].len()] = [$($($kind),+),*];
+
+            /// The same representation with these options.
+            #[must_use]
+            pub fn with(self, options: EncodingOptions) -> Self {
+                match self {
+                    $(Self::$variant { .. } => Self::$variant $((options.$option))?,)*
+                }
+            }
+
+            /// Its row of the table.
+            #[inline]
+            pub(crate) fn row(self) -> Representation {
+                match self {
+                    $(Self::$variant $(($option))? => Representation { $($row)* },)*
+                }
+            }
+        }
+    };
+}
+
+representations! {
     /// `x y z w`, f32: 16 bytes a rotation.
     #[default]
-    F32,
+    F32 {
+        kinds: [Self::F32],
+        ..QUATERNION
+    }
     /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes a
     /// rotation, within 2^-12 of each component.
-    F16,
+    F16 {
+        kinds: [Self::F16],
+        name: "f16",
+        summary: "float16: half the size, within 2.5e-4 of each component",
+        component_type: ComponentType::F16,
+        error_bound: Some(2e-3),
+        store: Store::F16,
+        encode: by!(f16::store),
+        ..OF_ROTATIONS
+    }
     /// `x y z w` as whole numbers of 1/32767 in 16 bits, rounded to nearest, ties to even
     /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each
     /// component.
-    Snorm16,
+    Snorm16 {
+        kinds: [Self::Snorm16],
+        name: "snorm16",
+        summary: "int16, to be divided by 32767: half the size, within 1.6e-5",
+        component_type: ComponentType::Snorm16,
+        error_bound: Some(1.5e-4),
+        store: Store::Snorm16,
+        encode: by!(snorm16::store),
+        ..OF_ROTATIONS
+    }
     /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360. If `v` is
     /// zero the axis is x. Four f32.
-    AxisAngle,
+    AxisAngle {
+        kinds: [Self::AxisAngle],
+        name: "axis-angle",
+        summary: "x y z of the axis, and degrees, 0 to 360",
+        components: &["x", "y", "z", "degrees"],
+        store: Store::AxisAngle,
+        encode: by!(axis_angle::store),
+        decode: |number, _| {
+            let axis = Vec3::new(number(0), number(1), number(2));
+            Quat::from_axis_angle(axis, number(3).to_radians()).to_array()
+        },
+        ..OF_ROTATIONS
+    }
     /// The 3 × 3 matrix that turns column vectors: nine f32.
-    Matrix3x3(MatrixOrder),
+    Matrix3x3(order: MatrixOrder) {
+        kinds: [Self::Matrix3x3(MatrixOrder::RowMajor), Self::Matrix3x3(MatrixOrder::ColumnMajor)],
+        name: "matrix",
+        summary: "3 × 3, for column vectors",
+        shape: &[3, 3],
+        components: match order {
+            MatrixOrder::RowMajor => &["m00", "m01", "m02", "m10", "m11", "m12", "m20", "m21", "m22"],
+            MatrixOrder::ColumnMajor => &["m00", "m10", "m20", "m01", "m11", "m21", "m02", "m12", "m22"],
+        },
+        store: Store::Matrix3x3,
+        detail: order as u32,
+        encode: by!(matrix::rows),
+        decode: |number, order| of_matrix(number, 3, order),
+        ..OF_ROTATIONS
+    }
     /// The same with a translation of 0: twelve f32.
-    Matrix3x4(MatrixOrder),
+    Matrix3x4(order: MatrixOrder) {
+        kinds: [Self::Matrix3x4(MatrixOrder::RowMajor), Self::Matrix3x4(MatrixOrder::ColumnMajor)],
+        name: "matrix-3x4",
+        summary: "3 × 4, its translation 0",
+        shape: match order {
+            MatrixOrder::RowMajor => &[3, 4],
+            MatrixOrder::ColumnMajor => &[4, 3],
+        },
+        components: match order {
+            MatrixOrder::RowMajor => &[
+                "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23",
+            ],
+            MatrixOrder::ColumnMajor => &[
+                "m00", "m10", "m20", "m01", "m11", "m21", "m02", "m12", "m22", "m03", "m13", "m23",
+            ],
+        },
+        store: Store::Matrix3x4,
+        detail: order as u32,
+        encode: match order {
+            MatrixOrder::RowMajor => by!(matrix::store3x4_rows),
+            MatrixOrder::ColumnMajor => by!(matrix::store3x4_columns),
+        },
+        decode: |number, order| of_matrix(number, if order == 0 { 4 } else { 3 }, order),
+        ..OF_ROTATIONS
+    }
     /// Three angles in degrees, in the order of the sequence: the first and the third within ±180,
     /// the second within ±90, or from 0 to 180 if the third axis equals the first. In gimbal lock,
     /// where the first and the third angle turn about the same axis, the third is 0. Three f32.
-    Euler(EulerSequence),
+    Euler(sequence: EulerSequence) {
+        kinds: [Self::Euler(EulerSequence::XYZ)],
+        name: "euler",
+        summary: "three angles, degrees",
+        shape: &[3],
+        components: sequence.angle_names(),
+        store: Store::Euler,
+        detail: sequence.detail(),
+        encode: by!(euler::store),
+        decode: EulerSequence::decode,
+        ..OF_ROTATIONS
+    }
     /// `x y z` alone, for velocities and accelerations: three f32.
-    Vector,
+    Vector {
+        kinds: [Self::Vector],
+        name: "vector",
+        summary: "x y z",
+        shape: &[3],
+        components: &["x", "y", "z"],
+        error_bound: None,
+        store: Store::Vector,
+        encode: by!(xyz),
+        decode: |number, _| [number(0), number(1), number(2), 0.0],
+        ..QUATERNION
+    }
 }
 
-/// How a matrix lies in memory.
+/// What some representations leave open; see [`Encoding::with`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct EncodingOptions {
+    /// How matrices lie in memory.
+    pub order: MatrixOrder,
+    /// The axes of Euler angles.
+    pub sequence: EulerSequence,
+}
+
+/// How a matrix lies in memory. The kernels' stores take these numbers as their parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixOrder {
     /// Row by row.
-    RowMajor,
+    RowMajor = 0,
     /// Column by column.
-    ColumnMajor,
+    ColumnMajor = 1,
 }
 
 impl Encoding {
-    /// One of every kind.
-    pub const KINDS: [Self; 10] = [
-        Self::F32,
-        Self::F16,
-        Self::Snorm16,
-        Self::AxisAngle,
-        Self::Matrix3x3(MatrixOrder::RowMajor),
-        Self::Matrix3x3(MatrixOrder::ColumnMajor),
-        Self::Matrix3x4(MatrixOrder::RowMajor),
-        Self::Matrix3x4(MatrixOrder::ColumnMajor),
-        Self::Euler(EulerSequence::XYZ),
-        Self::Vector,
-    ];
+    /// The name by which programs call it, whatever its options.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
 
-    pub(crate) const MOST_BYTES: usize = 48;
+    /// What it is, in a few words.
+    #[must_use]
+    pub fn summary(self) -> &'static str {
+        self.row().summary
+    }
 
     /// Bytes of one rotation.
     #[must_use]
     pub fn bytes(self) -> usize {
-        match self {
-            Self::F16 | Self::Snorm16 => 8,
-            Self::Euler(_) | Self::Vector => 12,
-            Self::F32 | Self::AxisAngle => 16,
-            Self::Matrix3x3(_) => 36,
-            Self::Matrix3x4(_) => Self::MOST_BYTES,
-        }
+        let row = self.row();
+        row.component_type.bytes() * row.components.len()
     }
 
     /// The shape of one rotation in an array: `[4]`, `[3]`, `[3, 3]`, ….
     #[must_use]
     pub fn shape(self) -> &'static [usize] {
-        match self {
-            Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle => &[4],
-            Self::Euler(_) | Self::Vector => &[3],
-            Self::Matrix3x3(_) => &[3, 3],
-            Self::Matrix3x4(MatrixOrder::RowMajor) => &[3, 4],
-            Self::Matrix3x4(MatrixOrder::ColumnMajor) => &[4, 3],
-        }
+        self.row().shape
     }
 
     /// The names of its numbers, in order.
     #[must_use]
-    pub fn components(self) -> Vec<String> {
-        let names: &[&str] = match self {
-            Self::F32 | Self::F16 | Self::Snorm16 => &["x", "y", "z", "w"],
-            Self::AxisAngle => &["x", "y", "z", "degrees"],
-            Self::Vector => &["x", "y", "z"],
-            Self::Matrix3x3(order) | Self::Matrix3x4(order) => {
-                let columns = self.bytes() / 12;
-                let name = |i: usize| match order {
-                    MatrixOrder::RowMajor => (i / columns, i % columns),
-                    MatrixOrder::ColumnMajor => (i % 3, i / 3),
-                };
-                let names = (0..3 * columns).map(name);
-                return names
-                    .map(|(row, column)| format!("m{row}{column}"))
-                    .collect();
-            }
-            Self::Euler(sequence) => {
-                let axes = (1..).zip(sequence.axes());
-                return axes
-                    .map(|(i, axis)| format!("{}{i}", ["x", "y", "z"][axis]))
-                    .collect();
-            }
-        };
-        names.iter().map(|&name| name.to_owned()).collect()
+    pub fn components(self) -> &'static [&'static str] {
+        self.row().components
     }
 
-    /// Whether it can store rotations only, not velocities and accelerations.
-    pub(crate) fn needs_rotations(self) -> bool {
-        !matches!(self, Self::F32 | Self::Vector)
+    /// What each of its numbers is stored as.
+    #[must_use]
+    pub fn component_type(self) -> ComponentType {
+        self.row().component_type
     }
 
-    /// The store of the kernels for it.
-    pub(crate) fn store(self) -> Store {
-        match self {
-            Self::F32 => Store::F32,
-            Self::F16 => Store::F16,
-            Self::Snorm16 => Store::Snorm16,
-            Self::AxisAngle => Store::AxisAngle,
-            Self::Matrix3x3(_) => Store::Matrix3x3,
-            Self::Matrix3x4(_) => Store::Matrix3x4,
-            Self::Euler(_) => Store::Euler,
-            Self::Vector => Store::Vector,
-        }
-    }
-
-    /// The parameter of the kernels' store: a matrix's order, or the sequence of Euler angles.
-    pub(crate) fn detail(self) -> u32 {
-        match self {
-            Self::F32 | Self::F16 | Self::Snorm16 | Self::AxisAngle | Self::Vector => 0,
-            Self::Matrix3x3(order) | Self::Matrix3x4(order) => {
-                u32::from(order == MatrixOrder::ColumnMajor)
-            }
-            Self::Euler(sequence) => sequence.detail(),
-        }
+    /// Whether its numbers are `x y z w`, in any precision.
+    #[must_use]
+    pub fn is_quaternion(self) -> bool {
+        self.components() == QUATERNION.components
     }
 
     /// Stores rotations, `x y z w` each, in the machine's byte order.
@@ -157,12 +321,8 @@ impl Encoding {
     /// When `output` has not [`Encoding::bytes`] for each rotation.
     pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) {
         assert_eq!(output.len(), rotations.len() * self.bytes());
-        match self {
-            Self::F32 => output.copy_from_slice(bytemuck::cast_slice(rotations)),
-            Self::F16 => in_lanes(&mut Halves(components(rotations), output)),
-            Self::Snorm16 => in_lanes(&mut WholeNumbers(components(rotations), output)),
-            _ => in_lanes(&mut Converted(self, rotations, output)),
-        }
+        let row = self.row();
+        (row.encode)(rotations, row.detail, output);
     }
 
     /// Reads what is stored: the rotation, up to rounding and sign, or the vector.
@@ -172,176 +332,27 @@ impl Encoding {
     #[must_use]
     pub fn decode(self, bytes: &[u8]) -> [f32; 4] {
         assert_eq!(bytes.len(), self.bytes());
-        let number = |i: usize| f32::from_ne_bytes(std::array::from_fn(|b| bytes[4 * i + b]));
-        let half = |i: usize| u16::from_ne_bytes([bytes[2 * i], bytes[2 * i + 1]]);
-        match self {
-            Self::F32 => [0, 1, 2, 3].map(number),
-            Self::F16 => [0, 1, 2, 3].map(|i| from_half(half(i))),
-            // -32768 means -1 too.
-            Self::Snorm16 => [0, 1, 2, 3].map(|i| (f32::from(half(i) as i16) / 32767.0).max(-1.0)),
-            Self::AxisAngle => {
-                let axis = Vec3::new(number(0), number(1), number(2));
-                Quat::from_axis_angle(axis, number(3).to_radians()).to_array()
-            }
-            Self::Matrix3x3(order) => {
-                let columns = Mat3::from_cols_array(&std::array::from_fn(number));
-                from_columns(columns, order)
-            }
-            Self::Matrix3x4(MatrixOrder::ColumnMajor) => {
-                let columns = Mat3::from_cols_array(&std::array::from_fn(number));
-                from_columns(columns, MatrixOrder::ColumnMajor)
-            }
-            Self::Matrix3x4(MatrixOrder::RowMajor) => {
-                let columns = Mat3::from_cols_array(&std::array::from_fn(|i| number(i + i / 3)));
-                from_columns(columns, MatrixOrder::RowMajor)
-            }
-            Self::Euler(sequence) => {
-                let turns = [0, 1, 2].map(|i| {
-                    let axis = Vec3::AXES[sequence.axes()[i]];
-                    Quat::from_axis_angle(axis, number(i).to_radians())
-                });
-                let [first, second, third] = turns;
-                let together = if sequence.is_intrinsic() {
-                    first * second * third
-                } else {
-                    third * second * first
-                };
-                together.to_array()
-            }
-            Self::Vector => [number(0), number(1), number(2), 0.0],
-        }
+        let row = self.row();
+        let size = row.component_type.bytes();
+        let number = |place: usize| (row.component_type).decode(&bytes[place * size..][..size]);
+        (row.decode)(&number, row.detail)
     }
 }
 
-fn from_columns(columns: Mat3, order: MatrixOrder) -> [f32; 4] {
-    let matrix = match order {
-        MatrixOrder::ColumnMajor => columns,
-        MatrixOrder::RowMajor => columns.transpose(),
+/// The rotation of a matrix whose rows, or columns if `order` is 1, start `length` numbers apart.
+fn of_matrix(number: &Numbers, length: usize, order: u32) -> [f32; 4] {
+    let columns = Mat3::from_cols_array(&std::array::from_fn(|i| number(i / 3 * length + i % 3)));
+    let matrix = if order == 0 {
+        columns.transpose()
+    } else {
+        columns
     };
     Quat::from_mat3(&matrix).to_array()
-}
-
-/// Converts rotations to a representation in f32: the encoding, the rotations, the output.
-struct Converted<'a>(Encoding, &'a [[f32; 4]], &'a mut [u8]);
-
-impl InLanes for Converted<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let Self(encoding, rotations, output) = self;
-        let detail = encoding.detail();
-        match encoding {
-            Encoding::Matrix3x3(_) => each(rotations, output, |rotation| {
-                let [a, b, c] = rows(rotation, detail);
-                [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
-            }),
-            Encoding::Matrix3x4(MatrixOrder::RowMajor) => each(rotations, output, |rotation| {
-                let [a, b, c] = rows(rotation, detail);
-                let [first, second] = [[a[0], a[1], a[2], 0.0], [b[0], b[1], b[2], 0.0]];
-                let third = [c[0], c[1], c[2], 0.0];
-                std::array::from_fn::<_, 12, _>(|i| [first, second, third][i / 4][i % 4])
-            }),
-            Encoding::Matrix3x4(MatrixOrder::ColumnMajor) => each(rotations, output, |rotation| {
-                let rows = rows(rotation, detail);
-                std::array::from_fn::<_, 12, _>(|i| if i < 9 { rows[i / 3][i % 3] } else { 0.0 })
-            }),
-            Encoding::Euler(_) => each(rotations, output, |rotation| {
-                euler(rotation, detail).map(canonical)
-            }),
-            Encoding::Vector => each(rotations, output, |[x, y, z, _]| [x, y, z]),
-            _ => each(rotations, output, |rotation| {
-                axis_angle(rotation).map(canonical)
-            }),
-        }
-    }
-}
-
-#[inline(always)]
-fn each<const N: usize>(
-    rotations: &[[f32; 4]],
-    output: &mut [u8],
-    convert: impl Fn([f32; 4]) -> [f32; N],
-) {
-    for (&rotation, bytes) in rotations.iter().zip(output.chunks_exact_mut(4 * N)) {
-        bytes.copy_from_slice(bytemuck::cast_slice(&convert(rotation)));
-    }
-}
-
-fn components(rotations: &[[f32; 4]]) -> &[f32] {
-    rotations.as_flattened()
-}
-
-/// Converts f32 to half precision: the input and the output.
-struct Halves<'a>(&'a [f32], &'a mut [u8]);
-
-impl InLanes for Halves<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
-            bytes.copy_from_slice(&to_half(value).to_ne_bytes());
-        }
-    }
-}
-
-/// Converts f32 to whole numbers of 1/32767: the input and the output.
-struct WholeNumbers<'a>(&'a [f32], &'a mut [u8]);
-
-impl InLanes for WholeNumbers<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        for (&value, bytes) in self.0.iter().zip(self.1.chunks_exact_mut(2)) {
-            bytes.copy_from_slice(&to_snorm(value).to_ne_bytes());
-        }
-    }
-}
-
-fn from_half(half: u16) -> f32 {
-    let magnitude = u32::from(half & 0x7fff);
-    let value = if magnitude < 0x0400 {
-        magnitude as f32 * 2.0f32.powi(-24)
-    } else {
-        f32::from_bits((magnitude << 13) + 0x3800_0000)
-    };
-    if half & 0x8000 == 0 { value } else { -value }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Every half from 0 to 1, and values between two of them: the nearest half is stored, and the
-    /// even one if two are equally near.
-    #[test]
-    fn halves_are_the_nearest() {
-        for half in 0..0x3c00u16 {
-            let (low, high) = (from_half(half), from_half(half + 1));
-            let middle = low + (high - low) * 0.5; // exact
-            let even = if half & 1 == 0 { half } else { half + 1 };
-            for (value, expected) in [
-                (low, half),
-                (middle.next_down(), half),
-                (middle, even),
-                (middle.next_up(), half + 1),
-                (high, half + 1),
-            ] {
-                let stored = to_half(value);
-                assert_eq!(stored, expected, "{value}");
-                assert_eq!(to_half(-value), expected | 0x8000);
-            }
-        }
-    }
-
-    #[test]
-    fn whole_numbers_are_the_nearest() {
-        for n in -32767..=32767i32 {
-            let value = n as f32 / 32767.0;
-            assert_eq!(to_snorm(value), n as i16 as u16);
-            let off = (f64::from(n) + 0.49) / 32767.0;
-            assert_eq!(to_snorm(off as f32), n as i16 as u16);
-        }
-        // A component may pass 1 by rounding.
-        assert_eq!(to_snorm(1.000_000_4), 32767);
-        assert_eq!(to_snorm(-1.000_000_4), -32767i16 as u16);
-    }
 
     #[test]
     fn what_is_decoded_is_near_what_was_encoded() {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use glam::{Quat, Vec3};
+
 use crate::shader::{INTRINSIC, NEGATIVE, SYMMETRIC};
 
 /// The three axes of Euler angles: one of twelve sequences, about axes that turn with the body
@@ -48,6 +50,22 @@ impl EulerSequence {
         self.axes.map(usize::from)
     }
 
+    /// The names of the angles: the axis, and the place in the sequence.
+    pub(crate) fn angle_names(self) -> &'static [&'static str; 3] {
+        const NAMES: [[&str; 3]; 27] = {
+            let [first, second, third] =
+                [["x1", "y1", "z1"], ["x2", "y2", "z2"], ["x3", "y3", "z3"]];
+            let (mut names, mut code) = ([[""; 3]; 27], 0);
+            while code < 27 {
+                names[code] = [first[code / 9], second[code / 3 % 3], third[code % 3]];
+                code += 1;
+            }
+            names
+        };
+        let [i, j, k] = self.axes();
+        &NAMES[9 * i + 3 * j + k]
+    }
+
     /// Whether each angle is about an axis that the angles before it have turned.
     #[must_use]
     pub fn is_intrinsic(self) -> bool {
@@ -71,6 +89,20 @@ impl EulerSequence {
             | flag(symmetric, SYMMETRIC)
             | flag(negative, NEGATIVE)
             | flag(self.intrinsic, INTRINSIC)
+    }
+
+    /// The rotation of three angles in degrees, by the sequence that the parameter of the kernels'
+    /// store stands for.
+    pub(crate) fn decode(degrees: &dyn Fn(usize) -> f32, detail: u32) -> [f32; 4] {
+        let axis = |place: u32| Vec3::AXES[(detail >> (2 * place) & 3) as usize];
+        let last_axis = axis(if detail & SYMMETRIC != 0 { 0 } else { 2 });
+        let (first, last) = if detail & INTRINSIC != 0 {
+            (2, 0)
+        } else {
+            (0, 2)
+        };
+        let turn = |axis, angle| Quat::from_axis_angle(axis, degrees(angle).to_radians());
+        (turn(last_axis, last) * turn(axis(1), 1) * turn(axis(0), first)).to_array()
     }
 }
 

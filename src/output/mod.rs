@@ -2,6 +2,7 @@
 //! windows into which long results are cut.
 
 pub(crate) mod buffer;
+pub(crate) mod component_type;
 pub(crate) mod encoding;
 pub(crate) mod euler;
 pub(crate) mod rotations;

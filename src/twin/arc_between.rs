@@ -5,7 +5,7 @@ use crate::shader::{
     SECANT_1, SECANT_2, SECANT_3, SECANT_4, SECANT_5, SECANT_6, SECANT_7, SECANT_8, SECANT_9,
 };
 use crate::simd::lanes::{Number, canonical};
-use crate::twin::evaluate_arc::square;
+use crate::twin::evaluate_arc::norm_squared;
 
 /// The middle of the arc between two unit quaternions, and its tangent there. They are at most pi/2
 /// apart in R⁴.
@@ -21,7 +21,7 @@ pub(crate) fn arc_between<N: Number>(start: [N; 4], end: [N; 4]) -> ([N; 4], [N;
         (aw + bw) * one_half,
     ];
     let difference = [bx - ax, by - ay, bz - az, bw - aw];
-    let x = square(difference) * N::all(0.25);
+    let x = norm_squared(difference) * N::all(0.25);
     let xx = x * x;
     let secant_7 = N::all(SECANT_8) * x + N::all(SECANT_7);
     let secant_5 = N::all(SECANT_6) * x + N::all(SECANT_5);

@@ -1,5 +1,6 @@
 //! Twin of `shaders/stores/axis_angle.wgsl`: the same names, the same order.
 
+use crate::math::canonical::canonical;
 use crate::shader::DEGREES;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 
@@ -17,4 +18,9 @@ pub(crate) fn axis_angle(rotation: [f32; 4]) -> [f32; 4] {
     } else {
         turned
     }
+}
+
+#[inline(always)]
+pub(crate) fn store(rotation: [f32; 4], _: u32) -> [f32; 4] {
+    axis_angle(rotation).map(canonical)
 }

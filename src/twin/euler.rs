@@ -1,5 +1,6 @@
 //! Twin of `shaders/stores/euler.wgsl`: the same names, the same order.
 
+use crate::math::canonical::canonical;
 use crate::shader::{
     DEGREES, GIMBAL, HALF_PI, HALF_PI_LOW, INTRINSIC, NEGATIVE, PI, PI_LOW, SYMMETRIC,
 };
@@ -55,4 +56,9 @@ pub(crate) fn euler(rotation: [f32; 4], detail: u32) -> [f32; 3] {
         wrapped(second) * DEGREES,
         wrapped(inner) * DEGREES,
     ]
+}
+
+#[inline(always)]
+pub(crate) fn store(rotation: [f32; 4], detail: u32) -> [f32; 3] {
+    euler(rotation, detail).map(canonical)
 }

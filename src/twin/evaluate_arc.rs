@@ -2,6 +2,7 @@
 
 use glam::Vec4;
 
+use crate::math::quaternion::dot;
 use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number};
 use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
@@ -10,7 +11,7 @@ use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter
 impl Evaluate for ArcSegment {
     #[inline(always)]
     fn constant(&self) -> f32 {
-        square(self.tangent)
+        norm_squared(self.tangent)
     }
 
     #[inline(always)]
@@ -168,6 +169,6 @@ fn turned<N: Number>(middle: N, tangent: N, sine: N, cosine_minus_one: N) -> N {
 }
 
 #[inline(always)]
-pub(crate) fn square<N: Number>(q: [N; 4]) -> N {
-    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+pub(crate) fn norm_squared<N: Number>(q: [N; 4]) -> N {
+    dot(q, q)
 }

@@ -21,3 +21,8 @@ pub(crate) fn to_half(value: f32) -> u16 {
     };
     (sign | half) as u16
 }
+
+#[inline(always)]
+pub(crate) fn store([component]: [f32; 1], _: u32) -> [u16; 1] {
+    [to_half(component)]
+}

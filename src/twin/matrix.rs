@@ -1,4 +1,5 @@
-//! Twin of `shaders/stores/matrix.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl` and
+//! `shaders/stores/matrix3x4.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 
@@ -27,4 +28,17 @@ pub(super) fn matrix_rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
         [xy + wz, 1.0 - (xx + zz), yz - wx],
         [zx - wy, yz + wx, 1.0 - (xx + yy)],
     ]
+}
+
+/// What `store` writes row by row.
+#[inline(always)]
+pub(crate) fn store3x4_rows(rotation: [f32; 4], detail: u32) -> [[f32; 4]; 3] {
+    rows(rotation, detail).map(|[x, y, z]| [x, y, z, 0.0])
+}
+
+/// What `store` writes column by column.
+#[inline(always)]
+pub(crate) fn store3x4_columns(rotation: [f32; 4], detail: u32) -> [f32; 12] {
+    let columns = rows(rotation, detail);
+    std::array::from_fn(|i| if i < 9 { columns[i / 3][i % 3] } else { 0.0 })
 }

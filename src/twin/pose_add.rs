@@ -1,12 +1,11 @@
 //! Twin of `shaders/poses/add.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
-use crate::twin::quaternion::{normalised, product, slerp};
+use crate::math::quaternion::{product, step};
+use crate::twin::quaternion::{normalised, slerp};
 
 #[inline(always)]
 pub(crate) fn pose(base: [f32; 4], layer: [f32; 4], reference: [f32; 4], weight: f32) -> [f32; 4] {
-    let own = reference;
-    let inverse = [-own[0], -own[1], -own[2], own[3]];
-    let turn = slerp([0.0, 0.0, 0.0, 1.0], product(inverse, layer), weight);
+    let turn = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
     normalised(product(base, turn)).map(canonical)
 }

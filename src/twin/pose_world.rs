@@ -1,9 +1,10 @@
 //! Twin of `shaders/poses/world.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
+use crate::math::quaternion::product;
 use crate::shader::Link;
 use crate::shader::ROOT;
-use crate::twin::quaternion::{normalised, product, rotated};
+use crate::twin::quaternion::{normalised, rotated};
 
 /// One frame: from each track's rotation in its parent's frame to its rotation and its position in
 /// the world. `links` lists parents before their children.

@@ -1,23 +1,9 @@
-//! Twin of `shaders/math/quaternion.wgsl`: the same names, the same order.
+//! Twin of `shaders/math/quaternion.wgsl`: the same names, the same order. The twins of its `product`
+//! and `dot4` are [`product`](crate::math::quaternion::product) and [`dot`].
 
+use crate::math::quaternion::dot;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 use crate::twin::sine_cosine::sine_cosine;
-
-/// The Hamilton product `a b`.
-#[inline(always)]
-pub(crate) fn product(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
-    [
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-    ]
-}
-
-#[inline(always)]
-pub(crate) fn dot4(a: [f32; 4], b: [f32; 4]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-}
 
 #[inline(always)]
 pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
@@ -37,17 +23,17 @@ pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
 
 #[inline(always)]
 pub(crate) fn normalised(q: [f32; 4]) -> [f32; 4] {
-    let scale = reciprocal_root(dot4(q, q));
+    let scale = reciprocal_root(dot(q, q));
     q.map(|c| c * scale)
 }
 
 #[inline(always)]
 pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
-    let near = if dot4(a, b) < 0.0 { b.map(|c| -c) } else { b };
+    let near = if dot(a, b) < 0.0 { b.map(|c| -c) } else { b };
     let sum: [f32; 4] = std::array::from_fn(|c| a[c] + near[c]);
     let difference: [f32; 4] = std::array::from_fn(|c| flushed(near[c] - a[c]));
-    let square = dot4(difference, difference);
-    let whole = dot4(sum, sum);
+    let square = dot(difference, difference);
+    let whole = dot(sum, sum);
     let half = arc_tangent(root(square), root(whole));
     let turn = sine_cosine((t + t - 1.0) * half);
     let inverse = if square == 0.0 {

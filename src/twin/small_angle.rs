@@ -1,7 +1,7 @@
 //! Twin of `shaders/from_keys/small_angle.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
-use crate::math::quaternion::{Arithmetic, scaled, sum};
+use crate::math::quaternion::{Arithmetic, cross3, dot3, minus, product, scaled, sum};
 use crate::shader::TangentWeights;
 use crate::shader::{
     B_111_1, B_111_2, B_111_3, B_111_4, B_111_5, B_111_6, B_122_1, B_122_2, B_122_3, B_122_4,
@@ -10,7 +10,7 @@ use crate::shader::{
     COSM1_1, COSM1_2, KEY_AT_END, KEY_UNKNOWN, LOG_1, LOG_2, LOG_3, LOG_4, LONGEST_STEP,
     LONGEST_TANGENT_PART, SINC_1, SINC_2, SMALL_SQUARED_EXTENT, THIRD, TWO_THIRDS,
 };
-use crate::twin::evaluate_arc::square;
+use crate::twin::evaluate_arc::norm_squared;
 
 type Vector = [f32; 3];
 type Quaternion = [f32; 4];
@@ -32,25 +32,6 @@ pub(crate) struct SmallAngleCubic {
 }
 
 #[inline(always)]
-pub(crate) fn minus<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-pub(crate) fn cross3<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-#[inline(always)]
-pub(crate) fn dot3<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> N {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
 pub(crate) fn chord_of<N: Arithmetic>(a: [N; 4], b: [N; 4]) -> [N; 4] {
     [b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]]
 }
@@ -64,6 +45,7 @@ pub(crate) fn step_vector<N: Arithmetic>(a: [N; 4], chord: [N; 4]) -> [N; 3] {
     ]
 }
 
+/// The logarithm by a series in the squared sine, for small angles.
 #[inline(always)]
 pub(super) fn small_log(v: Vector) -> Vector {
     let x = dot3(v, v);
@@ -71,6 +53,8 @@ pub(super) fn small_log(v: Vector) -> Vector {
     sum(scaled(v, tail * x), v)
 }
 
+/// The exponential by a series from the identity, for small angles: it adds `v` last, so that no
+/// digit of it is lost.
 #[inline(always)]
 pub(super) fn small_exp(v: Vector) -> FromIdentity<f32> {
     let x = dot3(v, v);
@@ -101,12 +85,8 @@ pub(crate) fn inverse_rotated<N: Arithmetic>(v: [N; 3], r: FromIdentity<N>) -> [
 
 #[inline(always)]
 pub(super) fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
-    [
-        canonical(m[3] * v[0] + m[0] * w + m[1] * v[2] - m[2] * v[1]),
-        canonical(m[3] * v[1] - m[0] * v[2] + m[1] * w + m[2] * v[0]),
-        canonical(m[3] * v[2] + m[0] * v[1] - m[1] * v[0] + m[2] * w),
-        canonical(m[3] * w - m[0] * v[0] - m[1] * v[1] - m[2] * v[2]),
-    ]
+    let [x, y, z, w] = product(m, [v[0], v[1], v[2], w]);
+    [canonical(x), canonical(y), canonical(z), canonical(w)]
 }
 
 /// The cubic between the second and the third of four keys, each of which has the sign nearer to
@@ -148,7 +128,7 @@ pub(crate) fn small_angle_cubic(
     };
     let whole = FromIdentity {
         vector: step,
-        cosm1: square(chord) * -0.5,
+        cosm1: norm_squared(chord) * -0.5,
     };
     let without_first = composed(small_exp([-w1[0], -w1[1], -w1[2]]), whole);
     let back = small_exp([-w3[0], -w3[1], -w3[2]]);
@@ -156,9 +136,9 @@ pub(crate) fn small_angle_cubic(
 
     let squared_extent = dot3(w1, w1) + dot3(w2, w2) + dot3(w3, w3);
     let holds = (squared_extent <= SMALL_SQUARED_EXTENT)
-        & (square(chord_before) <= LONGEST_STEP)
-        & (square(chord) <= LONGEST_STEP)
-        & (square(chord_after) <= LONGEST_STEP)
+        & (norm_squared(chord_before) <= LONGEST_STEP)
+        & (norm_squared(chord) <= LONGEST_STEP)
+        & (norm_squared(chord_after) <= LONGEST_STEP)
         & (dot3(first_left, first_left) <= LONGEST_TANGENT_PART)
         & (dot3(first_right, first_right) <= LONGEST_TANGENT_PART)
         & (dot3(last_left, last_left) <= LONGEST_TANGENT_PART)

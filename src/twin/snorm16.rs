@@ -7,3 +7,8 @@ use crate::shader::SNORM_SHIFT;
 pub(crate) fn to_snorm(value: f32) -> u16 {
     ((value * 32767.0 + SNORM_SHIFT).to_bits() & 0xffff) as u16
 }
+
+#[inline(always)]
+pub(crate) fn store([component]: [f32; 1], _: u32) -> [u16; 1] {
+    [to_snorm(component)]
+}

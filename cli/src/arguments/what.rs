@@ -1,17 +1,18 @@
 //! Arguments that say what of each rotation is written.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
-use tumble::{Axes, Encoding, EulerSequence, MatrixOrder, Quantity, Skeleton};
+use tumble::{Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, Skeleton};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct What {
     /// What to write of each rotation
     #[arg(
         long = "output",
-        value_enum,
         value_name = "WHAT",
-        default_value = "quaternion"
+        default_value = "quaternion",
+        value_parser = one_of(outputs())
     )]
     output: Output,
     /// euler, BVH: the axes, about turned ones (XYZ, ZXZ …) or about fixed ones (xyz, zxz …)
@@ -34,27 +35,61 @@ pub(crate) struct What {
     axes: AxesArgument,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy)]
 enum Output {
-    /// x y z w
     Quaternion,
-    /// x y z of the axis, and degrees, 0 to 360
-    AxisAngle,
-    /// 3 × 3, for column vectors
-    Matrix,
-    /// 3 × 4, its translation 0
-    #[value(name = "matrix-3x4")]
-    Matrix3x4,
-    /// three angles, degrees
-    Euler,
-    /// angular velocity, rad/s
+    Encoded(Encoding),
     Velocity,
-    /// angular acceleration, rad/s²
     Acceleration,
-    /// (frames, tracks, 10): translation x y z, rotation x y z w, scale x y z
     Transform,
-    /// (frames, tracks, 7): where each box hangs, and how it is turned in the world
     World,
+}
+
+/// A value of an argument, with its name and its help.
+type Named<T> = (&'static str, &'static str, T);
+
+/// What `--output` knows: every representation that is no quaternion, and what is no rotation.
+fn outputs() -> Vec<Named<Output>> {
+    let others = encodings(|own| !own.is_quaternion() && own != Encoding::Vector);
+    let others = others.map(|(name, help, own)| (name, help, Output::Encoded(own)));
+    let poses = "(frames, tracks, 10): translation x y z, rotation x y z w, scale x y z";
+    let world = "(frames, tracks, 7): where each box hangs, and how it is turned in the world";
+    let mut outputs = vec![("quaternion", "x y z w", Output::Quaternion)];
+    outputs.extend(others);
+    outputs.extend([
+        ("velocity", "angular velocity, rad/s", Output::Velocity),
+        (
+            "acceleration",
+            "angular acceleration, rad/s²",
+            Output::Acceleration,
+        ),
+        ("transform", poses, Output::Transform),
+        ("world", world, Output::World),
+    ]);
+    outputs.dedup_by_key(|(name, ..)| *name); // those that differ by their options
+    outputs
+}
+
+fn encodings(filter: impl Fn(Encoding) -> bool) -> impl Iterator<Item = Named<Encoding>> {
+    let all = Encoding::KINDS.into_iter().filter(move |own| filter(*own));
+    all.map(|own| (own.name(), own.summary(), own))
+}
+
+/// Parses the name of a representation of quaternions.
+pub(crate) fn quaternions() -> impl TypedValueParser<Value = Encoding> {
+    one_of(encodings(Encoding::is_quaternion).collect())
+}
+
+/// Parses one of these names.
+fn one_of<T: Clone + Send + Sync + 'static>(
+    all: Vec<Named<T>>,
+) -> impl TypedValueParser<Value = T> {
+    let value = |&(name, help, _): &Named<T>| PossibleValue::new(name).help(help);
+    let values: Vec<PossibleValue> = all.iter().map(value).collect();
+    PossibleValuesParser::new(values).map(move |given| {
+        let own = all.iter().find(|(name, ..)| *name == given);
+        own.expect("clap takes these names alone").2.clone()
+    })
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -94,12 +129,10 @@ impl What {
             Major::Row => MatrixOrder::RowMajor,
             Major::Column => MatrixOrder::ColumnMajor,
         };
+        let sequence = self.sequence.unwrap_or(EulerSequence::XYZ);
         match self.output {
             Output::Quaternion | Output::Transform | Output::World => components,
-            Output::AxisAngle => Encoding::AxisAngle,
-            Output::Matrix => Encoding::Matrix3x3(order),
-            Output::Matrix3x4 => Encoding::Matrix3x4(order),
-            Output::Euler => Encoding::Euler(self.sequence.unwrap_or(EulerSequence::XYZ)),
+            Output::Encoded(own) => own.with(EncodingOptions { order, sequence }),
             Output::Velocity | Output::Acceleration => Encoding::Vector,
         }
     }

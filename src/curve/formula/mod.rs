@@ -12,6 +12,7 @@ pub(crate) mod rotation_vector;
 pub(crate) mod squad;
 
 use crate::math::dual::Scalar;
+use crate::math::quaternion::{dot, exp_by, square};
 
 /// How many numbers a formula may take.
 pub(crate) const NUMBERS: usize = 25;
@@ -47,29 +48,17 @@ fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize, k: S) -> [S
     ]
 }
 
-/// The Hamilton product `a b`.
-#[inline(always)]
-fn product<S: Scalar>(a: [S; 4], b: [S; 4]) -> [S; 4] {
-    [
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-    ]
-}
-
 /// The exponential of a half-rotation vector.
 #[inline(always)]
-fn exp<S: Scalar>([x, y, z]: [S; 3]) -> [S; 4] {
-    let (sinc, cosine) = (x * x + y * y + z * z).waves();
-    [sinc * x, sinc * y, sinc * z, cosine]
+fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
+    exp_by(a, square(a).waves())
 }
 
-/// `q / |q|`.
+/// `q / |q|`, whatever the length.
 #[inline(always)]
-fn normalised<S: Scalar>([x, y, z, w]: [S; 4]) -> [S; 4] {
-    let scale = (x * x + y * y + z * z + w * w).reciprocal_root();
-    [x * scale, y * scale, z * scale, w * scale]
+fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
+    let scale = dot(q, q).reciprocal_root();
+    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 
 /// `a u + b v`.
@@ -91,8 +80,8 @@ fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
 #[inline(always)]
 fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
     let minus = S::all(-1.0);
-    let [x, y, z, w] = weighted(b, S::all(1.0), a, minus);
-    let chord = (x * x + y * y + z * z + w * w) * S::all(0.25);
+    let difference = weighted(b, S::all(1.0), a, minus);
+    let chord = dot(difference, difference) * S::all(0.25);
     let square = chord.arc_square();
     let rest = S::all(1.0) - t;
     let (to_b, _) = (t * t * square).waves();

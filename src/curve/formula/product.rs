@@ -4,8 +4,9 @@
 //! Numbers: the base, the three half-rotation vectors, and for each of the three
 //! cumulative basis functions the coefficients of 1, t, t², t³.
 
-use crate::curve::formula::{Formula, NUMBERS, Numbers, exp, product, quaternion, vector};
+use crate::curve::formula::{Formula, NUMBERS, Numbers, exp, quaternion, vector};
 use crate::math::dual::Scalar;
+use crate::math::quaternion::product;
 
 pub(crate) struct Product;
 

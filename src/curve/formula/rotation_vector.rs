@@ -2,8 +2,9 @@
 //!
 //! Numbers: the base and the three half-rotation vectors.
 
-use crate::curve::formula::{Formula, NUMBERS, exp, product, quaternion, vector};
+use crate::curve::formula::{Formula, NUMBERS, exp, quaternion, vector};
 use crate::math::dual::Scalar;
+use crate::math::quaternion::product;
 
 pub(crate) struct RotationVector;
 

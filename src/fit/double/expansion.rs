@@ -7,12 +7,14 @@ use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use crate::fit::double::intervals::{LANES, load, load3, load4, rounded};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
-use crate::math::quaternion::{self, Real as _, product, scaled, square};
+use crate::math::quaternion::{
+    self, Real as _, cross3, dot3, exp_by, product, product_with_vector, scaled, square,
+};
 use crate::math::ranges::{LONG_SQUARE, SHORT_SQUARE, long_waves, short_waves};
 use crate::shader::PolynomialSegment;
-use crate::simd::lanes::{Doubles, Lanes, Number};
+use crate::simd::lanes::{Doubles, Lanes};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
-use crate::twin::small_angle::{FromIdentity, cross3, dot3, inverse_rotated};
+use crate::twin::small_angle::{FromIdentity, inverse_rotated};
 
 /// Samples a cubic by its expansion about the middle, in f32. With `OWN_BASIS` each curve has basis
 /// functions of its own; without it all share those of their shape.
@@ -111,7 +113,7 @@ impl<L: Lanes> Factor<L> {
         let (before, after) = (odd - even, odd + even);
         let far = (before * before).larger(after * after);
         Self {
-            turn: exp::<L::Doubles, WHOLE>(scaled(vector, weight)),
+            turn: exp_in_lanes::<L::Doubles, WHOLE>(scaled(vector, weight)),
             vector: [
                 L::rounded(vector[0]),
                 L::rounded(vector[1]),
@@ -127,15 +129,14 @@ impl<L: Lanes> Factor<L> {
 /// The exponentials of half-rotation vectors by polynomials; lanes whose vector is too long for
 /// them are computed over the full range.
 #[inline(always)]
-fn exp<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
+fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     let squared = square(vector);
-    let (limit, (sinc, cosine)) = if SHORT {
+    let (limit, waves) = if SHORT {
         (SHORT_SQUARE, short_waves(squared))
     } else {
         (LONG_SQUARE, long_waves(squared))
     };
-    let [x, y, z] = scaled(vector, sinc);
-    let turn = [x, y, z, cosine];
+    let turn = exp_by(vector, waves);
     if squared.are_at_most(limit) {
         return turn;
     }
@@ -181,17 +182,6 @@ fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
     lanes
 }
 
-/// The product `a v` of a quaternion and a vector.
-#[inline(always)]
-pub(crate) fn about<N: Number>(a: [N; 4], v: [N; 3]) -> [N; 4] {
-    [
-        a[3] * v[0] + a[1] * v[2] - a[2] * v[1],
-        a[3] * v[1] - a[0] * v[2] + a[2] * v[0],
-        a[3] * v[2] + a[0] * v[1] - a[1] * v[0],
-        -a[0] * v[0] - a[1] * v[1] - a[2] * v[2],
-    ]
-}
-
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.
 pub(crate) type SineCosm1<L> = (L, L);
 
@@ -215,7 +205,7 @@ impl<L: Lanes> AboutMiddle<L> {
         let [x, y, z] = cross3(v2, v3);
         Self {
             middle,
-            first: about(middle, v1),
+            first: product_with_vector(middle, v1),
             second: v2,
             third: v3,
             both: [x, y, z, -dot3(v2, v3)],

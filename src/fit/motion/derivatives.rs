@@ -6,7 +6,7 @@ use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
 use crate::fit::double::intervals::LANES;
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::Dual;
-use crate::math::quaternion::{Quaternion, Vector, product, step};
+use crate::math::quaternion::{Quaternion, rotated, step};
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -36,12 +36,6 @@ pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quate
 fn finite(value: f64) -> f64 {
     let largest = 0.25 * f64::from(f32::MAX);
     value.clamp(-largest, largest)
-}
-
-/// `q v q⁻¹`.
-fn rotated(q: Quaternion, [x, y, z]: Vector) -> Vector {
-    let [a, b, c, _] = product(product(q, [x, y, z, 0.0]), [-q[0], -q[1], -q[2], q[3]]);
-    [a, b, c]
 }
 
 /// Fits a block's velocities or accelerations.

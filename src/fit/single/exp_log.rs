@@ -1,7 +1,7 @@
 //! Exponentials and logarithms in f32 vector lanes, and rows of f32 numbers.
 
 use crate::fit::double::intervals::ROOM;
-use crate::math::quaternion::{Real as _, scaled, square, sum};
+use crate::math::quaternion::{Real as _, exp_by, scaled, square, sum};
 use crate::math::ranges::medium_waves;
 use crate::simd::lanes::{Lanes, Number};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
@@ -33,20 +33,21 @@ pub(crate) const LONG_LOG: [f32; 10] = [
     0.005_381_98,
 ];
 
-/// The exponential of a half-rotation vector up to pi/4.
+/// The exponential of a half-rotation vector up to pi/4, as its difference from the identity.
 #[inline(always)]
 pub(crate) fn short_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
-    let (sinc, cosm1) = sine_cosm1_quarter(N::all(1.0), square(v));
-    FromIdentity {
-        vector: scaled(v, sinc),
-        cosm1,
-    }
+    exp_from_identity(v, sine_cosm1_quarter(N::all(1.0), square(v)))
 }
 
 /// The same up to pi/2.
 #[inline(always)]
 pub(crate) fn long_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
-    let (sinc, cosm1) = sine_cosm1(N::all(1.0), square(v));
+    exp_from_identity(v, sine_cosm1(N::all(1.0), square(v)))
+}
+
+/// As [`exp_by`], with the cosine minus one.
+#[inline(always)]
+fn exp_from_identity<N: Number>(v: [N; 3], (sinc, cosm1): (N, N)) -> FromIdentity<N> {
     FromIdentity {
         vector: scaled(v, sinc),
         cosm1,
@@ -56,16 +57,14 @@ pub(crate) fn long_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
 /// The exponential of `times` a vector, in f64: within 7e-9 for squared lengths up to
 /// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE).
 #[inline(always)]
-pub(crate) fn exact_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
+pub(crate) fn medium_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
     let times = L::Doubles::all(f64::from(times));
     let vector = [
         x.widened() * times,
         y.widened() * times,
         z.widened() * times,
     ];
-    let (sinc, cosine) = medium_waves(square(vector));
-    let [x, y, z] = scaled(vector, sinc);
-    [x, y, z, cosine]
+    exp_by(vector, medium_waves(square(vector)))
 }
 
 #[inline(always)]

@@ -7,16 +7,18 @@
 //! the rounding errors of all others would add up in it.
 
 use crate::fit::double::intervals::{Intervals, ROOM, squared_extent};
-use crate::fit::single::exp_log::{LONG_LOG, Row, exact_exp, load3, log, long_exp, store, widened};
+use crate::fit::single::exp_log::{
+    LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
+};
 use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
-use crate::math::quaternion::{self, Real as _, dot, product, scaled, square, sum};
+use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
 use crate::math::ranges::MEDIUM_SQUARE;
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
-use crate::twin::small_angle::{composed, minus};
+use crate::twin::small_angle::composed;
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
 /// [`LARGEST_COSINE_MINUS_ONE`]; from Chebyshev nodes, within 5e-10.
@@ -199,7 +201,7 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 
     // Keys have norm 1 to f32's precision: one step of Newton's method normalises both.
     let scale = all(1.5) - all(0.5) * dot(start, start) * dot(end, end);
     let step = [x * scale, y * scale, z * scale, w * scale];
-    let [x, y, z, w] = product(product(exact_exp(w1, -1.0), step), exact_exp(w3, -1.0));
+    let [x, y, z, w] = product(product(medium_exp(w1, -1.0), step), medium_exp(w3, -1.0));
     let u = all(1.0) - w;
     let [c0, c1, c2, c3, c4, c5, c6, c7] = MEDIUM_LOG;
     let uu = u * u;

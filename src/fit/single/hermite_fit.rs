@@ -3,15 +3,17 @@
 //! that only one or two pairs of nodes are sampled.
 
 use crate::fit::both_sides::Sides;
-use crate::fit::double::expansion::{AboutMiddle, SineCosm1, about};
+use crate::fit::double::expansion::{AboutMiddle, SineCosm1};
 use crate::fit::double::fit::{MOST, Samples, interpolate};
 use crate::fit::double::intervals::rounded;
-use crate::fit::single::exp_log::{exact_exp, long_exp, short_exp, widened};
+use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp, widened};
 use crate::fit::single::fit_part::{Gain, HALF, LAST_HALF, Part, Place, SEAM};
-use crate::math::quaternion::{normalised, product, scaled, square, sum};
+use crate::math::quaternion::{
+    cross3, normalised, product, product_with_vector, scaled, square, sum,
+};
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::small_angle::{FromIdentity, composed, cross3, inverse_rotated};
+use crate::twin::small_angle::{composed, inverse_rotated};
 
 /// Curves `q₀ exp(w₁ b₁) exp(w₂ b₂) exp(w₃ b₃)`, a lane to each.
 #[derive(Clone, Copy)]
@@ -108,7 +110,7 @@ impl<L: Lanes> End<L> {
     fn new(rotation: [L; 4], vector: [L; 3], times: f32) -> Self {
         Self {
             rotation,
-            slope: about(rotation, scaled(vector, L::all(times))),
+            slope: product_with_vector(rotation, scaled(vector, L::all(times))),
         }
     }
 
@@ -134,15 +136,15 @@ impl<L: Lanes> Moment<L> {
     #[inline(always)]
     fn new<const EXACT: bool>(start: [L; 4], vectors: [[L; 3]; 3], place: &Place) -> Self {
         let ([w1, w2, w3], [b1, b2, b3]) = (vectors, place.weights);
-        let third_turn = exp(w3, b3);
-        let second_turn = composed(exp(w2, b2), third_turn);
+        let third_turn = short_exp(scaled(w3, L::all(b3)));
+        let second_turn = composed(short_exp(scaled(w2, L::all(b2))), third_turn);
         let rotation = if EXACT {
             // Curves that are halved turn farther; f32 would round too much in this product.
-            let turn = product(exact_exp(w1, b1), exact_exp(w2, b2));
-            let turn = product(turn, exact_exp(w3, b3));
+            let turn = product(medium_exp(w1, b1), medium_exp(w2, b2));
+            let turn = product(turn, medium_exp(w3, b3));
             rounded::<L>(product(normalised(widened(start)), turn))
         } else {
-            let turn = composed(exp(w1, b1), second_turn);
+            let turn = composed(short_exp(scaled(w1, L::all(b1))), second_turn);
             let [x, y, z] = turn.vector;
             let [x, y, z, w] = product(start, [x, y, z, turn.cosm1]);
             [x + start[0], y + start[1], z + start[2], w + start[3]]
@@ -165,12 +167,6 @@ impl<L: Lanes> Moment<L> {
             scaled(v3, L::all(r3)),
         ]
     }
-}
-
-/// The exponential of `times` a vector.
-#[inline(always)]
-fn exp<L: Lanes>(vector: [L; 3], times: f32) -> FromIdentity<L> {
-    short_exp(scaled(vector, L::all(times)))
 }
 
 /// The vectors of the same curves from their ends. With `Bᵢ' = 1 - Bᵢ` the curves are
@@ -253,7 +249,7 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     let bend = sum(ends, scaled(v2, L::all(b2)));
     // u₁ × rate is u₁ × u₂ + u₁ × u₃, as u₁ × u₁ is 0.
     let turning = sum(cross3(u1, rate), cross3(u2, u3));
-    let [x, y, z, w] = about(m, sum(bend, turning));
+    let [x, y, z, w] = product_with_vector(m, sum(bend, turning));
     let half = square(rate) * L::all(0.5);
     let half_second = [
         x - m[0] * half,
@@ -261,7 +257,7 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
         z - m[2] * half,
         w - m[3] * half,
     ];
-    samples.set_middle(about(m, rate), half_second);
+    samples.set_middle(product_with_vector(m, rate), half_second);
 }
 
 #[inline(always)]

@@ -3,6 +3,7 @@
 
 use crate::fit::double::intervals::{Intervals, ROOM};
 use crate::fit::single::exp_log::{LOG, Row, log, store};
+use crate::math::quaternion::dot;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::{FromIdentity, chord_of, step_vector};
@@ -41,8 +42,7 @@ impl InLanes for FindSteps<'_> {
         for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
             let start = L::load_rotations(&from[lane..]);
             let chord = chord_of(start, L::load_rotations(&to[lane..]));
-            let [x, y, z, w] = chord;
-            let chord_square = x * x + y * y + z * z + w * w;
+            let chord_square = dot(chord, chord);
             let step = FromIdentity {
                 vector: step_vector(start, chord),
                 cosm1: chord_square * L::all(-0.5),

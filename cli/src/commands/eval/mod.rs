@@ -17,7 +17,7 @@ use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Wanted, wanted};
 use crate::arguments::results::{Results, each_file};
 use crate::arguments::time::{Samples, Sampling};
-use crate::arguments::what::What;
+use crate::arguments::what::{What, quaternions};
 use crate::batch::digest;
 use crate::batch::output::Target;
 use crate::batch::place::Written;
@@ -71,8 +71,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "xyzw")]
     order: OrderArgument,
     /// What a component of NPY results is stored as
-    #[arg(long, value_enum, default_value = "f32")]
-    encoding: EncodingArgument,
+    #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
+    encoding: Encoding,
     #[command(flatten)]
     what: What,
     /// Also say which way each input takes to its rotations; all ways give the same bits
@@ -94,26 +94,6 @@ enum OrderArgument {
     Wxyz,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum EncodingArgument {
-    /// float32
-    F32,
-    /// float16: half the size, within 2.5e-4 of each component
-    F16,
-    /// int16, to be divided by 32767: half the size, within 1.6e-5
-    Snorm16,
-}
-
-impl From<EncodingArgument> for Encoding {
-    fn from(encoding: EncodingArgument) -> Self {
-        match encoding {
-            EncodingArgument::F32 => Self::F32,
-            EncodingArgument::F16 => Self::F16,
-            EncodingArgument::Snorm16 => Self::Snorm16,
-        }
-    }
-}
-
 impl From<OrderArgument> for ComponentOrder {
     fn from(order: OrderArgument) -> Self {
         match order {
@@ -131,14 +111,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = arguments.sampling.samples()?;
     let plan = arguments.results.plan(&inputs)?;
     let is_text = |target: &Target| target.format().write.as_ref().is_some_and(|it| it.is_text);
-    let short = arguments.encoding != EncodingArgument::F32;
+    let short = arguments.encoding != Encoding::F32;
     if short && plan.targets.iter().any(is_text) {
         return Err(Failure::usage(
             "--encoding is for binary results (NPY); text holds every digit",
         ));
     }
-    let encoding = arguments.what.encoding(arguments.encoding.into());
-    if short && encoding != arguments.encoding.into() {
+    let encoding = arguments.what.encoding(arguments.encoding);
+    if short && encoding != arguments.encoding {
         return Err(Failure::usage("--encoding is for quaternions"));
     }
     let mut device = arguments.device.open()?;

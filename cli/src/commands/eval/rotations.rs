@@ -30,7 +30,7 @@ impl Job<'_> {
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let encoding = arguments.what.encoding(arguments.encoding.into());
+        let encoding = arguments.what.encoding(arguments.encoding);
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
         let wished = match arguments.layout {
             LayoutArgument::Track => Layout::TrackMajor,

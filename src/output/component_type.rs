@@ -1,0 +1,86 @@
+//! What the components of a representation are stored as.
+
+/// What a component of a representation is stored as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ComponentType {
+    /// IEEE 754 single precision.
+    F32,
+    /// IEEE 754 half precision.
+    F16,
+    /// A whole number of 1/32767, in 16 bits.
+    Snorm16,
+}
+
+impl ComponentType {
+    /// Bytes of one component.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::F16 | Self::Snorm16 => 2,
+        }
+    }
+
+    /// The number that is stored.
+    pub(crate) fn decode(self, bytes: &[u8]) -> f32 {
+        let half = || u16::from_ne_bytes([bytes[0], bytes[1]]);
+        match self {
+            Self::F32 => bytemuck::pod_read_unaligned(bytes),
+            Self::F16 => from_half(half()),
+            // -32768 means -1 too.
+            Self::Snorm16 => (f32::from(half() as i16) / 32767.0).max(-1.0),
+        }
+    }
+}
+
+fn from_half(half: u16) -> f32 {
+    let magnitude = u32::from(half & 0x7fff);
+    let value = if magnitude < 0x0400 {
+        magnitude as f32 * 2.0f32.powi(-24)
+    } else {
+        f32::from_bits((magnitude << 13) + 0x3800_0000)
+    };
+    if half & 0x8000 == 0 { value } else { -value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::f16::to_half;
+    use crate::twin::snorm16::to_snorm;
+
+    /// Every half from 0 to 1, and values between two of them: the nearest half is stored, and the
+    /// even one if two are equally near.
+    #[test]
+    fn halves_are_the_nearest() {
+        for half in 0..0x3c00u16 {
+            let (low, high) = (from_half(half), from_half(half + 1));
+            let middle = low + (high - low) * 0.5; // exact
+            let even = if half & 1 == 0 { half } else { half + 1 };
+            for (value, expected) in [
+                (low, half),
+                (middle.next_down(), half),
+                (middle, even),
+                (middle.next_up(), half + 1),
+                (high, half + 1),
+            ] {
+                let stored = to_half(value);
+                assert_eq!(stored, expected, "{value}");
+                assert_eq!(to_half(-value), expected | 0x8000);
+            }
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_the_nearest() {
+        for n in -32767..=32767i32 {
+            let value = n as f32 / 32767.0;
+            assert_eq!(to_snorm(value), n as i16 as u16);
+            let off = (f64::from(n) + 0.49) / 32767.0;
+            assert_eq!(to_snorm(off as f32), n as i16 as u16);
+        }
+        // A component may pass 1 by rounding.
+        assert_eq!(to_snorm(1.000_000_4), 32767);
+        assert_eq!(to_snorm(-1.000_000_4), -32767i16 as u16);
+    }
+}
