@@ -7,6 +7,7 @@ pub mod dat;
 pub mod diagnostic;
 pub mod format;
 pub mod generate;
+pub mod gltf;
 mod grid;
 pub mod keys;
 pub mod motion;
