@@ -2,4 +2,6 @@
 
 mod dat_fixtures;
 mod fixtures;
+mod gltf_new;
 mod support;
+mod validator;

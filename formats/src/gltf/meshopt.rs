@@ -130,7 +130,7 @@ pub(crate) fn decode_attributes(
     filter: Filter,
 ) -> Result<Vec<u8>, MeshoptError> {
     let not = |allowed| Err(MeshoptError::Stride { stride, allowed });
-    if !(4..=256).contains(&stride) || stride % 4 != 0 {
+    if !(4..=256).contains(&stride) || !stride.is_multiple_of(4) {
         return not("it is a multiple of 4, from 4 to 256");
     }
     if filter == Filter::Quaternion && stride != 8 {

@@ -5,3 +5,4 @@
     expect(dead_code, reason = "called by the reader of buffer views")
 )]
 mod meshopt;
+pub mod write_new;
