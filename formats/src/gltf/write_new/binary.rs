@@ -41,9 +41,11 @@ impl Data<'_> {
 
 /// Numbers as a file has them: little-endian.
 fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
-    values
-        .flat_map(|value| value.map(f32::to_le_bytes).into_iter().flatten())
-        .collect()
+    let mut bytes = Vec::with_capacity(4 * N * values.size_hint().0);
+    for number in values.flatten() {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes
 }
 
 /// All binary data, in the order of its accessors. Every value is of f32, so everything is aligned
