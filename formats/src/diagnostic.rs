@@ -152,6 +152,11 @@ codes! {
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Unrecognised = "E031", "an unknown format", "Neither the first bytes nor the ending of the name tell a format that can be read; --format names it.";
     // E1xx and W1xx: glTF.
+    NothingToAnimate = "E180", "nothing to animate", "An animation in glTF has at least one time and one channel; clips without tracks or samples cannot be written.";
+    NotTrees = "E181", "joints that are no trees", "Nodes of glTF have one parent, are not their own ancestors, and have finite transforms relative to it; the clip's joints are not such.";
+    TimesInF32 = "E182", "times that f32 cannot tell apart", "Times in glTF are f32, which has 24 bits: after a day, times are 7.8 ms from each other. Use a lower rate, or times nearer to 0.";
+    TimesBelowZero = "E183", "times below 0", "Times in glTF begin at 0 or later.";
+    GlbTooLong = "E184", "too long for GLB", "A GLB has lengths of 32 bits, at most 4 GiB. Write fewer samples, or the clips to several files.";
     // E2xx and W2xx: BVH.
     BvhStart = "E200", "no HIERARCHY", "A BVH file begins with the word HIERARCHY, then its joints, then MOTION.";
     BvhWord = "E201", "a word that has no place", "Joints are ROOT or JOINT and a name, then in braces an OFFSET, CHANNELS, and further JOINTs or an End Site.";

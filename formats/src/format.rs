@@ -159,6 +159,9 @@ pub type WriteMotion =
 pub struct MotionOptions {
     /// What messages call the output.
     pub name: String,
+    /// By which of the format's name and extensions it was asked for, where they differ: `gltf` is
+    /// text, `glb` is binary.
+    pub format: String,
     /// The axes of the angles, for formats that have angles (BVH) [default: ZXY].
     pub sequence: Option<EulerSequence>,
 }

@@ -11,6 +11,7 @@ mod decimal;
 pub mod diagnostic;
 pub mod format;
 pub mod generate;
+pub mod gltf;
 mod grid;
 pub mod keyed;
 pub mod keys;

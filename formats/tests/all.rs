@@ -3,5 +3,6 @@
 mod bvh;
 mod dat_fixtures;
 mod fixtures;
+mod gltf_new;
 mod support;
-mod tum;
+mod validator;

@@ -1,0 +1,341 @@
+//! Meshopt's attribute streams, versions 0 and 1, as the appendices of `KHR_meshopt_compression`
+//! specify them; `EXT_meshopt_compression` has version 0.
+//!
+//! A stream is a header byte, blocks of up to 256 elements, and a tail that holds the element before
+//! the first. An element has `stride` bytes. A block stores its elements' first bytes, then their
+//! second bytes and so on, each such list in groups of 16. What is stored is the difference from the
+//! element before, in 0, 1, 2, 4 or 8 bits. Four bytes of an element that begin at a multiple of
+//! four are a channel; in version 1 the tail says how the differences of each channel are to be
+//! applied.
+
+#![forbid(unsafe_code)]
+
+use std::array;
+use std::f32::consts::FRAC_1_SQRT_2;
+
+/// Elements of a group.
+const GROUP: usize = 16;
+/// Elements of a block, at most.
+const BLOCK: usize = 256;
+/// Bytes that a block decodes to, at most.
+const BLOCK_BYTES: usize = 8192;
+
+/// What is done to decoded elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Filter {
+    /// Nothing.
+    None,
+    /// Three components and the place of the largest become four normalised i16, `x y z w`.
+    Quaternion,
+    /// A mantissa of 24 bits and an exponent of 8 become an f32.
+    Exponential,
+}
+
+/// Why a view cannot be decoded.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum MeshoptError {
+    /// Triangles, indices, or what is unknown.
+    #[error("the meshopt mode is `{0}`; animations are stored in the mode ATTRIBUTES alone")]
+    Mode(String),
+    /// Normals, colours, or what is unknown.
+    #[error(
+        "the meshopt filter is `{0}`; animations are stored with NONE, QUATERNION or EXPONENTIAL"
+    )]
+    Filter(String),
+    /// An element's length that the format does not have.
+    #[error("the meshopt stride is {stride} bytes; {allowed}")]
+    Stride {
+        /// Bytes of an element.
+        stride: usize,
+        /// Which there are.
+        allowed: &'static str,
+    },
+    /// Another header byte.
+    #[error("the meshopt stream begins with {0:#04x}; 0xa0 and 0xa1 (versions 0 and 1) are read")]
+    Version(u8),
+    /// Fewer bytes than the shortest stream of so many elements.
+    #[error(
+        "{count} elements of {stride} bytes need a meshopt stream of {needed} bytes or more, and \
+         this one has {given}; export the file again"
+    )]
+    Short {
+        /// Elements said to be there.
+        count: usize,
+        /// Bytes of an element.
+        stride: usize,
+        /// The length of the shortest such stream.
+        needed: u128,
+        /// Bytes given.
+        given: usize,
+    },
+    /// The blocks run into the tail.
+    #[error(
+        "the meshopt stream of {given} bytes ends within the block that begins with element \
+         {element}; it is cut or damaged: export the file again"
+    )]
+    Cut {
+        /// Bytes given.
+        given: usize,
+        /// The first element of the block, counted from 0.
+        element: usize,
+    },
+    /// Bytes between the last block and the tail.
+    #[error(
+        "{left} bytes of the meshopt stream are left after its {count} elements; it is damaged: \
+         export the file again"
+    )]
+    LeftOver {
+        /// How many.
+        left: usize,
+        /// Elements decoded.
+        count: usize,
+    },
+    /// An unknown way to apply differences.
+    #[error(
+        "channel {channel} of the meshopt stream has the unknown mode {mode:#04x}; export the \
+         file again, with version 0 or 1 of the codec"
+    )]
+    Channel {
+        /// Which four bytes of an element, counted from 0.
+        channel: usize,
+        /// The mode's byte.
+        mode: u8,
+    },
+}
+
+impl Filter {
+    /// The filter of a view, by the properties `mode` and `filter` of its extension object.
+    pub(crate) fn named(mode: &str, filter: Option<&str>) -> Result<Self, MeshoptError> {
+        if mode != "ATTRIBUTES" {
+            return Err(MeshoptError::Mode(mode.to_owned()));
+        }
+        match filter {
+            None | Some("NONE") => Ok(Self::None),
+            Some("QUATERNION") => Ok(Self::Quaternion),
+            Some("EXPONENTIAL") => Ok(Self::Exponential),
+            Some(other) => Err(MeshoptError::Filter(other.to_owned())),
+        }
+    }
+}
+
+/// Decodes `count` elements of `stride` bytes each, `count * stride` bytes in all. The caller has
+/// compared that product with its limits; the shortest streams decode to 1024 times their length.
+///
+/// # Errors
+/// When `bytes` are not exactly a stream of so many elements.
+pub(crate) fn decode_attributes(
+    bytes: &[u8],
+    count: usize,
+    stride: usize,
+    filter: Filter,
+) -> Result<Vec<u8>, MeshoptError> {
+    let not = |allowed| Err(MeshoptError::Stride { stride, allowed });
+    if !(4..=256).contains(&stride) || !stride.is_multiple_of(4) {
+        return not("it is a multiple of 4, from 4 to 256");
+    }
+    if filter == Filter::Quaternion && stride != 8 {
+        return not("the filter QUATERNION has 8");
+    }
+    let has_channels = match bytes.first() {
+        Some(0xa0) => false,
+        Some(0xa1) => true,
+        other => return Err(MeshoptError::Version(other.copied().unwrap_or(0))),
+    };
+    // The tail ends with the element before the first and, in version 1, the channels' modes. It is
+    // padded at its front, so that decoders may read past a group's end.
+    let channels = if has_channels { stride / 4 } else { 0 };
+    let tail = (stride + channels).max(if has_channels { 24 } else { 32 });
+    let block = (BLOCK_BYTES / stride / GROUP * GROUP).min(BLOCK);
+    let needed = 1 + tail as u128 + least_body(count, stride, block, has_channels);
+    let size = count
+        .checked_mul(stride)
+        .filter(|_| needed <= bytes.len() as u128);
+    let Some(size) = size else {
+        return Err(MeshoptError::Short {
+            count,
+            stride,
+            needed,
+            given: bytes.len(),
+        });
+    };
+    let (before, modes) = bytes[bytes.len() - stride - channels..].split_at(stride);
+    for (channel, &mode) in modes.iter().enumerate() {
+        if !matches!(mode, 0 | 1) && mode & 15 != 2 {
+            return Err(MeshoptError::Channel { channel, mode });
+        }
+    }
+    let mut body = &bytes[1..bytes.len() - tail];
+    let mut output = vec![0; size];
+    let mut before = before.to_vec();
+    for (index, block_output) in output.chunks_mut(block * stride).enumerate() {
+        if decode_block(&mut body, modes, &mut before, block_output).is_none() {
+            return Err(MeshoptError::Cut {
+                given: bytes.len(),
+                element: index * block,
+            });
+        }
+    }
+    if !body.is_empty() {
+        let left = body.len();
+        return Err(MeshoptError::LeftOver { left, count });
+    }
+    match filter {
+        Filter::None => {}
+        Filter::Quaternion => output.as_chunks_mut().0.iter_mut().for_each(quaternion),
+        Filter::Exponential => output.as_chunks_mut().0.iter_mut().for_each(exponential),
+    }
+    Ok(output)
+}
+
+/// The fewest bytes that so many elements can take between the header and the tail: two bits a
+/// group in version 0, two bits a block in version 1, each for every byte of an element.
+fn least_body(count: usize, stride: usize, block: usize, has_channels: bool) -> u128 {
+    let stride = stride as u128;
+    if has_channels {
+        return count.div_ceil(block) as u128 * (stride / 4);
+    }
+    let headers = |elements: usize| elements.div_ceil(GROUP).div_ceil(4) as u128;
+    ((count / block) as u128 * headers(block) + headers(count % block)) * stride
+}
+
+/// The next `count` bytes, `None` where they are not there.
+fn take<'a>(body: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
+    let (taken, rest) = body.split_at_checked(count)?;
+    *body = rest;
+    Some(taken)
+}
+
+/// Decodes the elements of one block. `before` is the element before the first, then the last of
+/// the block; `modes` are those of the channels, empty in version 0.
+fn decode_block(
+    body: &mut &[u8],
+    modes: &[u8],
+    before: &mut [u8],
+    output: &mut [u8],
+) -> Option<()> {
+    let stride = before.len();
+    let elements = output.len() / stride;
+    let controls = take(body, modes.len())?;
+    let mut lists = [[0; BLOCK]; 4];
+    for (channel, before) in before.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        for (byte, list) in lists.iter_mut().enumerate() {
+            let control = controls.get(channel).map(|bits| bits >> (2 * byte) & 3);
+            decode_list(body, control, elements, list)?;
+        }
+        let mode = modes.get(channel).copied().unwrap_or(0);
+        for (element, own) in output.chunks_exact_mut(stride).enumerate() {
+            let difference = lists.each_ref().map(|list| list[element]);
+            *before = apply(*before, difference, mode);
+            own[4 * channel..][..4].copy_from_slice(before);
+        }
+    }
+    Some(())
+}
+
+/// Decodes the differences of one byte of all elements of a block; `control` are its two bits in
+/// the block's header, which version 0 does not have.
+fn decode_list(
+    body: &mut &[u8],
+    control: Option<u8>,
+    elements: usize,
+    list: &mut [u8; BLOCK],
+) -> Option<()> {
+    let widths = match control {
+        None => [0, 2, 4, 8],
+        Some(0) => [0, 1, 2, 4],
+        Some(1) => [1, 2, 4, 8],
+        Some(2) => {
+            list.fill(0);
+            return Some(());
+        }
+        Some(_) => {
+            list[..elements].copy_from_slice(take(body, elements)?);
+            return Some(());
+        }
+    };
+    let groups = elements.div_ceil(GROUP);
+    let header = take(body, groups.div_ceil(4))?;
+    for (group, list) in list.as_chunks_mut().0.iter_mut().take(groups).enumerate() {
+        let place = header[group / 4] >> (2 * (group % 4)) & 3;
+        decode_group(body, widths[usize::from(place)], list)?;
+    }
+    Some(())
+}
+
+/// Decodes 16 differences of `width` bits. One with all bits set is a byte behind the others; those
+/// of one bit begin at a byte's lowest, wider ones at its highest.
+fn decode_group(body: &mut &[u8], width: usize, list: &mut [u8; GROUP]) -> Option<()> {
+    let packed = take(body, 2 * width)?;
+    match width {
+        0 => list.fill(0),
+        8 => list.copy_from_slice(packed),
+        _ => {
+            let all_set = (1 << width) - 1;
+            let in_byte = 8 / width;
+            for (place, difference) in list.iter_mut().enumerate() {
+                let low = place % in_byte * width;
+                let shift = if width == 1 { low } else { 8 - width - low };
+                *difference = packed[place / in_byte] >> shift & all_set;
+                if *difference == all_set {
+                    *difference = take(body, 1)?[0];
+                }
+            }
+        }
+    }
+    Some(())
+}
+
+/// Four bytes of an element, from those of the element before and a difference: of bytes (mode 0)
+/// or of pairs of bytes (1), whose lowest bit says that the others are to be inverted, or exclusive
+/// or of all four, turned left by the mode's upper bits.
+fn apply(before: [u8; 4], difference: [u8; 4], mode: u8) -> [u8; 4] {
+    match mode & 15 {
+        0 => array::from_fn(|byte| {
+            let v = difference[byte];
+            before[byte].wrapping_add((v >> 1) ^ (v & 1).wrapping_neg())
+        }),
+        1 => {
+            let [before, difference] = [before, difference]
+                .map(|[a, b, c, d]| [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])]);
+            let [[a, b], [c, d]] = array::from_fn(|pair| {
+                let v = difference[pair];
+                let sum = before[pair].wrapping_add((v >> 1) ^ (v & 1).wrapping_neg());
+                sum.to_le_bytes()
+            });
+            [a, b, c, d]
+        }
+        _ => {
+            let difference = u32::from_le_bytes(difference).rotate_right((mode >> 4).into());
+            (u32::from_le_bytes(before) ^ difference).to_le_bytes()
+        }
+    }
+}
+
+/// Three components as parts of `one`, times the root of 2, become `x y z w` as normalised i16. The
+/// fourth input is `one`, but its two lowest bits, which say which component is left out: the
+/// largest, which is positive. Nothing is rounded before the root where `one` has up to 12 bits,
+/// and the order of operations is meshoptimizer's, so that the results are the same.
+fn quaternion(element: &mut [u8; 8]) {
+    let input: [i16; 4] =
+        array::from_fn(|i| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]));
+    let [x, y, z, one] = [input[0], input[1], input[2], input[3] | 3].map(f32::from);
+    let largest = (2.0 * (one * one) - (x * x + (y * y + z * z))).max(0.0);
+    let scale = 32767.0 * FRAC_1_SQRT_2 / one;
+    let place = usize::from(element[6] & 3);
+    for (i, component) in [largest.sqrt(), x, y, z].into_iter().enumerate() {
+        // Conversions of floats to integers saturate.
+        let rounded = (component * scale).round_ties_even() as i16;
+        element[(place + i) % 4 * 2..][..2].copy_from_slice(&rounded.to_le_bytes());
+    }
+}
+
+/// A mantissa in the 24 lower bits, times 2 to the power of the 8 upper bits, both signed.
+fn exponential(element: &mut [u8; 4]) {
+    let bits = i32::from_le_bytes(*element);
+    let (mantissa, exponent) = (bits << 8 >> 8, bits >> 24);
+    let power = f64::from_bits(((1023 + exponent) as u64) << 52);
+    *element = ((f64::from(mantissa) * power) as f32).to_le_bytes();
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,286 @@
+//! Clips of any format as a new glTF file: a node for each track, skins that make bones of the
+//! joints, and an animation for each clip. In its binary data, the inverse bind matrices come first,
+//! then each animation's times and the samples of its channels.
+
+mod binary;
+mod json;
+mod rig;
+mod samples;
+
+use std::io::{self, BufWriter, Write};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{MotionOptions, WriteError};
+use crate::gltf::write_new::binary::{Binary, Data};
+use crate::gltf::write_new::json::{
+    Animation, Asset, Buffer, Channel, Root, Sampler, Scene, Skin, Target,
+};
+use crate::gltf::write_new::rig::{Nodes, UniqueNames};
+use crate::gltf::write_new::samples::{Property, Samples};
+use crate::motion::Sampled;
+
+/// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
+const HEADERS: u64 = 28;
+
+/// Writes clips as GLB, or where the options' `format` is `gltf`, as text with the binary data
+/// inside it; text takes memory for all of it.
+///
+/// Clips with the same track names, parents and rest transforms move the same nodes; others get
+/// nodes of their own. Tracks of a clip without skeleton are roots without skin. Poses in the world
+/// become relative to the parents. Rotations are f32, each with the sign that continues the one
+/// before it; translations and scales are written of joints where they leave the rest pose. Steps
+/// stay steps, all else is linear.
+///
+/// # Errors
+/// When writing fails; [`Code::NothingToAnimate`], [`Code::NotTrees`], [`Code::TimesInF32`],
+/// [`Code::TimesBelowZero`], [`Code::GlbTooLong`]; `InvalidInput` when the lists of a clip differ
+/// in length. Nothing is written then but by the system's fault.
+pub fn write_new(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let mut nodes = Nodes::default();
+    let parts = parts(clips, options, &mut nodes)?;
+    let mut binary = Binary::default();
+    let mut skins = Vec::new();
+    for (joints, matrices) in nodes.skins {
+        skins.push(Skin {
+            inverse_bind_matrices: binary.push(Data::Matrices(matrices)),
+            skeleton: joints[0],
+            joints,
+        });
+    }
+    let mut names = UniqueNames::default();
+    let mut animations = Vec::new();
+    for (place, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
+        let mut animation = animation(&mut binary, part);
+        let name = clip.clip.name.clone();
+        animation.name = name.map(|name| names.unique(name, place));
+        let notes = clip.notes.iter();
+        animation.extras = notes
+            .map(|(key, note)| ((*key).to_owned(), Value::from(note.as_str())))
+            .collect();
+        animations.push(animation);
+    }
+    let root = Root {
+        asset: Asset {
+            version: "2.0",
+            generator: concat!("Tumble ", env!("CARGO_PKG_VERSION")),
+        },
+        scene: 0,
+        scenes: [Scene { nodes: nodes.roots }],
+        nodes: nodes.list,
+        skins,
+        animations,
+        accessors: std::mem::take(&mut binary.accessors),
+        buffers: [Buffer {
+            uri: None,
+            byte_length: binary.length(),
+        }],
+        buffer_views: binary.views.clone(),
+    };
+    let json = serde_json::to_vec(&root).map_err(io::Error::from)?;
+    let length = glb_length(json.len() as u64, binary.length())
+        .map_err(|why| Diagnostic::new(&options.name, Code::GlbTooLong, why))?;
+    let mut out = BufWriter::new(out);
+    if options.format.eq_ignore_ascii_case("gltf") {
+        write_text(root, &binary, &mut out)?;
+    } else {
+        write_glb(json, &binary, length, &mut out)?;
+    }
+    out.flush()?;
+    Ok(Vec::new())
+}
+
+/// A clip that can be written.
+struct Part<'a> {
+    samples: Samples<'a>,
+    times: Vec<f32>,
+    /// The node of its first track; the others follow.
+    first_node: usize,
+}
+
+/// Checks all clips, and adds their nodes.
+fn parts<'a>(
+    clips: &'a [Sampled<'a>],
+    options: &MotionOptions,
+    nodes: &mut Nodes,
+) -> Result<Vec<Part<'a>>, WriteError> {
+    // The first clip of each skeleton, and the node of its first track.
+    let mut skeletons: Vec<(&Sampled<'_>, usize)> = Vec::new();
+    let mut parts = Vec::new();
+    for (place, clip) in clips.iter().enumerate() {
+        let refuse = |(code, why): (Code, String)| {
+            let name = clip.clip.name.as_deref().map(|name| format!(" ({name})"));
+            let message = format!("clip {}{}: {why}", place + 1, name.unwrap_or_default());
+            Diagnostic::new(&options.name, code, message)
+        };
+        let samples = Samples::of(clip)?;
+        let times = f32_times(samples, clip.times).map_err(refuse)?;
+        if samples.has_scaled_parents_in_world() {
+            let why = "its poses are in the world and its joints have scales, so they cannot be \
+                       made relative to their parents; write it without scales";
+            return Err(refuse((Code::NotTrees, why.to_owned())).into());
+        }
+        let mut known = skeletons.iter();
+        let first_node = match known.find(|(other, _)| have_one_skeleton(other, clip)) {
+            Some(&(_, first)) => first,
+            None => {
+                let first = nodes.add(clip.clip);
+                let first = first.map_err(|why| refuse((Code::NotTrees, why)))?;
+                skeletons.push((clip, first));
+                first
+            }
+        };
+        parts.push(Part {
+            samples,
+            times,
+            first_node,
+        });
+    }
+    if parts.is_empty() {
+        let message = "there is no clip to write; give one at least";
+        return Err(Diagnostic::new(&options.name, Code::NothingToAnimate, message).into());
+    }
+    Ok(parts)
+}
+
+/// Writes JSON whose only buffer is a data URI.
+fn write_text(mut root: Root, binary: &Binary<'_>, out: &mut impl Write) -> io::Result<()> {
+    let mut bytes = Vec::new();
+    binary.write(&mut bytes)?;
+    let encoded = STANDARD.encode(bytes);
+    root.buffers[0].uri = Some(format!("data:application/octet-stream;base64,{encoded}"));
+    serde_json::to_writer(out, &root).map_err(io::Error::from)
+}
+
+/// Writes a GLB of `length` bytes. JSON is padded with blanks to a multiple of 4 bytes.
+fn write_glb(
+    mut json: Vec<u8>,
+    binary: &Binary<'_>,
+    length: u32,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    write_words(out, [GLTF, 2, length])?;
+    // Both are parts of `length`.
+    write_words(out, [json.len() as u32, JSON])?;
+    out.write_all(&json)?;
+    write_words(out, [binary.length() as u32, BIN])?;
+    binary.write(out)
+}
+
+const GLTF: u32 = u32::from_le_bytes(*b"glTF");
+const JSON: u32 = u32::from_le_bytes(*b"JSON");
+const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
+
+fn write_words<const N: usize>(out: &mut impl Write, words: [u32; N]) -> io::Result<()> {
+    let mut words = words.into_iter();
+    words.try_for_each(|word| out.write_all(&word.to_le_bytes()))
+}
+
+/// The length of a GLB of so much JSON and binary data, or why there is none.
+fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
+    let length = HEADERS + json.next_multiple_of(4) + binary;
+    u32::try_from(length).map_err(|_| {
+        format!(
+            "it would take {length} bytes, and a GLB has 4294967295 at most; write fewer samples, \
+             or the clips to several files"
+        )
+    })
+}
+
+/// Whether two clips move the same nodes.
+fn have_one_skeleton(a: &Sampled<'_>, b: &Sampled<'_>) -> bool {
+    let [names, other_names] = [a, b].map(|of| of.clip.set.tracks().map(|track| track.name));
+    a.clip.skeleton == b.clip.skeleton && names.eq(other_names)
+}
+
+/// The times of a clip as glTF has them, or why it cannot.
+fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
+    // The sum makes -0 to 0.
+    let times: Vec<f32> = seconds.iter().map(|&time| time as f32 + 0.0).collect();
+    let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
+        let why = "it has no samples; give a time at least";
+        return Err((Code::NothingToAnimate, why.to_owned()));
+    };
+    if samples.tracks == 0 {
+        return Err((Code::NothingToAnimate, "it has no tracks".to_owned()));
+    }
+    if first < 0.0 {
+        let why = format!(
+            "its first sample is at {} s, and times in glTF begin at 0; sample it from 0 s on",
+            seconds[0]
+        );
+        return Err((Code::TimesBelowZero, why));
+    }
+    if !last.is_finite() {
+        let time = seconds[seconds.len() - 1];
+        let why = format!("{time} s is beyond f32, in which glTF has times; sample it earlier");
+        return Err((Code::TimesInF32, why));
+    }
+    if let Some(place) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
+        let spacing = f64::from(last.next_up()) - f64::from(last);
+        let why = format!(
+            "{} s and {} s are one time in f32, in which glTF has times; there f32 has a \
+             time every {spacing} s: sample at {} fps or less, or nearer to 0 s",
+            seconds[place],
+            seconds[place + 1],
+            1.0 / spacing,
+        );
+        return Err((Code::TimesInF32, why));
+    }
+    Ok(times)
+}
+
+/// The animation of a clip, without name.
+fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
+    let samples = part.samples;
+    binary.begin_view();
+    let input = binary.push(Data::Times(part.times));
+    let mut channels = Vec::new();
+    for track in 0..samples.tracks {
+        for property in Property::ALL {
+            if let Some(interpolation) = samples.interpolation(track, property) {
+                channels.push((track, property, interpolation));
+            }
+        }
+    }
+    // An animation has a channel at least, and lasts as long as its channels.
+    if channels.is_empty() {
+        channels.push((0, Property::Rotation, "LINEAR"));
+    }
+    let mut animation = Animation::default();
+    for (sampler, (track, property, interpolation)) in channels.into_iter().enumerate() {
+        animation.samplers.push(Sampler {
+            input,
+            output: binary.push(Data::Channel(samples, track, property)),
+            interpolation,
+        });
+        let target = Target {
+            node: part.first_node + track,
+            path: property.path(),
+        };
+        animation.channels.push(Channel { sampler, target });
+    }
+    animation
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_glb_has_up_to_four_gibibytes() {
+        let most = u64::from(u32::MAX) - HEADERS;
+        assert_eq!(glb_length(100, most - 103), Ok(u32::MAX - 3));
+        assert_eq!(glb_length(101, 4), Ok(28 + 104 + 4));
+        let error = glb_length(104, most - 103).unwrap_err();
+        assert!(error.contains("4294967296 bytes"), "{error}");
+    }
+}

@@ -1,0 +1,109 @@
+//! The binary data of a new glTF file: what lies where, and its bytes.
+
+use std::io::{self, Write};
+
+use crate::gltf::write_new::json::{Accessor, BufferView, FLOAT};
+use crate::gltf::write_new::samples::{Property, Samples};
+
+/// What an accessor gives.
+pub(super) enum Data<'a> {
+    /// Inverse bind matrices.
+    Matrices(Vec<[f32; 16]>),
+    /// Times of samples, increasing.
+    Times(Vec<f32>),
+    /// The samples of a channel.
+    Channel(Samples<'a>, usize, Property),
+}
+
+impl Data<'_> {
+    /// The type of the values, bytes of each, and their number.
+    fn shape(&self) -> (&'static str, u64, usize) {
+        match self {
+            Self::Matrices(matrices) => ("MAT4", 64, matrices.len()),
+            Self::Times(times) => ("SCALAR", 4, times.len()),
+            Self::Channel(samples, _, Property::Rotation) => ("VEC4", 16, samples.len()),
+            Self::Channel(samples, _, _) => ("VEC3", 12, samples.len()),
+        }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::Matrices(matrices) => bytes_of(matrices.iter().copied()),
+            Self::Times(times) => bytes_of(times.iter().map(|&time| [time])),
+            Self::Channel(samples, track, property) => match property {
+                Property::Rotation => bytes_of(samples.rotations(*track)),
+                Property::Translation => bytes_of(samples.translations(*track)),
+                Property::Scale => bytes_of(samples.scales(*track)),
+            },
+        }
+    }
+}
+
+/// Numbers as a file has them: little-endian.
+fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(4 * N * values.size_hint().0);
+    for number in values.flatten() {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes
+}
+
+/// All binary data, in the order of its accessors. Every value is of f32, so everything is aligned
+/// to 4 bytes.
+#[derive(Default)]
+pub(super) struct Binary<'a> {
+    data: Vec<Data<'a>>,
+    pub(super) accessors: Vec<Accessor>,
+    pub(super) views: Vec<BufferView>,
+}
+
+impl<'a> Binary<'a> {
+    /// Bytes of all.
+    pub(super) fn length(&self) -> u64 {
+        let last = self.views.last();
+        last.map_or(0, |view| view.byte_offset + view.byte_length)
+    }
+
+    /// What follows lies in a view of its own.
+    pub(super) fn begin_view(&mut self) {
+        self.views.push(BufferView {
+            buffer: 0,
+            byte_offset: self.length(),
+            byte_length: 0,
+        });
+    }
+
+    /// Puts data into the last view; gives the place of its accessor.
+    pub(super) fn push(&mut self, data: Data<'a>) -> usize {
+        if self.views.is_empty() {
+            self.begin_view();
+        }
+        let buffer_view = self.views.len() - 1;
+        let view = &mut self.views[buffer_view];
+        let (shape, bytes, count) = data.shape();
+        let [min, max] = match &data {
+            Data::Times(times) => {
+                [times.first(), times.last()].map(|time| time.map(|&time| [time.into()]))
+            }
+            _ => [None; 2],
+        };
+        self.accessors.push(Accessor {
+            buffer_view,
+            byte_offset: view.byte_length,
+            component_type: FLOAT,
+            count,
+            shape,
+            min,
+            max,
+        });
+        view.byte_length += bytes * count as u64;
+        self.data.push(data);
+        self.accessors.len() - 1
+    }
+
+    /// Writes all, a channel at a time.
+    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let mut data = self.data.iter();
+        data.try_for_each(|data| out.write_all(&data.bytes()))
+    }
+}

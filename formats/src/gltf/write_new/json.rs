@@ -1,0 +1,118 @@
+//! The JSON of a new glTF file, as far as animations need it. Numbers that name something are places
+//! in the list of such things.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// The whole.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Root {
+    pub(super) asset: Asset,
+    pub(super) scene: usize,
+    pub(super) scenes: [Scene; 1],
+    pub(super) nodes: Vec<Node>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) skins: Vec<Skin>,
+    pub(super) animations: Vec<Animation>,
+    pub(super) accessors: Vec<Accessor>,
+    pub(super) buffer_views: Vec<BufferView>,
+    pub(super) buffers: [Buffer; 1],
+}
+
+#[derive(Serialize)]
+pub(super) struct Asset {
+    pub(super) version: &'static str,
+    pub(super) generator: &'static str,
+}
+
+/// The roots among the nodes.
+#[derive(Serialize)]
+pub(super) struct Scene {
+    pub(super) nodes: Vec<usize>,
+}
+
+/// A node at rest, relative to the node whose child it is.
+#[derive(Serialize)]
+pub(super) struct Node {
+    pub(super) name: String,
+    pub(super) translation: [f32; 3],
+    pub(super) rotation: [f32; 4],
+    pub(super) scale: [f32; 3],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) children: Vec<usize>,
+}
+
+/// The joints of one tree of nodes; `skeleton` is its root.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Skin {
+    pub(super) inverse_bind_matrices: usize,
+    pub(super) skeleton: usize,
+    pub(super) joints: Vec<usize>,
+}
+
+#[derive(Serialize, Default)]
+pub(super) struct Animation {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) name: Option<String>,
+    pub(super) channels: Vec<Channel>,
+    pub(super) samplers: Vec<Sampler>,
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    pub(super) extras: Map<String, Value>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Channel {
+    pub(super) sampler: usize,
+    pub(super) target: Target,
+}
+
+#[derive(Serialize)]
+pub(super) struct Target {
+    pub(super) node: usize,
+    pub(super) path: &'static str,
+}
+
+#[derive(Serialize)]
+pub(super) struct Sampler {
+    pub(super) input: usize,
+    pub(super) output: usize,
+    pub(super) interpolation: &'static str,
+}
+
+/// The component type of f32.
+pub(super) const FLOAT: u32 = 5126;
+
+/// `min` and `max` are f32 written with all the digits of f64: readers that take them for f64 then
+/// find them equal to the data.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub(super) buffer_view: usize,
+    pub(super) byte_offset: u64,
+    pub(super) component_type: u32,
+    pub(super) count: usize,
+    #[serde(rename = "type")]
+    pub(super) shape: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) min: Option<[f64; 1]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) max: Option<[f64; 1]>,
+}
+
+#[derive(Serialize, Clone)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub(super) buffer: usize,
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) uri: Option<String>,
+    pub(super) byte_length: u64,
+}

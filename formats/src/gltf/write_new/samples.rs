@@ -1,0 +1,164 @@
+//! The samples of one clip as the channels of a glTF file need them: a joint at a time, relative to
+//! its parent.
+
+use std::io;
+
+use glam::{DQuat, Quat, Vec3};
+
+use crate::motion::{Channels, Sampled, Sampler, Transform};
+
+/// What a channel moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Property {
+    Rotation,
+    Translation,
+    Scale,
+}
+
+impl Property {
+    pub(super) const ALL: [Self; 3] = [Self::Rotation, Self::Translation, Self::Scale];
+
+    /// The path of a channel's target.
+    pub(super) fn path(self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Translation => "translation",
+            Self::Scale => "scale",
+        }
+    }
+}
+
+/// A clip whose lists have the lengths that they must have.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    clip: &'a Sampled<'a>,
+    pub(super) tracks: usize,
+}
+
+impl<'a> Samples<'a> {
+    /// # Errors
+    /// `InvalidInput` when a list is too short or too long.
+    pub(super) fn of(clip: &'a Sampled<'a>) -> io::Result<Self> {
+        let tracks = clip.clip.set.track_count();
+        let all = tracks.saturating_mul(clip.times.len());
+        let lists = [
+            ("rotations", clip.rotations.len(), all, false),
+            ("translations", clip.translations.len(), all, true),
+            ("scales", clip.scales.len(), all, true),
+            ("joints", clip.clip.skeleton.len(), tracks, true),
+            ("channels", clip.clip.channels.len(), tracks, true),
+        ];
+        for (name, length, wanted, may_be_empty) in lists {
+            if length != wanted && !(may_be_empty && length == 0) {
+                let message =
+                    format!("a clip of {tracks} tracks has {length} {name}, not {wanted}");
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+            }
+        }
+        Ok(Self { clip, tracks })
+    }
+
+    /// The number of samples.
+    pub(super) fn len(self) -> usize {
+        self.clip.times.len()
+    }
+
+    /// Whether its poses, which are in the world, have to be made relative to scaled parents.
+    pub(super) fn has_scaled_parents_in_world(self) -> bool {
+        let clip = self.clip.clip;
+        let has_scales = !self.clip.scales.is_empty()
+            || clip
+                .skeleton
+                .iter()
+                .any(|joint| joint.rest.scale != Vec3::ONE);
+        clip.is_world && has_scales && clip.skeleton.iter().any(|joint| joint.parent.is_some())
+    }
+
+    /// How `property` of a track is interpolated in the file, `None` where it has no channel:
+    /// rotations of tracks without keys, translations and scales that never leave the rest pose.
+    pub(super) fn interpolation(self, track: usize, property: Property) -> Option<&'static str> {
+        const ALL: Channels = Channels {
+            rotation: Some(Sampler::Linear),
+            translation: Some(Sampler::Linear),
+            scale: Some(Sampler::Linear),
+        };
+        let channels = self.clip.clip.channels.get(track).unwrap_or(&ALL);
+        let rest = self.rest(track);
+        let (sampler, moves) = match property {
+            Property::Rotation => (channels.rotation, true),
+            Property::Translation => {
+                let rest = rest.translation.to_array();
+                let moves = self.translations(track).any(|own| own != rest);
+                (channels.translation, moves)
+            }
+            Property::Scale => {
+                let rest = rest.scale.to_array();
+                (channels.scale, self.scales(track).any(|own| own != rest))
+            }
+        };
+        match sampler? {
+            _ if !moves => None,
+            Sampler::Step => Some("STEP"),
+            Sampler::Linear | Sampler::Cubic => Some("LINEAR"),
+        }
+    }
+
+    /// Rotations of a track, each with the sign that continues the one before it.
+    pub(super) fn rotations(self, track: usize) -> impl Iterator<Item = [f32; 4]> + use<'a> {
+        let mut before = None;
+        (0..self.len()).map(move |sample| {
+            let own = self.rotation(sample, track);
+            let turns = before.is_some_and(|before: Quat| before.dot(own) < 0.0);
+            before.insert(if turns { -own } else { own }).to_array()
+        })
+    }
+
+    /// Translations of a track; none where the clip has none.
+    pub(super) fn translations(self, track: usize) -> impl Iterator<Item = [f32; 3]> + use<'a> {
+        let samples = self.clip.translations.len() / self.tracks.max(1);
+        (0..samples).map(move |sample| self.translation(sample, track).to_array())
+    }
+
+    /// Scales of a track; none where the clip has none.
+    pub(super) fn scales(self, track: usize) -> impl Iterator<Item = [f32; 3]> + use<'a> {
+        let own = self.clip.scales.get(track..).unwrap_or_default();
+        own.iter().step_by(self.tracks.max(1)).map(Vec3::to_array)
+    }
+
+    fn rest(self, track: usize) -> Transform {
+        let joint = self.clip.clip.skeleton.get(track);
+        joint.map(|joint| joint.rest).unwrap_or_default()
+    }
+
+    /// The parent of a track, in a clip whose poses are in the world.
+    fn parent_in_world(self, track: usize) -> Option<usize> {
+        let clip = self.clip.clip;
+        clip.skeleton.get(track)?.parent.filter(|_| clip.is_world)
+    }
+
+    fn rotation(self, sample: usize, track: usize) -> Quat {
+        let own = self.clip.rotations[sample * self.tracks + track];
+        match self.parent_in_world(track) {
+            None => own,
+            Some(parent) => (self.turned_back(sample, parent) * own.as_dquat()).as_quat(),
+        }
+    }
+
+    fn translation(self, sample: usize, track: usize) -> Vec3 {
+        let translation = |track| self.clip.translations[sample * self.tracks + track];
+        let own = translation(track);
+        match self.parent_in_world(track) {
+            None => own,
+            Some(parent) => {
+                let arm = own.as_dvec3() - translation(parent).as_dvec3();
+                (self.turned_back(sample, parent) * arm).as_vec3()
+            }
+        }
+    }
+
+    /// The inverse of a track's rotation.
+    fn turned_back(self, sample: usize, track: usize) -> DQuat {
+        let own = self.clip.rotations[sample * self.tracks + track];
+        own.as_dquat().normalize().conjugate()
+    }
+}
