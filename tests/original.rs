@@ -181,5 +181,5 @@ fn files_of_ones_own_match_the_original_program() {
         return;
     };
     let loaded = open_dat(path.as_ref(), &ReadOptions::default()).unwrap();
-    assert_matches_the_original(&loaded.set, &path.to_string_lossy());
+    assert_matches_the_original(&loaded.clips[0].set, &path.to_string_lossy());
 }
