@@ -40,7 +40,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o a.dat --format npy --overwrite | is the input
 2 | eval a.dat -o old.npy                        | --overwrite
 0 | eval a.dat -o old.npy --overwrite            | old.npy
-2 | eval a.dat -o folder                         | is a directory
+0 | eval a.dat -o folder                         | folder/a.npy
 7 | eval a.dat -o none/o.npy                     | none does not exist
 4 | eval none.dat -o o.npy                       | none.dat: error[E001]
 4 | eval empty -o o.npy                         | is a directory

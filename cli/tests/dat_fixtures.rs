@@ -26,6 +26,9 @@ fn the_program_says_of_every_fixture_what_is_expected() {
             let line = [
                 "eval",
                 &name,
+                // Some begin as files of other formats do.
+                "--from",
+                "dat",
                 "-o",
                 "-",
                 "--device",

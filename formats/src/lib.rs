@@ -2,12 +2,14 @@
 //! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
 //! play with ([`generate`](mod@generate)).
 
+pub mod adjust;
 pub mod csv;
 pub mod dat;
 pub mod diagnostic;
 pub mod format;
 pub mod generate;
 mod grid;
+pub mod keyed;
 pub mod keys;
 pub mod motion;
 pub mod npy;

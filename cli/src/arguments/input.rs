@@ -3,16 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use tumble::FrameRate;
-use tumble_formats::format::TimeUnit;
-use tumble_formats::keys::Duplicates;
+use clap::Args;
 use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
-use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded};
 
 use crate::arguments::gather::Gathered;
+use crate::arguments::reading::Reading;
 use crate::messages::exit::{self, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
@@ -32,58 +29,8 @@ pub(crate) struct Inputs {
     /// The largest input to read
     #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
     max_size: u64,
-    /// The format of the inputs [default: by their first bytes, then by their names]
-    #[arg(long, value_name = "FORMAT", value_parser = readable(), help_heading = READING)]
-    from: Option<&'static Format>,
-    /// The animation of a file that has several: its name, or its place, from 0
-    #[arg(long, value_name = "NAME", help_heading = READING)]
-    animation: Option<String>,
-    /// Leave key times as a file has them, instead of on the frames that they were rounded from
-    #[arg(long, help_heading = READING)]
-    raw_times: bool,
-    /// Of two different keys at one time, keep this one
-    #[arg(long, value_enum, value_name = "WHICH", help_heading = READING)]
-    duplicates: Option<DuplicatesArgument>,
-    /// The rate of the keys of files that do not say it
-    #[arg(long, value_name = "FPS", help_heading = READING)]
-    source_fps: Option<FrameRate>,
-    /// Which array or column is what, where names do not tell: rotations=keys:wxyz,time=t
-    #[arg(long, value_name = "MAP", help_heading = READING)]
-    map: Option<String>,
-    /// The unit of times that are whole numbers
-    #[arg(long, value_enum, value_name = "UNIT", help_heading = READING)]
-    time_unit: Option<TimeUnitArgument>,
-}
-
-/// The heading of these options in help.
-const READING: &str = "Reading motion files";
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DuplicatesArgument {
-    /// the first of them
-    First,
-    /// the last of them
-    Last,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum TimeUnitArgument {
-    /// seconds
-    S,
-    /// milliseconds
-    Ms,
-    /// microseconds
-    Us,
-    /// nanoseconds
-    Ns,
-}
-
-/// Reads the name of a format that can be read, for clap.
-fn readable() -> impl TypedValueParser<Value = &'static Format> {
-    let values =
-        Format::readable().map(|(format, _)| PossibleValue::new(format.name).help(format.summary));
-    PossibleValuesParser::new(values)
-        .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
+    #[command(flatten)]
+    pub(crate) reading: Reading,
 }
 
 /// `-` is standard input.
@@ -169,27 +116,11 @@ impl Inputs {
 
     /// As [`Inputs::load_quietly`], without a word of how far it is.
     pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
-        let options = ReadOptions {
-            limits: Limits {
-                file: self.max_size,
-                ..Limits::default()
-            },
-            pipes: self.pipes,
-            raw_times: self.raw_times,
-            duplicates: match self.duplicates {
-                None => Duplicates::Refuse,
-                Some(DuplicatesArgument::First) => Duplicates::First,
-                Some(DuplicatesArgument::Last) => Duplicates::Last,
-            },
-            source_rate: self.source_fps,
-            map: self.map.clone(),
-            time_unit: self.time_unit.map(|unit| match unit {
-                TimeUnitArgument::S => TimeUnit::Seconds,
-                TimeUnitArgument::Ms => TimeUnit::Milliseconds,
-                TimeUnitArgument::Us => TimeUnit::Microseconds,
-                TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
-            }),
+        let limits = Limits {
+            file: self.max_size,
+            ..Limits::default()
         };
+        let options = self.reading.options(limits, self.pipes);
         let refuse = |diagnostic: Diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",
@@ -198,7 +129,7 @@ impl Inputs {
             };
             Failure::input(&diagnostic, hint)
         };
-        let read = match self.from {
+        let read = match self.reading.from {
             Some(format) => format.open(path, &options),
             None => Format::open_detected(path, &options),
         };
@@ -208,28 +139,9 @@ impl Inputs {
         {
             return Err(Failure::input(first, ""));
         }
-        if let Some(wanted) = &self.animation {
-            choose(&mut loaded, wanted, path)?;
-        }
+        self.reading.apply(&mut loaded, path)?;
         Ok(loaded)
     }
-}
-
-/// Leaves the clip of that name, or at that place, alone.
-fn choose(loaded: &mut Loaded, wanted: &str, path: &Path) -> Result<(), Failure> {
-    let named = |clip: &Motion| clip.name.as_deref() == Some(wanted);
-    let place = loaded.clips.iter().position(named).or_else(|| {
-        let place = wanted.parse::<usize>().ok()?;
-        loaded.clips.iter().position(|clip| clip.place == place)
-    });
-    let Some(place) = place else {
-        let (name, names) = (name(path), clip_names(loaded));
-        let message = format!("{name}: has no animation `{wanted}`; it has {names}");
-        return Err(Failure::new(exit::ALL_INPUTS, message));
-    };
-    loaded.clips = vec![loaded.clips.swap_remove(place)];
-    loaded.refused.clear();
-    Ok(())
 }
 
 /// What a command that works on one clip says of a file with several.
@@ -247,7 +159,7 @@ pub(crate) fn clip_name(clip: &Motion) -> String {
     clip.name.clone().unwrap_or_else(|| place.to_string())
 }
 
-fn clip_names(loaded: &Loaded) -> String {
+pub(crate) fn clip_names(loaded: &Loaded) -> String {
     let names: Vec<String> = loaded.clips.iter().map(clip_name).collect();
     names.join(", ")
 }

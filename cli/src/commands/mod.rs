@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod completions;
+pub(crate) mod convert;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod explain;
@@ -23,6 +24,7 @@ use crate::messages::exit::Failure;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
+    Convert(convert::Arguments),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
@@ -43,6 +45,7 @@ impl Command {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
+            Self::Convert(arguments) => convert::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),

@@ -3,13 +3,11 @@
 mod motion;
 mod rotations;
 
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{Encoding, Interpolation, Method};
 use tumble_formats::Loaded;
-use tumble_formats::format::Format;
 use tumble_formats::motion::Motion;
 use tumble_formats::npy::ComponentOrder;
 
@@ -17,13 +15,14 @@ use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Wanted, wanted};
+use crate::arguments::results::{Results, each_file};
 use crate::arguments::time::{Samples, Sampling};
 use crate::arguments::what::What;
-use crate::batch::output::{Plan, Target, Wish};
+use crate::batch::digest;
+use crate::batch::output::Target;
 use crate::batch::place::Written;
-use crate::batch::run::{Batch, Done, Evaluated};
-use crate::batch::{digest, output};
-use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
+use crate::batch::run::Evaluated;
+use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// Evaluate keyframe tracks at every frame
@@ -40,20 +39,15 @@ Examples:
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
   tumble eval walks -o results --resume        a directory's tree; skips what is done
   find . -name '*.dat' | tumble eval --files-from - -o results
+  tumble eval walk.glb --fps 60 -o walk60.glb  baked; everything else stays as it is
+  tumble eval clips -o out --to bvh --resume   formats may be mixed
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
-    #[arg(short, long = "out", value_name = "OUT", help = output::out_help())]
-    out: Option<PathBuf>,
-    /// Replace existing files
-    #[arg(long)]
-    overwrite: bool,
-    /// In a directory of results: skip those that are there, whole, and made from the same input
-    /// in the same way
-    #[arg(long)]
-    resume: bool,
+    #[command(flatten)]
+    results: Results,
     /// How to interpolate (`tumble methods`); channels that hold each key until the next one stay
     /// as they are
     #[arg(
@@ -84,9 +78,6 @@ pub(crate) struct Arguments {
     /// Also say which way each input takes to its rotations; all ways give the same bits
     #[arg(long)]
     explain_route: bool,
-    /// The format of the result [default: by the name of the output, else npy]
-    #[arg(long, alias = "to", value_parser = output::format())]
-    format: Option<&'static Format>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -138,16 +129,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
-    let wish = Wish {
-        out: arguments.out.as_deref(),
-        format: arguments.format,
-        overwrite: arguments.overwrite,
-        resume: arguments.resume,
-    };
-    let Plan { targets, manifest } = output::plan(&inputs, wish)?;
+    let plan = arguments.results.plan(&inputs)?;
     let is_text = |target: &Target| target.format().write.as_ref().is_some_and(|it| it.is_text);
     let short = arguments.encoding != EncodingArgument::F32;
-    if short && targets.iter().any(is_text) {
+    if short && plan.targets.iter().any(is_text) {
         return Err(Failure::usage(
             "--encoding is for binary results (NPY); text holds every digit",
         ));
@@ -157,26 +142,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage("--encoding is for quaternions"));
     }
     let mut device = arguments.device.open()?;
-    let jobs: Vec<(PathBuf, Target)> = inputs.paths().into_iter().zip(targets).collect();
-    let mut evaluate = |path: &Path, loaded: &_, target: &_, done: &mut Done<'_>| {
-        arguments.evaluate(&mut device, &samples, (path, loaded), target, done)
-    };
-    if let Some(manifest) = manifest {
-        let batch = Batch {
-            inputs: &arguments.inputs,
-            options: arguments.options(&samples),
-            resume: arguments.resume,
-        };
-        return batch.run(&jobs, manifest, evaluate);
-    }
-    for_each(&jobs, |(path, target)| {
-        let loaded = arguments.inputs.load(path)?;
-        evaluate(path, &loaded, target, &mut |_, evaluated: Evaluated| {
-            evaluated.written.commit()?;
-            words::note(&evaluated.told);
-            Ok(())
-        })
-    })
+    let options = arguments.options(&samples);
+    let results = &arguments.results;
+    results.make(
+        &arguments.inputs,
+        &inputs,
+        plan,
+        options,
+        |path, loaded, target, done| {
+            let mut job = Job {
+                arguments,
+                device: &mut device,
+                samples: &samples,
+                loaded,
+                started: Instant::now(),
+            };
+            let name = input::name(path);
+            each_file(
+                &name,
+                (path, loaded),
+                target,
+                done,
+                |name, clips, target| job.evaluate(name, clips, target),
+            )
+        },
+    )
 }
 
 impl Arguments {
@@ -190,8 +180,9 @@ impl Arguments {
             Samples::Rate { .. } => String::new(),
         };
         format!(
-            "{} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
+            "{} {:?} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
             self.method,
+            self.inputs.reading,
             self.sampling,
             self.manner,
             self.layout,
@@ -199,48 +190,6 @@ impl Arguments {
             self.encoding,
             self.what
         )
-    }
-
-    /// One input, from its keys to its results.
-    fn evaluate(
-        &self,
-        device: &mut Opened,
-        samples: &Samples,
-        input: (&Path, &Loaded),
-        target: &Target,
-        done: &mut Done<'_>,
-    ) -> Result<(), Failure> {
-        let (path, loaded) = input;
-        let name = input::name(path);
-        let started = Instant::now();
-        let mut job = Job {
-            arguments: self,
-            device,
-            samples,
-            loaded,
-            started,
-        };
-        if target.format().many_clips || loaded.clips.len() == 1 {
-            let clips: Vec<&Motion> = loaded.clips.iter().collect();
-            let evaluated = job.evaluate(&name, &clips, target)?;
-            done(target.name(), evaluated)?;
-        } else {
-            for clip in &loaded.clips {
-                let clip_name = input::clip_name(clip);
-                let target = target.of_clip(&clip_name);
-                let target = target.ok_or_else(|| input::several(path, loaded))??;
-                let evaluated = job.evaluate(&format!("{name} {clip_name}"), &[clip], &target)?;
-                done(target.name(), evaluated)?;
-            }
-        }
-        match loaded.refused.len() {
-            0 => Ok(()),
-            refused => {
-                let all = refused + loaded.clips.len();
-                let message = format!("{name}: {refused} of {all} animations failed");
-                Err(Failure::new(SOME_INPUTS, message))
-            }
-        }
     }
 }
 

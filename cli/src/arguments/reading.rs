@@ -1,0 +1,157 @@
+//! Arguments that say how motion files are read, and what becomes of their clips.
+
+use std::path::Path;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use glam::DQuat;
+use tumble::FrameRate;
+use tumble_formats::adjust::adjust;
+use tumble_formats::format::TimeUnit;
+use tumble_formats::keys::Duplicates;
+use tumble_formats::motion::Motion;
+use tumble_formats::{Format, Limits, Loaded, ReadOptions};
+
+use crate::arguments::input::{clip_names, name};
+use crate::messages::exit::{self, Failure};
+
+/// How files are read. All of it decides over results.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = READING)]
+pub(crate) struct Reading {
+    /// The format of the inputs [default: by their first bytes, then by their names]
+    #[arg(long, value_name = "FORMAT", value_parser = readable())]
+    pub(crate) from: Option<&'static Format>,
+    /// The animation of a file that has several: its name, or its place, from 0
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
+    /// Leave key times as a file has them, instead of on the frames that they were rounded from
+    #[arg(long)]
+    raw_times: bool,
+    /// Of two different keys at one time, keep this one
+    #[arg(long, value_enum, value_name = "WHICH")]
+    duplicates: Option<DuplicatesArgument>,
+    /// The rate of the keys of files that do not say it
+    #[arg(long, value_name = "FPS")]
+    source_fps: Option<FrameRate>,
+    /// Which array or column is what, where names do not tell: rotations=keys:wxyz,time=t
+    #[arg(long, value_name = "MAP")]
+    map: Option<String>,
+    /// The unit of times that are whole numbers
+    #[arg(long, value_enum, value_name = "UNIT")]
+    time_unit: Option<TimeUnitArgument>,
+    /// Multiply all translations by this
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    scale: Option<f64>,
+    /// Turn all roots by a quarter about x, so that this axis is up where the other was
+    #[arg(long, value_enum, value_name = "AXIS")]
+    up: Option<UpArgument>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum UpArgument {
+    /// z was up, as in SMPL's files
+    Y,
+    /// y was up, as in glTF and BVH
+    Z,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("not a number over 0".to_owned()),
+    }
+}
+
+/// The heading of these options in help.
+const READING: &str = "Reading motion files";
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum DuplicatesArgument {
+    /// the first of them
+    First,
+    /// the last of them
+    Last,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum TimeUnitArgument {
+    /// seconds
+    S,
+    /// milliseconds
+    Ms,
+    /// microseconds
+    Us,
+    /// nanoseconds
+    Ns,
+}
+
+/// Reads the name of a format that can be read, for clap.
+fn readable() -> impl TypedValueParser<Value = &'static Format> {
+    let values =
+        Format::readable().map(|(format, _)| PossibleValue::new(format.name).help(format.summary));
+    PossibleValuesParser::new(values)
+        .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
+}
+
+impl Reading {
+    pub(crate) fn options(&self, limits: Limits, pipes: bool) -> ReadOptions {
+        ReadOptions {
+            limits,
+            pipes,
+            raw_times: self.raw_times,
+            duplicates: match self.duplicates {
+                None => Duplicates::Refuse,
+                Some(DuplicatesArgument::First) => Duplicates::First,
+                Some(DuplicatesArgument::Last) => Duplicates::Last,
+            },
+            source_rate: self.source_fps,
+            map: self.map.clone(),
+            time_unit: self.time_unit.map(|unit| match unit {
+                TimeUnitArgument::S => TimeUnit::Seconds,
+                TimeUnitArgument::Ms => TimeUnit::Milliseconds,
+                TimeUnitArgument::Us => TimeUnit::Microseconds,
+                TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
+            }),
+        }
+    }
+
+    /// Leaves the clip that was asked for, in the units and axes that were asked for.
+    pub(crate) fn apply(&self, loaded: &mut Loaded, path: &Path) -> Result<(), Failure> {
+        if let Some(wanted) = &self.animation {
+            choose(loaded, wanted, path)?;
+        }
+        if self.scale.is_some() || self.up.is_some() {
+            let quarter = std::f64::consts::FRAC_PI_2;
+            let turn = self.up.map_or(DQuat::IDENTITY, |up| match up {
+                UpArgument::Y => DQuat::from_rotation_x(-quarter),
+                UpArgument::Z => DQuat::from_rotation_x(quarter),
+            });
+            for clip in &mut loaded.clips {
+                *clip = adjust(clip, self.scale.unwrap_or(1.0), turn).map_err(|error| {
+                    Failure::new(exit::ALL_INPUTS, format!("{}: {error}", name(path)))
+                })?;
+            }
+            // What is kept of the file has its own units and axes.
+            loaded.document = None;
+        }
+        Ok(())
+    }
+}
+
+/// Leaves the clip of that name, or at that place, alone.
+fn choose(loaded: &mut Loaded, wanted: &str, path: &Path) -> Result<(), Failure> {
+    let named = |clip: &Motion| clip.name.as_deref() == Some(wanted);
+    let place = loaded.clips.iter().position(named).or_else(|| {
+        let place = wanted.parse::<usize>().ok()?;
+        loaded.clips.iter().position(|clip| clip.place == place)
+    });
+    let Some(place) = place else {
+        let (name, names) = (name(path), clip_names(loaded));
+        let message = format!("{name}: has no animation `{wanted}`; it has {names}");
+        return Err(Failure::new(exit::ALL_INPUTS, message));
+    };
+    loaded.clips = vec![loaded.clips.swap_remove(place)];
+    loaded.refused.clear();
+    Ok(())
+}

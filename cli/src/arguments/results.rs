@@ -1,0 +1,107 @@
+//! Arguments that say where results go and in which format, and the run over all inputs.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tumble_formats::motion::Motion;
+use tumble_formats::{Format, Loaded};
+
+use crate::arguments::gather::Gathered;
+use crate::arguments::input::{Inputs, clip_name, several};
+use crate::batch::output::{self, Plan, Target, Wish};
+use crate::batch::run::{Batch, Done, Evaluated};
+use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
+use crate::messages::words;
+
+#[derive(Debug, Args)]
+pub(crate) struct Results {
+    #[arg(short, long = "out", value_name = "OUT", help = output::out_help())]
+    out: Option<PathBuf>,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
+    /// In a directory of results: skip those that are there, whole, and made from the same input
+    /// in the same way
+    #[arg(long)]
+    resume: bool,
+    /// The format of the results [default: by the name of the output, else npy]
+    #[arg(long, visible_alias = "to", value_parser = output::format())]
+    format: Option<&'static Format>,
+}
+
+impl Results {
+    /// Where each input's result goes. Everything that can be refused is refused here, before any
+    /// work.
+    pub(crate) fn plan(&self, inputs: &Gathered) -> Result<Plan, Failure> {
+        output::plan(
+            inputs,
+            Wish {
+                out: self.out.as_deref(),
+                format: self.format,
+                overwrite: self.overwrite,
+                resume: self.resume,
+            },
+        )
+    }
+
+    /// Makes the results of all inputs. `options` are all that decides over a result besides its
+    /// input.
+    pub(crate) fn make(
+        &self,
+        inputs: &Inputs,
+        files: &Gathered,
+        plan: Plan,
+        options: String,
+        mut work: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let Plan { targets, manifest } = plan;
+        let jobs: Vec<(PathBuf, Target)> = files.paths().into_iter().zip(targets).collect();
+        if let Some(manifest) = manifest {
+            let batch = Batch {
+                inputs,
+                options,
+                resume: self.resume,
+            };
+            return batch.run(&jobs, manifest, work);
+        }
+        for_each(&jobs, |(path, target)| {
+            let loaded = inputs.load(path)?;
+            work(path, &loaded, target, &mut |_, evaluated: Evaluated| {
+                evaluated.written.commit()?;
+                words::note(&evaluated.told);
+                Ok(())
+            })
+        })
+    }
+}
+
+/// Makes a file of each input's clips: of all together where its format holds several, else of
+/// each. `make` gets what messages call the clips, the clips, and where they go.
+pub(crate) fn each_file(
+    name: &str,
+    (path, loaded): (&Path, &Loaded),
+    target: &Target,
+    done: &mut Done<'_>,
+    mut make: impl FnMut(&str, &[&Motion], &Target) -> Result<Evaluated, Failure>,
+) -> Result<(), Failure> {
+    let clips: Vec<&Motion> = loaded.clips.iter().collect();
+    if target.format().many_clips || clips.len() == 1 {
+        done(target.name(), make(name, &clips, target)?)?;
+    } else {
+        for clip in &loaded.clips {
+            let clip_name = clip_name(clip);
+            let target = target.of_clip(&clip_name);
+            let target = target.ok_or_else(|| several(path, loaded))??;
+            let made = make(&format!("{name} {clip_name}"), &[clip], &target)?;
+            done(target.name(), made)?;
+        }
+    }
+    match loaded.refused.len() {
+        0 => Ok(()),
+        refused => {
+            let all = refused + loaded.clips.len();
+            let message = format!("{name}: {refused} of {all} animations failed");
+            Err(Failure::new(SOME_INPUTS, message))
+        }
+    }
+}

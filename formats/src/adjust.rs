@@ -1,0 +1,100 @@
+//! Clips in other units and about other axes.
+
+use glam::{DQuat, Quat, Vec3};
+use tumble::{Channel, TrackError, TrackSet};
+
+use crate::motion::{Motion, Transform};
+
+/// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
+/// and tangents alike. Computed in f64, rounded once.
+///
+/// # Errors
+/// When a translation passes the largest f32.
+pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackError> {
+    let mut adjusted = Motion {
+        set: TrackSet::new(),
+        ..clip.clone()
+    };
+    for (index, track) in clip.set.tracks().enumerate() {
+        let joint = clip.skeleton.get(index);
+        let is_root = clip.is_world || joint.is_none_or(|joint| joint.parent.is_none());
+        let turn = if is_root { turn } else { DQuat::IDENTITY };
+        let turned = |key: Quat| match is_root {
+            true => (turn * key.as_dquat()).as_quat(),
+            false => key,
+        };
+        let moved = |vector: Vec3| (turn * (vector.as_dvec3() * scale)).as_vec3();
+        let keys: Vec<Quat> = track.keys.iter().map(|&key| turned(key)).collect();
+        let set = &mut adjusted.set;
+        set.push(track.name.unwrap_or_default(), track.times, &keys)?;
+        if !track.tangents.is_empty() {
+            let tangents: Vec<_> = track.tangents.iter().map(|both| both.map(turned)).collect();
+            set.set_tangents(index, &tangents)?;
+        }
+        if !track.velocities.is_empty() {
+            set.set_velocities(index, track.velocities)?;
+        }
+        if !track.tcb.is_empty() {
+            set.set_tcb(index, track.tcb)?;
+        }
+        if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
+            let keys: Vec<Vec3> = vectors.keys.iter().map(|&key| moved(key)).collect();
+            let both = |both: &[Vec3; 2]| both.map(moved);
+            let tangents: Vec<_> = vectors.tangents.iter().map(both).collect();
+            set.set_translations(index, vectors.times, &keys, &tangents)?;
+        }
+        if let Some(vectors) = clip.set.vector_keys(Channel::Scale, index) {
+            set.set_scales(index, vectors.times, vectors.keys, vectors.tangents)?;
+        }
+        if let Some(joint) = adjusted.skeleton.get_mut(index) {
+            joint.rest = Transform {
+                translation: moved(joint.rest.translation),
+                rotation: turned(joint.rest.rotation),
+                ..joint.rest
+            };
+        }
+    }
+    Ok(adjusted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::Joint;
+
+    #[test]
+    fn roots_are_turned_and_all_translations_scaled() {
+        let mut clip = Motion::default();
+        for parent in [None, Some(0)] {
+            let track = clip.set.track_count();
+            clip.set
+                .push("", &[0.0], &[Quat::from_rotation_x(0.3)])
+                .unwrap();
+            clip.set
+                .set_translations(track, &[0.0], &[Vec3::Z], &[])
+                .unwrap();
+            let rest = Transform {
+                translation: Vec3::Y,
+                ..Transform::default()
+            };
+            clip.skeleton.push(Joint { parent, rest });
+        }
+        // z up becomes y up.
+        let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        let adjusted = adjust(&clip, 0.01, turn).unwrap();
+        let at = |track| {
+            adjusted
+                .set
+                .vector_keys(Channel::Translation, track)
+                .unwrap()
+                .keys[0]
+        };
+        assert!(at(0).distance(Vec3::Y * 0.01) < 1e-8);
+        assert_eq!(at(1), Vec3::Z * 0.01);
+        let root = adjusted.set.track(0).keys[0];
+        let expected = Quat::from_rotation_x(0.3 - std::f32::consts::FRAC_PI_2);
+        assert!(root.angle_between(expected) < 1e-3);
+        assert_eq!(adjusted.set.track(1).keys, clip.set.track(1).keys);
+        assert_eq!(adjusted.skeleton[1].rest.translation, Vec3::Y * 0.01);
+    }
+}
