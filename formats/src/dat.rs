@@ -348,10 +348,8 @@ impl Keys {
         box_length: f64,
     ) -> Result<Loaded, Diagnostic> {
         if self.times.rows() == 0 {
-            // Where the end is: on the last line, unless that has ended.
-            lines.number -= u64::from(!lines.ended);
             let message = "no keys behind the header; a key line is `time w x y z …`".to_owned();
-            return Err(lines.refuse(1, Code::NoKeys, message));
+            return Err(lines.refuse_end(Code::NoKeys, message));
         }
         lines.number = lines.number.saturating_sub(1);
         if self.times.rows() == 1 {

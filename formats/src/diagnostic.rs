@@ -153,9 +153,26 @@ codes! {
     Unrecognised = "E031", "an unknown format", "Neither the first bytes nor the ending of the name tell a format that can be read; --format names it.";
     // E1xx and W1xx: glTF.
     // E2xx and W2xx: BVH.
+    BvhStart = "E200", "no HIERARCHY", "A BVH file begins with the word HIERARCHY, then its joints, then MOTION.";
+    BvhWord = "E201", "a word that has no place", "Joints are ROOT or JOINT and a name, then in braces an OFFSET, CHANNELS, and further JOINTs or an End Site.";
+    BvhBraces = "E202", "braces that do not match", "Each joint and End Site has its own pair of braces.";
+    BvhOffset = "E203", "no OFFSET", "Each joint says in three numbers where it is in its parent.";
+    BvhChannel = "E204", "no channel of this name", "A joint has Xposition, Yposition, Zposition, Xrotation, Yrotation and Zrotation, each at most once.";
+    BvhChannelCount = "E205", "the wrong number of channels", "CHANNELS gives the number of the names behind it, on the same line.";
+    BvhMotion = "E206", "no MOTION", "The file ends within its hierarchy; it is probably cut.";
+    BvhFrames = "E207", "not a number of frames", "The line behind MOTION is `Frames: ` and a whole number.";
+    BvhFrameTime = "E208", "not a frame time", "The line behind Frames is `Frame Time: ` and the seconds of a frame, from 1e-9 to 1e9.";
+    BvhRow = "E209", "the wrong number of numbers", "Each frame is a line with a number for each channel, in the order of the hierarchy.";
+    BvhCut = "E210", "fewer rows than frames", "The file ends before its last frame; it is probably cut.";
+    BvhSecond = "E211", "a second HIERARCHY", "Two files in one? Split it.";
+    BvhWrite = "E212", "not to be written as BVH", "A BVH file holds one clip, whose samples are frames of one rate, with angles about three different axes.";
     // E3xx and W3xx: NPY and NPZ.
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     // E5xx and W5xx: trajectories.
+    TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
+    TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
+    TumEmpty = "E503", "no poses", "All lines are blank or comments.";
+    TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -169,6 +186,10 @@ codes! {
     OneKey = "W011", "only one key", "The set stands still.";
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both ways round are equally short; the signs as stored decide.";
     EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
+    BvhMoreRows = "W201", "more rows than frames", "The rows behind the last frame are left out.";
+    BvhNoFrames = "W202", "no frames", "The skeleton rests.";
+    Scales = "W203", "scales are left out", "The format has rotations and translations only.";
+    StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0.";
 }
 
 impl Code {

@@ -16,12 +16,18 @@ use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::source::Source;
 use crate::text::lines::Limits;
-use crate::{csv, dat, npy};
+use crate::{bvh, csv, dat, npy, tum};
 
 /// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
 /// format that can be read is that of inputs which tell neither way, the first that can be written
 /// that of such outputs.
-pub static FORMATS: [&Format; 3] = [&dat::FORMAT, &npy::FORMAT, &csv::FORMAT];
+pub static FORMATS: [&Format; 5] = [
+    &dat::FORMAT,
+    &bvh::FORMAT,
+    &npy::FORMAT,
+    &csv::FORMAT,
+    &tum::FORMAT,
+];
 
 /// A file format.
 pub struct Format {

@@ -1,10 +1,13 @@
-//! The files that Tumble reads and writes: keyframes in (`.dat`), results out (NPY, CSV),
+//! The files that Tumble reads and writes: keyframes in (`.dat`), clips in and out (BVH, TUM), results
+//! out (NPY, CSV),
 //! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
 //! play with ([`generate`](mod@generate)).
 
 pub mod adjust;
+pub mod bvh;
 pub mod csv;
 pub mod dat;
+mod decimal;
 pub mod diagnostic;
 pub mod format;
 pub mod generate;
@@ -12,6 +15,7 @@ mod grid;
 pub mod keyed;
 pub mod keys;
 pub mod motion;
+mod names;
 pub mod npy;
 pub mod output;
 pub mod poses;
@@ -20,6 +24,7 @@ pub mod sample;
 mod source;
 mod text;
 pub mod times;
+pub mod tum;
 mod warnings;
 pub mod world;
 

@@ -24,6 +24,9 @@ pub struct Motion {
     pub rate: Option<FrameRate>,
     /// Rotations and translations are relative to the world instead of the parent.
     pub is_world: bool,
+    /// Whole seconds that every time of the set is to be moved by. Clocks that count from 1970
+    /// would leave f64 only 0.2 µs; times that count from near their first lose nothing.
+    pub time_offset: i64,
 }
 
 /// A joint of a skeleton.

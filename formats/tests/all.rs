@@ -1,5 +1,7 @@
 //! Every test of the files.
 
+mod bvh;
 mod dat_fixtures;
 mod fixtures;
 mod support;
+mod tum;

@@ -11,6 +11,8 @@ pub(crate) struct Lines<R> {
     file: String,
     reader: R,
     limits: Limits,
+    /// Whether the text may hold names and remarks in any language, not numbers alone.
+    names: bool,
     buffer: Vec<u8>,
     /// The number of the line in `buffer`, from 1.
     pub(crate) number: u64,
@@ -51,17 +53,50 @@ const SIGNATURES: [(&[u8], &str); 6] = [
     (b"PK\x03\x04", "a ZIP archive; unpack it first"),
 ];
 
+/// The byte-order mark of UTF-8.
+const MARK: &[u8] = b"\xef\xbb\xbf";
+
 impl<R: BufRead> Lines<R> {
-    /// Looks at the first bytes and skips a byte-order mark.
-    pub(crate) fn new(file: &str, mut reader: R, limits: Limits) -> Result<Self, Diagnostic> {
+    /// Text of numbers. Looks at the first bytes and skips a byte-order mark.
+    pub(crate) fn new(file: &str, reader: R, limits: Limits) -> Result<Self, Diagnostic> {
+        let (mut lines, start) = Self::start(file, reader, limits)?;
+        if let Some((_, name)) = SIGNATURES
+            .iter()
+            .find(|(bytes, _)| start.starts_with(bytes))
+        {
+            let message = format!("this looks like {name}");
+            return Err(lines.refuse_whole(Code::OtherFormat, message));
+        }
+        if start.starts_with(MARK) {
+            lines.number = 1;
+            lines.warn(1, Code::ByteOrderMark, "a byte-order mark; it is skipped");
+            lines.number = 0;
+        }
+        Ok(lines)
+    }
+
+    /// Text that may hold names or remarks beside its numbers: letters of any language may occur,
+    /// and a byte-order mark, which says that they do.
+    pub(crate) fn with_names(file: &str, reader: R, limits: Limits) -> Result<Self, Diagnostic> {
+        let (mut lines, _) = Self::start(file, reader, limits)?;
+        lines.names = true;
+        Ok(lines)
+    }
+
+    /// The lines behind a byte-order mark, and the first bytes with it.
+    fn start(file: &str, mut reader: R, limits: Limits) -> Result<(Self, Vec<u8>), Diagnostic> {
         let start = reader
             .fill_buf()
             .map_err(|error| io_error(file, &error))?
             .to_vec();
-        let mut lines = Self {
+        if start.starts_with(MARK) {
+            reader.consume(MARK.len());
+        }
+        let lines = Self {
             file: file.to_owned(),
             reader,
             limits,
+            names: false,
             buffer: Vec::new(),
             number: 0,
             read: 0,
@@ -70,24 +105,11 @@ impl<R: BufRead> Lines<R> {
             ended: true,
             warnings: Vec::new(),
         };
-        if let Some((_, name)) = SIGNATURES
-            .iter()
-            .find(|(bytes, _)| start.starts_with(bytes))
-        {
-            let message = format!("this looks like {name}");
-            return Err(lines.refuse_whole(Code::OtherFormat, message));
-        }
         if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
             let message = "this is UTF-16; save it as UTF-8 or ASCII".to_owned();
             return Err(lines.refuse_whole(Code::Encoding, message));
         }
-        if start.starts_with(b"\xef\xbb\xbf") {
-            lines.reader.consume(3);
-            lines.number = 1;
-            lines.warn(1, Code::ByteOrderMark, "a byte-order mark; it is skipped");
-            lines.number = 0;
-        }
-        Ok(lines)
+        Ok((lines, start))
     }
 
     /// The next line without its end; `None` at the end of the input. Give it back
@@ -113,7 +135,7 @@ impl<R: BufRead> Lines<R> {
         }
         self.strip_line_end();
         self.check_characters()?;
-        // ASCII by now, apart from what the check refused.
+        // Text by now: the check refuses all else.
         let line = String::from_utf8(std::mem::take(&mut self.buffer));
         Ok(Some(line.unwrap_or_default()))
     }
@@ -168,6 +190,15 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
+    /// A refusal at the end of the input: on the last line, unless that has ended.
+    pub(crate) fn refuse_end(&self, code: Code, message: String) -> Diagnostic {
+        let mut refusal = self.refuse(1, code, message);
+        if let Some(Place::Text { line, .. }) = &mut refusal.place {
+            *line -= u64::from(!self.ended);
+        }
+        refusal
+    }
+
     /// Counts a warning; the first of each code keeps its place and words.
     pub(crate) fn warn(&mut self, column: u64, code: Code, message: impl Into<String>) {
         match self.warnings.iter_mut().find(|w| w.code == code) {
@@ -198,12 +229,39 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
+    /// Where the first character is that does not belong into the line.
+    fn first_odd(&self) -> Option<usize> {
+        // Without a branch for each byte the compiler compares many at once.
+        let all_plain = |bytes: &[u8]| bytes.iter().fold(true, |all, &byte| all & is_plain(byte));
+        let block = self.buffer.chunks(64).position(|block| !all_plain(block))?;
+        let first = 64 * block;
+        let plain = self.buffer[first..]
+            .iter()
+            .take_while(|&&byte| is_plain(byte));
+        let first = first + plain.count();
+        if !self.names {
+            return Some(first);
+        }
+        let (text, valid) = match std::str::from_utf8(&self.buffer[first..]) {
+            Ok(text) => (text, None),
+            Err(error) => {
+                let text = std::str::from_utf8(&self.buffer[first..][..error.valid_up_to()]);
+                (text.unwrap_or_default(), Some(first + error.valid_up_to()))
+            }
+        };
+        let mut odd = text.char_indices().filter(|&(_, c)| match u8::try_from(c) {
+            Ok(byte) if c.is_ascii() => !is_plain(byte),
+            _ => c.is_control() || c.is_whitespace(),
+        });
+        odd.next().map(|(place, _)| first + place).or(valid)
+    }
+
     fn check_characters(&self) -> Result<(), Diagnostic> {
-        let plain = |&b: &u8| b == b'\t' || (b' '..=b'~').contains(&b);
-        let Some(place) = self.buffer.iter().position(|b| !plain(b)) else {
+        let Some(place) = self.first_odd() else {
             return Ok(());
         };
-        let column = place as u64 + 1; // all before it is ASCII
+        let before = String::from_utf8_lossy(&self.buffer[..place]);
+        let column = before.chars().count() as u64 + 1;
         let rest = &self.buffer[place..];
         let character = match std::str::from_utf8(&rest[..rest.len().min(4)]) {
             Ok(text) => text.chars().next(),
@@ -239,14 +297,25 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
+/// Printable ASCII and tabs.
+fn is_plain(byte: u8) -> bool {
+    byte == b'\t' || (b' '..=b'~').contains(&byte)
+}
+
 fn io_error(file: &str, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(file, Code::Open, format!("cannot be read: {error}"))
 }
 
-/// The tokens of a line with their columns, both from 1.
+/// The tokens of a line with their columns, both from 1; columns are right where all before them
+/// is ASCII.
 pub(crate) fn tokens(line: &str) -> impl Iterator<Item = (u64, &str)> {
-    let start = line.as_ptr() as usize;
-    line.split([' ', '\t'])
-        .filter(|token| !token.is_empty())
-        .map(move |token| ((token.as_ptr() as usize - start) as u64 + 1, token))
+    let is_blank = |byte: u8| byte == b' ' || byte == b'\t';
+    let bytes = line.as_bytes();
+    let mut end = 0;
+    std::iter::from_fn(move || {
+        let start = end + bytes[end..].iter().position(|&byte| !is_blank(byte))?;
+        let length = bytes[start..].iter().position(|&byte| is_blank(byte));
+        end = length.map_or(bytes.len(), |length| start + length);
+        Some((start as u64 + 1, &line[start..end]))
+    })
 }

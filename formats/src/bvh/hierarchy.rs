@@ -1,0 +1,339 @@
+//! The first half of a file: joints, their offsets and channels, up to `MOTION`.
+
+use std::collections::HashSet;
+use std::io::BufRead;
+
+use glam::Vec3;
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::names::usable_name;
+use crate::text::lines::Lines;
+use crate::text::number;
+
+/// What every file begins with.
+pub(super) const FIRST_WORD: &str = "HIERARCHY";
+
+/// The joints of a file, parents before their children.
+#[derive(Debug, Default)]
+pub(super) struct Hierarchy {
+    pub(super) joints: Vec<Joint>,
+    /// Channels of all joints together, the numbers of a row.
+    pub(super) columns: usize,
+}
+
+#[derive(Debug)]
+pub(super) struct Joint {
+    pub(super) name: String,
+    pub(super) parent: Option<usize>,
+    pub(super) offset: Vec3,
+    /// The axes that the joint turns about, in this order, each with its number's place in a row.
+    pub(super) rotations: Vec<(usize, usize)>,
+    /// The coordinates that a row has, each with its place there.
+    pub(super) positions: Vec<(usize, usize)>,
+}
+
+/// A word of the hierarchy: its place, and the word.
+struct Word {
+    line: u64,
+    column: u64,
+    text: String,
+}
+
+impl Word {
+    fn is(&self, keyword: &str) -> bool {
+        self.text.eq_ignore_ascii_case(keyword)
+    }
+}
+
+/// An open brace.
+struct Block {
+    /// What opened it, for messages.
+    line: u64,
+    /// An End Site is no joint.
+    joint: Option<usize>,
+    has_offset: bool,
+    has_channels: bool,
+}
+
+struct Parser<'a, R> {
+    lines: &'a mut Lines<R>,
+    /// The current line, and where the next word is looked for: in bytes, and in characters.
+    line: String,
+    at: usize,
+    column: u64,
+    open: Vec<Block>,
+    names: HashSet<String>,
+    hierarchy: Hierarchy,
+}
+
+impl Hierarchy {
+    /// Reads all up to the line of `MOTION`.
+    pub(super) fn read<R: BufRead>(lines: &mut Lines<R>) -> Result<Self, Diagnostic> {
+        let mut parser = Parser {
+            lines,
+            line: String::new(),
+            at: 0,
+            column: 1,
+            open: Vec::new(),
+            names: HashSet::new(),
+            hierarchy: Self::default(),
+        };
+        match parser.next()? {
+            Some(word) if word.is(FIRST_WORD) => {}
+            Some(word) => {
+                let message = format!("`{}` where a BVH file says {FIRST_WORD}", word.text);
+                return Err(parser.refuse(&word, Code::BvhStart, message));
+            }
+            None => {
+                let message = format!("the file is empty; a BVH file begins with {FIRST_WORD}");
+                return Err(parser.lines.refuse_end(Code::BvhStart, message));
+            }
+        }
+        while parser.statement()? {}
+        if let Some(word) = parser.word_before("") {
+            let message = format!("`{}` behind MOTION; begin a new line", word.text);
+            return Err(parser.refuse(&word, Code::BvhWord, message));
+        }
+        Ok(parser.hierarchy)
+    }
+}
+
+impl<R: BufRead> Parser<'_, R> {
+    /// Reads what one keyword begins; whether it was another than `MOTION`.
+    fn statement(&mut self) -> Result<bool, Diagnostic> {
+        let Some(word) = self.next()? else {
+            let message = "the file ends without MOTION; is it cut?".to_owned();
+            return Err(self.lines.refuse_end(Code::BvhMotion, message));
+        };
+        // The joint that the word stands in; an End Site holds an OFFSET and nothing else.
+        let block = self.open.last();
+        let (in_joint, outside) = (block.is_some_and(|b| b.joint.is_some()), block.is_none());
+        match word.text.to_ascii_uppercase().as_str() {
+            "ROOT" if outside => self.joint(&word)?,
+            "JOINT" if in_joint => self.joint(&word)?,
+            "END" if in_joint => {
+                while self.word_before("{").is_some() {} // `Site`, and perhaps a name
+                self.brace(&word, None)?;
+            }
+            "OFFSET" if block.is_some_and(|block| !block.has_offset) => self.offset(&word)?,
+            "CHANNELS" if in_joint && block.is_some_and(|block| !block.has_channels) => {
+                self.channels(&word)?;
+            }
+            "}" => self.close(&word)?,
+            "MOTION" if outside && !self.hierarchy.joints.is_empty() => return Ok(false),
+            "MOTION" | "ROOT" if !outside => {
+                let line = block.map_or(0, |block| block.line);
+                let message = format!("the braces of line {line} are not closed; add `}}`");
+                return Err(self.refuse(&word, Code::BvhBraces, message));
+            }
+            other => {
+                let message = if other == FIRST_WORD {
+                    let message = "a second HIERARCHY; a file holds one, split it".to_owned();
+                    return Err(self.refuse(&word, Code::BvhSecond, message));
+                } else if ["ROOT", "JOINT", "END", "OFFSET", "CHANNELS", "MOTION"].contains(&other)
+                {
+                    "has no place here: a ROOT holds an OFFSET, CHANNELS and JOINTs, or an End Site"
+                } else {
+                    "is no word of BVH; remove it"
+                };
+                let message = format!("`{}` {message}", word.text);
+                return Err(self.refuse(&word, Code::BvhWord, message));
+            }
+        }
+        Ok(true)
+    }
+
+    /// `ROOT name {` or `JOINT name {`; the name is all that is on the line.
+    fn joint(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
+        let mut name = String::new();
+        while let Some(word) = self.word_before("{") {
+            name = name + &word.text + " ";
+        }
+        let parent = self.open.last().and_then(|block| block.joint);
+        let joints = &mut self.hierarchy.joints;
+        let joint = joints.len();
+        joints.push(Joint {
+            name: usable_name(&name, joint, &mut self.names),
+            parent,
+            offset: Vec3::ZERO,
+            rotations: Vec::new(),
+            positions: Vec::new(),
+        });
+        self.brace(keyword, Some(joint))
+    }
+
+    /// The brace behind a joint's name or `End Site`.
+    fn brace(&mut self, keyword: &Word, joint: Option<usize>) -> Result<(), Diagnostic> {
+        match self.next()? {
+            Some(word) if word.text == "{" => {}
+            Some(word) => {
+                let message = format!(
+                    "`{}` where the `{{` of line {} is missing",
+                    word.text, keyword.line
+                );
+                return Err(self.refuse(&word, Code::BvhBraces, message));
+            }
+            None => {
+                let message = "the file ends where `{` is missing; is it cut?".to_owned();
+                return Err(self.refuse(keyword, Code::BvhBraces, message));
+            }
+        }
+        self.open.push(Block {
+            line: keyword.line,
+            joint,
+            has_offset: false,
+            has_channels: false,
+        });
+        Ok(())
+    }
+
+    fn close(&mut self, brace: &Word) -> Result<(), Diagnostic> {
+        let Some(block) = self.open.pop() else {
+            let message = "`}` closes nothing; remove it".to_owned();
+            return Err(self.refuse(brace, Code::BvhBraces, message));
+        };
+        if let Some(joint) = block.joint.filter(|_| !block.has_offset) {
+            let name = &self.hierarchy.joints[joint].name;
+            let message = format!(
+                "`{name}` of line {} has no OFFSET; write `OFFSET x y z`",
+                block.line
+            );
+            return Err(self.refuse(brace, Code::BvhOffset, message));
+        }
+        Ok(())
+    }
+
+    /// `OFFSET x y z`.
+    fn offset(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
+        let mut offset = [0.0; 3];
+        for coordinate in &mut offset {
+            let Some(word) = self.word_before("}") else {
+                let message = "OFFSET lacks a number; it is `OFFSET x y z`".to_owned();
+                return Err(self.refuse(keyword, Code::BvhOffset, message));
+            };
+            let number = number::parse(&word.text)
+                .map_err(|(code, message)| self.refuse(&word, code, message))?;
+            *coordinate = number.value as f32;
+        }
+        if let Some(block) = self.open.last_mut() {
+            block.has_offset = true;
+            if let Some(joint) = block.joint {
+                self.hierarchy.joints[joint].offset = offset.into();
+            }
+        }
+        Ok(())
+    }
+
+    /// `CHANNELS count name…`, on one line.
+    fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
+        let Some(count) = self.word_before("}") else {
+            let message = "CHANNELS without their number; write `CHANNELS 0`".to_owned();
+            return Err(self.refuse(keyword, Code::BvhChannelCount, message));
+        };
+        let (mut names, mut named) = (Vec::new(), 0usize);
+        while let Some(word) = self.word_before("}") {
+            named += 1;
+            // Of more than six one is there twice.
+            if names.len() < 7 {
+                names.push(word);
+            }
+        }
+        if count.text.parse() != Ok(named) {
+            let message = format!(
+                "`{}` channels with {named} names behind it; the number counts the names",
+                count.text
+            );
+            return Err(self.refuse(&count, Code::BvhChannelCount, message));
+        }
+        let Some(block) = self.open.last_mut() else {
+            return Ok(());
+        };
+        block.has_channels = true;
+        let joint = block.joint.unwrap_or_default();
+        for word in &names {
+            let Some((kind, axis)) = channel(&word.text) else {
+                let message = format!(
+                    "`{}` is no channel; there are Xposition, Xrotation and those of Y and Z",
+                    word.text
+                );
+                return Err(self.refuse(word, Code::BvhChannel, message));
+            };
+            let joint = &mut self.hierarchy.joints[joint];
+            let channels = match kind {
+                Kind::Position => &mut joint.positions,
+                Kind::Rotation => &mut joint.rotations,
+            };
+            if channels.iter().any(|&(other, _)| other == axis) {
+                let message = format!("the joint has `{}` twice; remove one", word.text);
+                return Err(self.refuse(word, Code::BvhChannel, message));
+            }
+            channels.push((axis, self.hierarchy.columns));
+            self.hierarchy.columns += 1;
+        }
+        Ok(())
+    }
+
+    /// The next word, of this line or a later one.
+    fn next(&mut self) -> Result<Option<Word>, Diagnostic> {
+        loop {
+            if let Some(word) = self.word_before("") {
+                return Ok(Some(word));
+            }
+            self.lines.reuse(std::mem::take(&mut self.line));
+            let Some(line) = self.lines.next()? else {
+                return Ok(None);
+            };
+            (self.line, self.at, self.column) = (line, 0, 1);
+        }
+    }
+
+    /// The next word of this line, unless it is `stop`. A brace is a word of its own.
+    fn word_before(&mut self, stop: &str) -> Option<Word> {
+        let rest = &self.line[self.at..];
+        let start = rest.find(|c| c != ' ' && c != '\t')?;
+        let word = &rest[start..];
+        let end = match word.find(|c| " \t{}".contains(c)) {
+            Some(0) => 1,
+            Some(end) => end,
+            None => word.len(),
+        };
+        let text = word[..end].to_owned();
+        if text == stop {
+            return None;
+        }
+        let column = self.column + start as u64;
+        self.column = column + text.chars().count() as u64;
+        self.at += start + end;
+        Some(Word {
+            line: self.lines.number,
+            column,
+            text,
+        })
+    }
+
+    fn refuse(&self, word: &Word, code: Code, message: String) -> Diagnostic {
+        let (line, column) = (word.line, word.column);
+        Diagnostic {
+            place: Some(Place::Text { line, column }),
+            ..self.lines.refuse(column, code, message)
+        }
+    }
+}
+
+enum Kind {
+    Position,
+    Rotation,
+}
+
+/// `Xposition` to `Zrotation`, in any case.
+fn channel(name: &str) -> Option<(Kind, usize)> {
+    let (letter, kind) = name.split_at_checked(1)?;
+    let axis = ["x", "y", "z"]
+        .iter()
+        .position(|axis| axis.eq_ignore_ascii_case(letter))?;
+    match kind.to_ascii_lowercase().as_str() {
+        "position" => Some((Kind::Position, axis)),
+        "rotation" => Some((Kind::Rotation, axis)),
+        _ => None,
+    }
+}

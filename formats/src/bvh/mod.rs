@@ -1,0 +1,67 @@
+//! BVH, motion capture as text: a hierarchy of joints, then a row of numbers for each frame.
+//!
+//! A joint's rotation is the product of its rotation channels in the order in which `CHANNELS`
+//! names them, each about an axis that those before have turned, in degrees. Position channels
+//! replace the joint's `OFFSET`, each its own coordinate. End Sites are no joints.
+
+mod angles;
+mod hierarchy;
+mod motion;
+mod rate;
+mod write;
+
+use std::io::BufRead;
+use std::path::Path;
+
+use crate::bvh::hierarchy::Hierarchy;
+use crate::bvh::motion::Rows;
+use crate::bvh::write::write_motion;
+use crate::diagnostic::Diagnostic;
+use crate::format::{Format, Loaded, ReadOptions};
+use crate::source::Source;
+use crate::text::lines::Lines;
+
+/// Motion capture of a skeleton.
+pub static FORMAT: Format = Format {
+    name: "bvh",
+    summary: "motion capture of a skeleton, as text",
+    extensions: &[],
+    probe: |start| {
+        let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+        let word = start.trim_ascii_start().get(..hierarchy::FIRST_WORD.len());
+        word.is_some_and(|word| word.eq_ignore_ascii_case(hierarchy::FIRST_WORD.as_bytes()))
+    },
+    read: Some(open_bvh),
+    write: None,
+    write_motion: Some(write_motion),
+    many_clips: false,
+};
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_bvh(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let mut source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let loaded = read_bvh(&name, &mut source.reader, options)?;
+    source.check_unchanged()?;
+    Ok(loaded)
+}
+
+/// Reads a clip; `name` is what messages call the input. Translations have the file's units, times
+/// are whole frames of the file's rate from 0.
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_bvh(
+    name: &str,
+    reader: impl BufRead,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
+    let mut lines = Lines::with_names(name, reader, options.limits)?;
+    let hierarchy = Hierarchy::read(&mut lines)?;
+    let rows = Rows::read(&mut lines, &hierarchy, options.raw_times)?;
+    let clip = rows.into_clip(&lines, &hierarchy)?;
+    Ok(Loaded::of(clip, lines.warnings))
+}

@@ -1,0 +1,272 @@
+//! The second half of a file: the frames, a row of numbers each, made into keys row by row.
+
+use std::io::BufRead;
+
+use glam::{DQuat, Quat, Vec3};
+use tumble::{FrameRate, TrackSet};
+
+use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
+use crate::bvh::rate;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::{Joint, Motion, Transform};
+use crate::quaternion::rounded;
+use crate::text::blocks::Blocks;
+use crate::text::lines::{Lines, tokens};
+use crate::text::number;
+
+/// The keys of all frames, in the order `[frame][joint]`: rotations of the joints that have
+/// rotation channels, positions of those that have position channels.
+pub(super) struct Rows {
+    rate: FrameRate,
+    count: usize,
+    rotations: Blocks<Quat>,
+    positions: Blocks<Vec3>,
+}
+
+impl Rows {
+    /// Reads all behind `MOTION`. With `raw_times` the frame time is taken as it is printed, not as
+    /// that of a usual rate.
+    pub(super) fn read<R: BufRead>(
+        lines: &mut Lines<R>,
+        hierarchy: &Hierarchy,
+        raw_times: bool,
+    ) -> Result<Self, Diagnostic> {
+        let frames = read_frames(lines)?;
+        let joints = || hierarchy.joints.iter();
+        let rotating = joints().filter(|joint| !joint.rotations.is_empty());
+        let moving = joints().filter(|joint| !joint.positions.is_empty());
+        let mut rows = Self {
+            rate: read_rate(lines, raw_times)?,
+            count: 0,
+            rotations: Blocks::new(rotating.count()),
+            positions: Blocks::new(moving.count()),
+        };
+        let mut row = Vec::new();
+        while let Some(line) = lines.next()? {
+            let start = line.trim_start_matches([' ', '\t']);
+            if start
+                .get(..FIRST_WORD.len())
+                .is_some_and(|word| word.eq_ignore_ascii_case(FIRST_WORD))
+            {
+                let message = "a second HIERARCHY; a file holds one, split it".to_owned();
+                return Err(lines.refuse(1, Code::BvhSecond, message));
+            }
+            if !start.is_empty() {
+                read_row(lines, &line, hierarchy.columns, &mut row)?;
+                if (rows.count as u64) < frames {
+                    rows.push(hierarchy, &row);
+                } else {
+                    let message =
+                        format!("a row behind the last of {frames} frames; it is left out");
+                    lines.warn(1, Code::BvhMoreRows, message);
+                }
+            }
+            lines.reuse(line);
+        }
+        // Rows without numbers are blank lines.
+        if (rows.count as u64) < frames && hierarchy.columns > 0 {
+            let message = format!("{} rows of {frames} frames; is the file cut?", rows.count);
+            return Err(lines.refuse_end(Code::BvhCut, message));
+        }
+        if rows.count == 0 {
+            let end = lines.refuse_end(
+                Code::BvhNoFrames,
+                "no frames; the skeleton rests".to_owned(),
+            );
+            lines.warnings.push(end);
+        }
+        Ok(rows)
+    }
+
+    fn push(&mut self, hierarchy: &Hierarchy, row: &[f64]) {
+        for joint in &hierarchy.joints {
+            if !joint.rotations.is_empty() {
+                self.rotations.push(rotation(&joint.rotations, row));
+            }
+            if !joint.positions.is_empty() {
+                let mut position = joint.offset;
+                for &(coordinate, place) in &joint.positions {
+                    position[coordinate] = row[place] as f32;
+                }
+                self.positions.push(position);
+            }
+        }
+        self.count += 1;
+    }
+
+    /// One track a joint; joints without rotation channels have one key.
+    pub(super) fn into_clip<R: BufRead>(
+        self,
+        lines: &Lines<R>,
+        hierarchy: &Hierarchy,
+    ) -> Result<Motion, Diagnostic> {
+        // Without frames every track has one key, at time 0.
+        let count = self.count.max(1);
+        let times: Vec<f64> = (0..count as u64)
+            .map(|frame| self.rate.time_of(frame))
+            .collect();
+        let rotations = self.rotations.into_columns();
+        let positions = self.positions.into_columns();
+        let mut rotations = rotations.chunks_exact(count);
+        let mut positions = positions.chunks_exact(count);
+        let mut set = TrackSet::new();
+        let mut skeleton = Vec::with_capacity(hierarchy.joints.len());
+        // What was read is unit and in order; a set refuses what slipped through.
+        let refuse =
+            |error: tumble::TrackError| lines.refuse_whole(Code::BvhRow, error.to_string());
+        for (track, joint) in hierarchy.joints.iter().enumerate() {
+            let own = !joint.rotations.is_empty();
+            let keys = own
+                .then(|| rotations.next())
+                .flatten()
+                .unwrap_or(&[Quat::IDENTITY]);
+            set.push(&joint.name, &times[..keys.len()], keys)
+                .map_err(refuse)?;
+            let own = !joint.positions.is_empty();
+            if let Some(keys) = own.then(|| positions.next()).flatten() {
+                set.set_translations(track, &times, keys, &[])
+                    .map_err(refuse)?;
+            }
+            let rest = Transform {
+                translation: joint.offset,
+                ..Transform::default()
+            };
+            skeleton.push(Joint {
+                parent: joint.parent,
+                rest,
+            });
+        }
+        Ok(Motion {
+            set,
+            skeleton,
+            rate: Some(self.rate),
+            ..Motion::default()
+        })
+    }
+}
+
+/// The product of turns about the axes, the first the outermost: each is about an axis that those
+/// before it have turned.
+fn rotation(channels: &[(usize, usize)], row: &[f64]) -> Quat {
+    let mut q = DQuat::IDENTITY.to_array();
+    for &(axis, place) in channels {
+        let (sine, cosine) = libm::sincos(row[place] * (std::f64::consts::PI / 360.0));
+        let (i, j, k) = (axis, (axis + 1) % 3, (axis + 2) % 3);
+        let mut next = [0.0; 4];
+        next[i] = q[i] * cosine + q[3] * sine;
+        next[j] = q[j] * cosine + q[k] * sine;
+        next[k] = q[k] * cosine - q[j] * sine;
+        next[3] = q[3] * cosine - q[i] * sine;
+        q = next;
+    }
+    rounded(DQuat::from_array(q))
+}
+
+/// The number of `Frames: 120`.
+fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
+    let field = read_field(lines, &["frames"], Code::BvhFrames, "Frames: 120")?;
+    let whole = field.text.parse();
+    whole.map_err(|_| {
+        let message = format!(
+            "`{}` is no number of frames; write a whole number",
+            field.text
+        );
+        lines.refuse(field.column, Code::BvhFrames, message)
+    })
+}
+
+/// The rate of `Frame Time: 0.0083333`.
+fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, Diagnostic> {
+    let Field { column, text } = read_field(
+        lines,
+        &["frame", "time"],
+        Code::BvhFrameTime,
+        "Frame Time: 0.0083333",
+    )?;
+    let period = number::parse(&text)
+        .map_err(|(code, message)| lines.refuse(column, code, message))?
+        .value;
+    let rate = if raw {
+        rate::itself(period)
+    } else {
+        rate::of_period(&text, period)
+    };
+    rate.ok_or_else(|| {
+        let message = format!("a frame time of {text} s; it is from 1e-9 to 1e9");
+        lines.refuse(column, Code::BvhFrameTime, message)
+    })
+}
+
+/// What stands behind a line's words and colon.
+struct Field {
+    column: u64,
+    text: String,
+}
+
+fn read_field<R: BufRead>(
+    lines: &mut Lines<R>,
+    words: &[&str],
+    code: Code,
+    example: &str,
+) -> Result<Field, Diagnostic> {
+    while let Some(line) = lines.next()? {
+        let mut rest = line.trim_start();
+        if rest.is_empty() {
+            lines.reuse(line);
+            continue;
+        }
+        for word in words {
+            let found = rest.split_at_checked(word.len());
+            let found = found.filter(|(start, _)| start.eq_ignore_ascii_case(word));
+            rest = found.map_or("", |(_, rest)| rest.trim_start());
+        }
+        let value = rest.strip_prefix(':').unwrap_or_default();
+        let mut values = tokens(value);
+        let (Some((column, text)), None) = (values.next(), values.next()) else {
+            let message = format!("`{example}` stands here, with one number; it is missing");
+            return Err(lines.refuse(1, code, message));
+        };
+        return Ok(Field {
+            column: (line.len() - value.len()) as u64 + column,
+            text: text.to_owned(),
+        });
+    }
+    let message = format!("`{example}` is missing; is the file cut?");
+    Err(lines.refuse_end(code, message))
+}
+
+fn read_row<R: BufRead>(
+    lines: &mut Lines<R>,
+    line: &str,
+    columns: usize,
+    row: &mut Vec<f64>,
+) -> Result<(), Diagnostic> {
+    row.clear();
+    for (column, token) in tokens(line) {
+        let number = match number::parse(token) {
+            Ok(number) if row.len() < columns => number,
+            Err((code, message)) if tokens(line).count() == columns => {
+                return Err(lines.refuse(column, code, message));
+            }
+            // What is wrong with the row as a whole explains more.
+            _ => return Err(wrong_count(lines, line, columns)),
+        };
+        if number.vanished {
+            let message = format!("`{token}` is too small for f32; it becomes 0");
+            lines.warn(column, Code::Tiny, message);
+        }
+        row.push(number.value);
+    }
+    if row.len() < columns {
+        return Err(wrong_count(lines, line, columns));
+    }
+    Ok(())
+}
+
+fn wrong_count<R: BufRead>(lines: &Lines<R>, line: &str, columns: usize) -> Diagnostic {
+    let found = tokens(line).count();
+    let first_extra = tokens(line).nth(columns).map(|(column, _)| column);
+    let column = first_extra.unwrap_or(line.trim_end().len() as u64 + 1);
+    let message = format!("{found} numbers where {columns} are expected, one for each channel");
+    lines.refuse(column, Code::BvhRow, message)
+}

@@ -1,0 +1,124 @@
+//! Times as decimal numbers, exact to 1e-24 s: an f64 of seconds since 1970 is exact to 0.2 µs.
+
+use std::fmt;
+
+/// Steps of a second.
+const SECOND: i128 = 10i128.pow(PLACES);
+const PLACES: u32 = 24;
+
+/// Seconds either way of 0 that are taken, three million years.
+const LARGEST: i128 = 100_000_000_000_000 * SECOND;
+
+/// A number of seconds, in steps of 1e-24.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Decimal(i128);
+
+impl Decimal {
+    /// A number as [`parse`](crate::text::number::parse) takes it; digits behind the 24th place
+    /// are left out. `None` beyond ±1e14.
+    pub(crate) fn parse(token: &str) -> Option<Self> {
+        let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
+        let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+        let is_negative = whole.starts_with('-');
+        let digits = format!("{}{decimals}", whole.trim_start_matches(['+', '-']));
+        let digits = digits.trim_start_matches('0');
+        if digits.is_empty() {
+            return Some(Self(0));
+        }
+        // An exponent of too many digits for i32 is out of range, or leaves nothing.
+        let exponent = match exponent.parse::<i32>() {
+            Ok(exponent) => exponent,
+            Err(_) if exponent.starts_with('-') => return Some(Self(0)),
+            Err(_) => return None,
+        };
+        let zeros = exponent
+            .saturating_sub(decimals.len() as i32)
+            .saturating_add(PLACES as i32);
+        let digits = match usize::try_from(zeros) {
+            Ok(zeros) if zeros + digits.len() <= 39 => format!("{digits}{}", "0".repeat(zeros)),
+            Ok(_) => return None,
+            Err(_) => {
+                let kept = digits.len().saturating_sub(zeros.unsigned_abs() as usize);
+                format!("0{}", &digits[..kept])
+            }
+        };
+        let steps: i128 = digits.parse().ok().filter(|&steps| steps <= LARGEST)?;
+        Some(Self(if is_negative { -steps } else { steps }))
+    }
+
+    /// Whole seconds and the shortest decimals of a time behind them; `None` beyond ±1e14.
+    pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
+        let Self(time) = Self::parse(&time.to_string())?;
+        let sum = i128::from(whole).checked_mul(SECOND)?.checked_add(time)?;
+        (sum.abs() <= LARGEST).then_some(Self(sum))
+    }
+
+    /// The whole second at or before it.
+    pub(crate) fn whole_seconds(self) -> i64 {
+        self.0.div_euclid(SECOND) as i64
+    }
+
+    /// Seconds behind a whole second, correctly rounded.
+    pub(crate) fn since(self, whole: i64) -> f64 {
+        let difference = Self(self.0 - i128::from(whole) * SECOND);
+        difference.to_string().parse().unwrap_or(f64::NAN) // digits and a point
+    }
+}
+
+impl fmt::Display for Decimal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (sign, steps) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());
+        let (whole, rest) = (steps / SECOND as u128, steps % SECOND as u128);
+        if rest == 0 {
+            return write!(f, "{sign}{whole}");
+        }
+        let decimals = format!("{rest:0places$}", places = PLACES as usize);
+        write!(f, "{sign}{whole}.{}", decimals.trim_end_matches('0'))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_digit_is_kept() {
+        for (token, shown) in [
+            ("1305031098.6659", "1305031098.6659"),
+            ("1.305031098665900000e+09", "1305031098.6659"),
+            ("-0.25", "-0.25"),
+            ("+.5", "0.5"),
+            ("5.", "5"),
+            ("-0", "0"),
+            ("1e-24", "0.000000000000000000000001"),
+            ("1.9e-24", "0.000000000000000000000001"),
+            ("1e-999999999999", "0"),
+            ("0e999999999999", "0"),
+            ("00012", "12"),
+            ("1e14", "100000000000000"),
+        ] {
+            assert_eq!(Decimal::parse(token).unwrap().to_string(), shown, "{token}");
+        }
+        for token in ["100000000000000.1", "-1e15", "1e38", "1e999999999999"] {
+            assert_eq!(Decimal::parse(token), None, "{token}");
+        }
+    }
+
+    #[test]
+    fn whole_seconds_and_the_rest_are_the_time() {
+        let time = Decimal::parse("1305031098.6659").unwrap();
+        assert_eq!(
+            (time.whole_seconds(), time.since(1_305_031_098)),
+            (1_305_031_098, 0.6659)
+        );
+        assert_eq!(Decimal::of(1_305_031_098, 0.6659), Some(time));
+        let before = Decimal::parse("-3.25").unwrap();
+        assert_eq!((before.whole_seconds(), before.since(-4)), (-4, 0.75));
+        assert_eq!(Decimal::of(-4, 0.75), Some(before));
+        assert_eq!(before.since(0), -3.25);
+        assert_eq!(
+            (Decimal::of(i64::MAX, 0.0), Decimal::of(0, f64::NAN)),
+            (None, None)
+        );
+    }
+}

@@ -1,0 +1,43 @@
+//! Names of joints that any program can read, and that are told apart.
+
+use std::collections::HashSet;
+
+/// The name of joint `index` (from 0) in a file whose names are words and differ: blanks and braces
+/// become `_`, a joint without a name is `joint7`, and a name that is taken gets the joint's number
+/// behind it, `hand#12`. `taken` collects what was given.
+pub(crate) fn usable_name(name: &str, index: usize, taken: &mut HashSet<String>) -> String {
+    let is_odd = |c: char| c.is_whitespace() || c.is_control() || c == '{' || c == '}';
+    let mut usable = name.trim().replace(is_odd, "_");
+    if usable.is_empty() {
+        usable = format!("joint{index}");
+    }
+    if taken.contains(&usable) {
+        usable = format!("{usable}#{index}");
+    }
+    while taken.contains(&usable) {
+        usable.push('_');
+    }
+    taken.insert(usable.clone());
+    usable
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_words_that_differ() {
+        let given = [
+            "hips", "left arm", "", " a{b}\n", "hips", "hips#4", "joint2", "hips",
+        ];
+        let mut taken = HashSet::new();
+        let names = given.iter().enumerate();
+        let names: Vec<_> = names
+            .map(|(index, name)| usable_name(name, index, &mut taken))
+            .collect();
+        let expected = [
+            "hips", "left_arm", "joint2", "a_b_", "hips#4", "hips#4#5", "joint2#6", "hips#7",
+        ];
+        assert_eq!(names, expected);
+    }
+}

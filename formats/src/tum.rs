@@ -1,0 +1,251 @@
+//! Trajectories as the TUM RGB-D benchmark has them: `t x y z qx qy qz qw` a line, separated by
+//! blanks or commas, with `#` comments. Times are often seconds since 1970.
+
+use std::fmt::Write as _;
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+
+use glam::{DQuat, Vec3};
+use tumble::{TrackError, TrackSet};
+
+use crate::decimal::Decimal;
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::format::{Format, Loaded, MotionOptions, ReadOptions, WriteError};
+use crate::grid::{Precision, restore};
+use crate::keys::{Origin, select};
+use crate::motion::{Joint, Motion, Sampled, Transform};
+use crate::source::Source;
+use crate::text::lines::{Lines, tokens};
+use crate::text::number;
+use crate::warnings::Warnings;
+
+/// A path of one body.
+pub static FORMAT: Format = Format {
+    name: "tum",
+    summary: "a trajectory, `t x y z qx qy qz qw` a line",
+    extensions: &[],
+    // The headings of the benchmark itself and of its tools; many files have none.
+    probe: |start| {
+        let line = start
+            .split(|&byte| byte == b'\n')
+            .next()
+            .unwrap_or_default();
+        let has = |words: &[u8]| line.windows(words.len()).any(|part| part == words);
+        line.starts_with(b"#") && (has(b"ground truth trajectory") || has(b"tx ty tz"))
+    },
+    read: Some(open_tum),
+    write: None,
+    write_motion: Some(write_motion),
+    many_clips: false,
+};
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_tum(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let mut source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let loaded = read_tum(&name, &mut source.reader, options)?;
+    source.check_unchanged()?;
+    Ok(loaded)
+}
+
+/// Reads poses; `name` is what messages call the input. The one track is named `body`. Times count
+/// from the whole second at or before the first, which is the clip's
+/// [`time_offset`](Motion::time_offset).
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_tum(
+    name: &str,
+    reader: impl BufRead,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
+    let mut lines = Lines::with_names(name, reader, options.limits)?;
+    let mut poses = Poses::default();
+    while let Some(line) = lines.next()? {
+        let numbers = line.split('#').next().unwrap_or_default();
+        if !numbers.trim().is_empty() {
+            poses.read(&mut lines, &numbers.replace(',', " "))?;
+        }
+        lines.reuse(line);
+    }
+    if poses.times.is_empty() {
+        let message = "no poses; a line is `t x y z qx qy qz qw`".to_owned();
+        return Err(lines.refuse_end(Code::TumEmpty, message));
+    }
+    poses.into_clip(name, lines.warnings, options)
+}
+
+#[derive(Default)]
+struct Poses {
+    times: Vec<Decimal>,
+    positions: Vec<Vec3>,
+    rotations: Vec<DQuat>,
+    /// The line of each.
+    lines: Vec<u64>,
+}
+
+impl Poses {
+    fn read<R: BufRead>(&mut self, lines: &mut Lines<R>, line: &str) -> Result<(), Diagnostic> {
+        let found = tokens(line).count();
+        if found != 8 {
+            let column = tokens(line)
+                .nth(8)
+                .map_or(line.trim_end().len() as u64 + 1, |(at, _)| at);
+            let message = format!("{found} numbers where 8 are expected: t x y z qx qy qz qw");
+            return Err(lines.refuse(column, Code::TumPose, message));
+        }
+        let mut numbers = [0.0; 8];
+        for (number, (column, token)) in numbers.iter_mut().zip(tokens(line)) {
+            let read = number::parse(token)
+                .map_err(|(code, message)| lines.refuse(column, code, message))?;
+            if read.vanished {
+                let message = format!("`{token}` is too small for f32; it becomes 0");
+                lines.warn(column, Code::Tiny, message);
+            }
+            *number = read.value;
+        }
+        let (column, time) = tokens(line).next().unwrap_or((1, ""));
+        let Some(time) = Decimal::parse(time) else {
+            let message = format!("the time {time} is out of range; is it seconds?");
+            return Err(lines.refuse(column, Code::TumTime, message));
+        };
+        let [_, x, y, z, qx, qy, qz, qw] = numbers;
+        self.times.push(time);
+        self.positions.push(Vec3::new(x as f32, y as f32, z as f32));
+        self.rotations.push(DQuat::from_xyzw(qx, qy, qz, qw));
+        self.lines.push(lines.number);
+        Ok(())
+    }
+
+    fn into_clip(
+        self,
+        name: &str,
+        of_lines: Vec<Diagnostic>,
+        options: &ReadOptions,
+    ) -> Result<Loaded, Diagnostic> {
+        let place = |key: usize| Place::Text {
+            line: self.lines[key],
+            column: 1,
+        };
+        let origin = Origin {
+            file: name,
+            place: &place,
+            duplicates: options.duplicates,
+        };
+        let mut warnings = Warnings::new(name);
+        let offset = self.times[0].whole_seconds();
+        let mut times: Vec<f64> = self.times.iter().map(|time| time.since(offset)).collect();
+        let mut positions = self.positions;
+        let mut keys = origin.unit(self.rotations, &mut warnings)?;
+        let equal = |i: usize, j: usize| keys[i] == keys[j] && positions[i] == positions[j];
+        let kept = origin.increasing(&times, equal, &mut warnings)?;
+        select(&mut times, kept.as_deref());
+        select(&mut positions, kept.as_deref());
+        select(&mut keys, kept.as_deref());
+        let mut lists = [times];
+        let rate = match options.raw_times {
+            true => None,
+            false => restore(&mut lists, Precision::F64),
+        };
+        let [times] = lists;
+        let mut set = TrackSet::new();
+        // Checked above; a set refuses what slipped through.
+        let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
+        set.push("body", &times, &keys).map_err(refuse)?;
+        set.set_translations(0, &times, &positions, &[])
+            .map_err(refuse)?;
+        let clip = Motion {
+            set,
+            skeleton: vec![Joint {
+                parent: None,
+                rest: Transform::default(),
+            }],
+            rate,
+            time_offset: offset,
+            ..Motion::default()
+        };
+        let warnings = of_lines.into_iter().chain(warnings.into_list());
+        Ok(Loaded::of(clip, warnings.collect()))
+    }
+}
+
+/// Writes one clip of one track. Times keep all digits, also those that count from 1970; the other
+/// numbers have the fewest digits that read back as the same f32.
+fn write_motion(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
+    let &[ref sampled] = clips else {
+        let message = format!("{} clips; a trajectory is one, choose one", clips.len());
+        return Err(refuse(message).into());
+    };
+    let tracks = sampled.clip.set.track_count();
+    if tracks != 1 {
+        let message = format!("{tracks} tracks; a trajectory is one, choose one");
+        return Err(refuse(message).into());
+    }
+    let samples = sampled.times.len();
+    let fits = |count: usize| count == 0 || count == samples;
+    if sampled.rotations.len() != samples
+        || !fits(sampled.translations.len())
+        || !fits(sampled.scales.len())
+    {
+        let message = "lists of samples whose lengths are not those of times and tracks";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
+    }
+    let mut warnings = Warnings::new(&options.name);
+    if sampled
+        .scales
+        .iter()
+        .any(|scale| !scale.abs_diff_eq(Vec3::ONE, 1e-5))
+    {
+        warnings.warn(Code::Scales, || {
+            (
+                None,
+                "the body is scaled; a trajectory has no scales, they are left out",
+            )
+        });
+    }
+    let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
+    for (key, value) in sampled.notes {
+        let value = value.replace(char::is_control, " ");
+        text += &format!("# {key}: {value}\n");
+    }
+    let rest = sampled
+        .clip
+        .skeleton
+        .first()
+        .map(|joint| joint.rest.translation);
+    for (sample, &time) in sampled.times.iter().enumerate() {
+        let Some(time) = Decimal::of(sampled.clip.time_offset, time) else {
+            let message = format!("the time {time} s is out of range");
+            return Err(refuse(message).into());
+        };
+        let position = sampled
+            .translations
+            .get(sample)
+            .copied()
+            .or(rest)
+            .unwrap_or_default();
+        let rotation = sampled.rotations[sample];
+        if !position.is_finite() || !rotation.is_finite() {
+            let message = format!("the pose at {time} s is not finite");
+            return Err(refuse(message).into());
+        }
+        let _ = write!(text, "{time}"); // memory takes everything
+        for number in position.to_array().into_iter().chain(rotation.to_array()) {
+            let number = if number.is_normal() { number } else { 0.0 };
+            let _ = write!(text, " {number}");
+        }
+        text.push('\n');
+        out.write_all(text.as_bytes())?;
+        text.clear();
+    }
+    out.write_all(text.as_bytes())?;
+    Ok(warnings.into_list())
+}
