@@ -10,7 +10,7 @@ import { position } from "./data.js";
 const BREADTH = 0.18;
 const BROADEST = 0.85;
 // The edge of a root's cube, of the middle one of all bones' lengths; or of the extent where no bone has any.
-const CUBE = 0.35;
+const CUBE = 0.2;
 const LONE_CUBE = 0.03;
 
 /** A bone of length 1: its joint at the origin, its parent at (0, -1, 0), flat sides. */

@@ -108,3 +108,12 @@ export function position({ positions }, joints, sample, joint) {
   const at = (sample * joints + joint) * 3;
   return low.map((least, axis) => least + (packed[at + axis] / 65535) * size[axis]);
 }
+
+/** The same in words, to about a thousandth of a percent of the clip's extent. */
+export function placeInWords(result, joints, sample, joint) {
+  const extent = Math.max(...result.positions.size) || 1;
+  const digits = Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
+  // No -0.00: what is rounded to zero loses its sign.
+  const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits);
+  return position(result, joints, sample, joint).map(words).join("  ");
+}

@@ -1,6 +1,6 @@
 // What is shown, and what people do to it.
 
-import { Set as Input, position, rotation } from "./data.js";
+import { Set as Input, placeInWords, rotation } from "./data.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./scene.js";
 import { colours, switchTheme } from "./theme.js";
@@ -136,9 +136,7 @@ function show(sample) {
   element("clock").textContent = `${time.toFixed(3)} s, sample ${sample + 1} of ${input.samples}`;
   const [x, y, z, w] = rotation(results[0], input.boxes, sample, state.box);
   const turned = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
-  const at = input.isSkeleton ? position(results[0], input.boxes, sample, state.box) : null;
-  const place = at ? `, at ${at.map((value) => value.toPrecision(4)).join("  ")}` : "";
-  element("box-values").textContent = turned + place;
+  element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(results[0], input.boxes, sample, state.box)}` : "");
 }
 
 const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4);

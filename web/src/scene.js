@@ -11,6 +11,9 @@ import { Bones } from "./bones.js";
 // Frames slower than this are drawn with fewer pixels.
 const SLOW = 30;
 const COARSEST = 0.5;
+// Where the camera looks from at first: down and around the upright axis, radians.
+const DOWN = 0.3;
+const AROUND = 0.4;
 
 /** Where the boxes of one result stand at a sample. */
 class Boxes {
@@ -178,7 +181,9 @@ export class Stage {
     this.points = results.flatMap((result) => group.points(result, samples, apart));
     this.extent = new Box3().setFromPoints(this.points);
     this.room = this.extent.clone().expandByScalar(group.length * 0.2);
-    this.span = this.room.max.x - this.room.min.x + group.length * 0.5;
+    const size = this.room.getSize(new Vector3());
+    // Long skeletons side by side would hide each other: the camera looks past them at an angle.
+    this.span = size.x + (this.hasSquares ? size.z * Math.tan(AROUND) : 0) + group.length * 0.5;
   }
 
   /** The floor under it, and the camera where it sees everything. */
@@ -194,7 +199,7 @@ export class Stage {
       this.floorPlace = new Vector3(centre.x, min.y - (max.y - min.y) * 0.02, centre.z);
     }
     this.layFloor();
-    const view = new Quaternion().setFromEuler(new Euler(-0.3, 0.4, 0, "YXZ"));
+    const view = new Quaternion().setFromEuler(new Euler(-DOWN, AROUND, 0, "YXZ"));
     const back = view.clone().invert();
     const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2)) * 0.92;
     const point = new Vector3();
