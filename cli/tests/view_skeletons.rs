@@ -28,7 +28,7 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|t| t.to_string())
+        .map(ToString::to_string)
         .collect();
     fs::write(folder.join("times.txt"), lines.join("\n")).unwrap();
     for method in ["bessel-overhauser", "c2"] {

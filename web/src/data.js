@@ -114,6 +114,6 @@ export function placeInWords(result, joints, sample, joint) {
   const extent = Math.max(...result.positions.size) || 1;
   const digits = Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
   // No -0.00: what is rounded to zero loses its sign.
-  const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits);
+  const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
   return position(result, joints, sample, joint).map(words).join("  ");
 }

@@ -147,11 +147,6 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// Parses a method's name; help, errors and completions list them all.
-pub(crate) fn method() -> impl TypedValueParser<Value = Method> {
-    PossibleValuesParser::new(names()).try_map(|name| name.parse::<Method>())
-}
-
 /// A method for every channel, or each channel's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wanted(pub(crate) Option<Method>);
@@ -185,7 +180,7 @@ fn wanted_names() -> impl Iterator<Item = PossibleValue> {
     Wanted::all().map(|wanted| PossibleValue::new(wanted.name()).help(wanted.summary()))
 }
 
-/// As [`method`], and `authored`.
+/// Parses the name of one of [`Wanted::all`]; help, errors and completions list them all.
 pub(crate) fn wanted() -> impl TypedValueParser<Value = Wanted> {
     PossibleValuesParser::new(wanted_names()).map(|name| Wanted(Method::named(&name)))
 }
@@ -211,7 +206,7 @@ const ALL: &str = "all";
 #[derive(Debug, Clone)]
 pub(crate) struct Selection(pub(crate) Vec<Method>);
 
-/// As [`method`], and `all`.
+/// Parses the name of a method, or `all`.
 pub(crate) fn methods() -> impl TypedValueParser<Value = Selection> {
     let all = PossibleValue::new(ALL).help("every method");
     PossibleValuesParser::new(std::iter::once(all).chain(names())).map(|name| {

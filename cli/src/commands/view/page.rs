@@ -112,7 +112,7 @@ impl StoredResult {
         let positions = || poses.iter().map(|pose| pose.position.as_dvec3());
         let low = positions().reduce(DVec3::min).unwrap_or_default();
         let size = positions().reduce(DVec3::max).unwrap_or_default() - low;
-        if !positions().all(|position| position.is_finite()) {
+        if !positions().all(DVec3::is_finite) {
             return None;
         }
         // A coordinate that is always the same has no size to be divided by.
