@@ -22,13 +22,19 @@ async function differences(text, stride) {
   return values;
 }
 
-/** One input: its boxes, sample times, keys, and results by each method. */
+/** One clip: its boxes or joints, sample times, keys, and results by each method. */
 export class Set {
   constructor(stored) {
     this.stored = stored;
     this.name = stored.name;
     this.boxes = stored.boxes;
     this.length = stored.length;
+    // Of joints: what each hangs on (-1: nothing), and its name. Boxes of a chain have neither.
+    this.parents = stored.parents;
+    this.names = stored.names;
+    this.isWorld = stored.isWorld;
+    this.isSkeleton = stored.parents.length > 0;
+    this.methods = stored.results.map((result) => result.method);
     this.results = new Map();
   }
 
@@ -39,17 +45,22 @@ export class Set {
     this.keys = new Int16Array((await differences(this.stored.keys, 4)).buffer);
   }
 
-  /** The rotations by a method, [sample][box][xyzw] as 16-bit integers, and the speeds. */
+  /** The rotations by a method, [sample][box][xyzw] as 16-bit integers, the speeds, and where joints are. */
   async result(method) {
     if (!this.results.has(method)) {
       const stored = this.stored.results.find((result) => result.method === method);
       const rotations = await differences(stored.rotations, this.boxes * 4);
       const speeds = await differences(stored.speeds, this.boxes);
+      const positions = stored.positions && {
+        ...stored.positions,
+        packed: await differences(stored.positions.packed, this.boxes * 3),
+      };
       this.results.set(method, {
         method,
         rotations: new Int16Array(rotations.buffer),
         speeds,
         fastest: stored.fastest,
+        positions,
       });
     }
     return this.results.get(method);
@@ -89,4 +100,20 @@ export function rotation(result, boxes, sample, box) {
   const q = [0, 1, 2, 3].map((i) => result.rotations[at + i] / 32767);
   const length = Math.hypot(...q) || 1;
   return q.map((component) => component / length);
+}
+
+/** Where a joint is in the world, x y z. */
+export function position({ positions }, joints, sample, joint) {
+  const { low, size, packed } = positions;
+  const at = (sample * joints + joint) * 3;
+  return low.map((least, axis) => least + (packed[at + axis] / 65535) * size[axis]);
+}
+
+/** The same in words, to about a thousandth of a percent of the clip's extent. */
+export function placeInWords(result, joints, sample, joint) {
+  const extent = Math.max(...result.positions.size) || 1;
+  const digits = Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
+  // No -0.00: what is rounded to zero loses its sign.
+  const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
+  return position(result, joints, sample, joint).map(words).join("  ");
 }

@@ -1,22 +1,24 @@
 // What is shown, and what people do to it.
 
-import { Set as Input, rotation } from "./data.js";
+import { Set as Input, placeInWords, rotation } from "./data.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./scene.js";
+import { colours, switchTheme } from "./theme.js";
 
 const element = (id) => document.getElementById(id);
 const stored = JSON.parse(element("data").textContent);
 const inputs = stored.sets.map((set) => new Input(set));
 // A longer chain is a tangle: its boxes are shown apart until somebody asks for the chain.
 const CHAIN = 64;
+const isTangle = (input) => !input.isSkeleton && input.boxes > CHAIN;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
 const state = {
   input: inputs[0],
-  method: stored.first,
+  method: inputs[0].methods[0],
   other: "",
   pairing: "ghost",
-  apart: inputs[0].boxes > CHAIN,
+  apart: isTangle(inputs[0]),
   box: 0,
   picked: false,
   time: 0,
@@ -28,22 +30,6 @@ const state = {
 let results = [];
 let stage = null;
 const plots = new Plots({ components: element("components"), speeds: element("speeds") }, (time) => seek(time));
-
-function colours() {
-  const style = getComputedStyle(document.documentElement);
-  const probe = document.createElement("i");
-  document.body.append(probe);
-  // What light-dark() comes to.
-  const value = (name) => {
-    probe.style.color = style.getPropertyValue(`--${name}`);
-    return getComputedStyle(probe).color;
-  };
-  const names = ["ground", "panel", "ink", "pale", "line", "accent"];
-  const theme = Object.fromEntries(names.map((name) => [name, value(name)]));
-  probe.remove();
-  theme.methods = Object.fromEntries(stored.methods.map((method) => [method.name, method.colour]));
-  return theme;
-}
 
 function fill(select, entries) {
   select.replaceChildren(
@@ -67,7 +53,7 @@ function load(refit = false) {
     if (stage) {
       const ghost = state.pairing === "ghost";
       const pair = results.length > 1 ? { ghost, colours: ghost ? [colourOf(other)] : stored.boxColours } : null;
-      stage.fill(input.boxes, input.length, stored.boxColours, pair);
+      stage.fill(input, results, stored.boxColours, pair);
       if (refit) {
         stage.measure(results, input.samples, state.apart);
         stage.frame(side());
@@ -89,6 +75,7 @@ const colourOf = (name) => stored.methods.find((method) => method.name === name)
 /** Menus, names and legend as the state is. */
 function tell() {
   const { input } = state;
+  fillMethods();
   element("title").textContent = input.name;
   document.title = `${input.name} · Tumble`;
   element("set").value = String(inputs.indexOf(input));
@@ -98,6 +85,10 @@ function tell() {
   element("pairing-field").hidden = results.length < 2;
   element("pairing-field").style.display = results.length < 2 ? "none" : "";
   element("arrangement").value = state.apart ? "apart" : "chain";
+  element("arrangement-field").style.display = input.isSkeleton ? "none" : "";
+  element("box-label").textContent = input.isSkeleton ? "Joint" : "Box";
+  element("box-name").textContent = input.isSkeleton ? input.names[state.box] : "";
+  element("stage").ariaLabel = `The ${input.isSkeleton ? "bones" : "boxes"}. Drag, or use the arrow keys, to turn the view.`;
   element("speed").value = String(state.speed);
   element("loop").checked = state.loop;
   element("box").max = String(input.boxes);
@@ -111,10 +102,24 @@ function tell() {
     return entry;
   });
   element("legend").replaceChildren(...legend);
+  const square = input.isSkeleton && stage?.square;
+  element("floor").textContent = square ? `squares of ${Number(square.toPrecision(1))}` : "";
+}
+
+/** The methods that this input is shown by. */
+function fillMethods() {
+  const names = state.input.methods.join();
+  if (element("method").dataset.names === names) return;
+  element("method").dataset.names = names;
+  const methods = stored.methods
+    .filter(({ name }) => state.input.methods.includes(name))
+    .map(({ name, summary }) => [name, name, summary]);
+  fill(element("method"), methods);
+  fill(element("other"), [["", "nothing"], ...methods]);
 }
 
 function drawPlots() {
-  plots.show(state.input, results, state.box, colours());
+  plots.show(state.input, results, state.box, colours(stored.methods));
   plots.now(state.input.times[state.sample] ?? 0);
 }
 
@@ -130,7 +135,8 @@ function show(sample) {
   element("time").setAttribute("aria-valuetext", `${time.toFixed(3)} seconds`);
   element("clock").textContent = `${time.toFixed(3)} s, sample ${sample + 1} of ${input.samples}`;
   const [x, y, z, w] = rotation(results[0], input.boxes, sample, state.box);
-  element("box-values").textContent = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
+  const turned = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
+  element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(results[0], input.boxes, sample, state.box)}` : "");
 }
 
 const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4);
@@ -186,7 +192,7 @@ function advance(seconds) {
 }
 
 function setMethod(name) {
-  if (!stored.methods.some((method) => method.name === name)) return; // not in this page
+  if (!state.input.methods.includes(name)) return; // not in this page
   state.method = name;
   load();
 }
@@ -200,7 +206,7 @@ function setOther(name, pairing = state.pairing) {
 
 /** Off, ghost, side by side, off. */
 function nextPairing() {
-  const names = stored.methods.map((method) => method.name);
+  const names = state.input.methods;
   const other = ["slerp", "bessel-overhauser", ...names].find((name) => name !== state.method && names.includes(name));
   if (!other) return;
   if (!state.other) setOther(other, "ghost");
@@ -209,6 +215,7 @@ function nextPairing() {
 }
 
 function arrange(apart) {
+  if (state.input.isSkeleton) return; // joints are where they are
   state.apart = apart;
   load(true);
 }
@@ -234,16 +241,20 @@ function loop(on) {
   tell();
 }
 
+function setInput(input) {
+  Object.assign(state, { input, sample: 0, time: 0, apart: isTangle(input) });
+  if (!input.methods.includes(state.method)) state.method = input.methods[0];
+  if (!input.methods.includes(state.other)) state.other = "";
+  load(true);
+}
+
 function theme() {
-  const root = document.documentElement;
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const now = root.dataset.theme ?? (dark ? "dark" : "light");
-  root.dataset.theme = now === "dark" ? "light" : "dark";
+  switchTheme();
   dress();
 }
 
 function dress() {
-  const found = colours();
+  const found = colours(stored.methods);
   stage?.theme({ ground: found.panel, line: found.line, pale: found.pale });
   if (results.length > 0) drawPlots();
 }
@@ -261,7 +272,7 @@ const KEYS = [
   ["m", "m", "choose any other method", () => element("method").focus()],
   ["g", "g", "compare with another method: ghost, side by side, off", nextPairing],
   ["a", "a", "boxes as a chain, or apart", () => arrange(!state.apart)],
-  ["n p", ["n", "p"], "curves of the next box, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
+  ["n p", ["n", "p"], "curves of the next box or joint, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
   ["- +", ["-", "+", "="], "slower, faster", (key) => faster(key === "-" ? -1 : 1)],
   ["l", "l", "loop", () => loop(!state.loop)],
   ["r", "r", "the whole view again", () => stage?.frame(side())],
@@ -309,11 +320,7 @@ function listen() {
     state.speed = Number(event.target.value);
   });
   on("loop", "change", (event) => loop(event.target.checked));
-  on("set", "change", (event) => {
-    const input = inputs[Number(event.target.value)];
-    Object.assign(state, { input, sample: 0, time: 0, apart: input.boxes > CHAIN });
-    load(true);
-  });
+  on("set", "change", (event) => setInput(inputs[Number(event.target.value)]));
   on("method", "change", (event) => setMethod(event.target.value));
   on("other", "change", (event) => setOther(event.target.value));
   on("pairing", "change", (event) => setOther(state.other, event.target.value));
@@ -332,11 +339,9 @@ function listen() {
 }
 
 function menus() {
-  const methods = stored.methods.map(({ name, summary }) => [name, name, summary]);
   fill(element("set"), inputs.map((input, i) => [String(i), input.name]));
   element("set-field").style.display = inputs.length > 1 ? "" : "none";
-  fill(element("method"), methods);
-  fill(element("other"), [["", "nothing"], ...methods]);
+  element("set-label").textContent = stored.menu;
   fill(element("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]));
   element("keys").replaceChildren(
     ...KEYS.flatMap(([label, , text]) => {
@@ -347,7 +352,8 @@ function menus() {
     }),
   );
   element("about").textContent =
-    `Rotations made by tumble ${stored.version} on ${stored.device}, kept in 16 bits a component; ` +
+    `${inputs.some((input) => input.isSkeleton) ? "Rotations and positions" : "Rotations"} made by tumble ` +
+    `${stored.version} on ${stored.device}, kept in 16 bits a component; ` +
     "this page interpolates nothing. three.js and uPlot are under the MIT licence; see the page's source.";
 }
 
@@ -360,7 +366,7 @@ async function start() {
     stage = new Stage(element("stage"), !many);
   } catch (error) {
     element("trouble").hidden = false;
-    element("trouble").textContent = `The boxes cannot be drawn, this browser has no WebGL (${error.message}); the curves are below.`;
+    element("trouble").textContent = `Nothing can be drawn, this browser has no WebGL (${error.message}); the curves are below.`;
   }
   dress();
   await load(true);
@@ -382,6 +388,7 @@ globalThis.tumble = {
   seek,
   loaded: () => loading,
   shown: (box, group = 0) => stage.groups[group].shown(box, state.apart),
+  ends: (joint, group = 0) => stage.groups[group].ends(joint),
   frames: () => stage.drawn,
   pixelRatio: () => stage.ratio,
   ready: start(),

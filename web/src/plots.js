@@ -69,8 +69,11 @@ export class Plots {
       NAMES.forEach((name, i) => series.push(line(`${name}, ${results[1].method}`, colours[i], dashed)));
       data.push(...other);
     }
+    // Keys side by side would hide the curve behind their outlines.
+    const dense = set.keysOf(box).times.length > this.width() / 8;
     NAMES.forEach((name, i) => {
-      const points = { show: true, size: 7, fill: colours[i], stroke: theme.panel, width: 1 };
+      const outlined = { size: 7, stroke: theme.panel, width: 1 };
+      const points = { show: true, fill: colours[i], ...(dense ? { size: 3, width: 0 } : outlined) };
       series.push({ label: `key ${name}`, class: "key", stroke: colours[i], paths: () => null, points });
       data.push(dots[i]);
     });

@@ -1,4 +1,4 @@
-// The boxes, drawn by three.js.
+// The view, drawn by three.js: boxes, or the bones of bones.js.
 
 import {
   Box3, BoxGeometry, Color, DirectionalLight, Euler, GridHelper, HemisphereLight, InstancedMesh,
@@ -6,10 +6,14 @@ import {
   Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Bones } from "./bones.js";
 
 // Frames slower than this are drawn with fewer pixels.
 const SLOW = 30;
 const COARSEST = 0.5;
+// Where the camera looks from at first: down and around the upright axis, radians.
+const DOWN = 0.3;
+const AROUND = 0.4;
 
 /** Where the boxes of one result stand at a sample. */
 class Boxes {
@@ -20,6 +24,8 @@ class Boxes {
     const material = new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
     this.mesh = new InstancedMesh(geometry, material, count);
     this.mesh.frustumCulled = false;
+    this.object = this.mesh;
+    this.meshes = [this.mesh];
     this.length = length;
     this.ghost = ghost;
     this.colours = colours;
@@ -60,6 +66,21 @@ class Boxes {
       hung.add(along.set(0, -this.length, 0).applyQuaternion(turned));
     }
     this.mesh.instanceMatrix.needsUpdate = true;
+  }
+
+  /** Every place that ends of boxes take at some samples. */
+  points(result, samples, apart) {
+    const points = [];
+    const matrix = new Matrix4();
+    const step = Math.max(1, Math.floor(samples / 60));
+    for (let sample = 0; sample < samples; sample += step) {
+      this.place(result, sample, { apart, shift: 0 });
+      for (let box = 0; box < this.mesh.count; box++) {
+        this.mesh.getMatrixAt(box, matrix);
+        for (const end of [0, -this.length]) points.push(new Vector3(0, end, 0).applyMatrix4(matrix));
+      }
+    }
+    return points;
   }
 
   /** The rotation that a box shows, seen from the box it hangs from: read back from what is drawn. */
@@ -123,62 +144,62 @@ export class Stage {
     this.stale = true;
   }
 
-  /** New boxes: of one result, or of two. */
-  fill(count, length, colours, others) {
-    for (const boxes of this.groups ?? []) {
-      this.scene.remove(boxes.mesh);
-      boxes.dispose();
+  /** New boxes or bones: of one result, or of two. */
+  fill(input, results, colours, others) {
+    for (const group of this.groups ?? []) {
+      this.scene.remove(group.object);
+      group.dispose();
     }
-    this.groups = [new Boxes(count, length, colours, false)];
-    if (others) this.groups.push(new Boxes(count, length, others.colours, others.ghost));
-    this.scene.add(...this.groups.map((boxes) => boxes.mesh));
+    const group = (result, colours, ghost) =>
+      input.isSkeleton
+        ? new Bones(input, result, colours, ghost)
+        : new Boxes(input.boxes, input.length, colours, ghost);
+    this.groups = [group(results[0], colours, false)];
+    if (others) this.groups.push(group(results[1], others.colours, others.ghost));
+    this.scene.add(...this.groups.map((group) => group.object));
+    this.hasSquares = input.isSkeleton;
     this.stale = true;
   }
 
   paint(chosen) {
-    for (const boxes of this.groups) boxes.paint(chosen);
+    for (const group of this.groups) group.paint(chosen);
     this.stale = true;
   }
 
   place(results, sample, { apart, side }) {
     const gap = side ? this.span : 0;
-    this.groups.forEach((boxes, group) => {
-      const shift = results.length > 1 ? (group - 0.5) * gap : 0;
-      boxes.place(results[group], sample, { apart, shift });
+    this.groups.forEach((group, i) => {
+      const shift = results.length > 1 ? (i - 0.5) * gap : 0;
+      group.place(results[i], sample, { apart, shift });
     });
     this.stale = true;
   }
 
-  /** Every place that ends of boxes take at some samples. */
+  /** How much room all of it takes. */
   measure(results, samples, apart) {
-    const [boxes] = this.groups;
-    const matrix = new Matrix4();
-    const step = Math.max(1, Math.floor(samples / 60));
-    this.points = [];
-    for (const result of results) {
-      for (let sample = 0; sample < samples; sample += step) {
-        boxes.place(result, sample, { apart, shift: 0 });
-        for (let box = 0; box < boxes.mesh.count; box++) {
-          boxes.mesh.getMatrixAt(box, matrix);
-          for (const end of [0, -boxes.length]) {
-            this.points.push(new Vector3(0, end, 0).applyMatrix4(matrix));
-          }
-        }
-      }
-    }
-    this.room = new Box3().setFromPoints(this.points).expandByScalar(boxes.length * 0.2);
-    this.span = this.room.max.x - this.room.min.x + boxes.length * 0.5;
+    const [group] = this.groups;
+    this.points = results.flatMap((result) => group.points(result, samples, apart));
+    this.extent = new Box3().setFromPoints(this.points);
+    this.room = this.extent.clone().expandByScalar(group.length * 0.2);
+    const size = this.room.getSize(new Vector3());
+    // Long skeletons side by side would hide each other: the camera looks past them at an angle.
+    this.span = size.x + (this.hasSquares ? size.z * Math.tan(AROUND) : 0) + group.length * 0.5;
   }
 
-  /** The floor under the boxes, and the camera where it sees all of them. */
+  /** The floor under it, and the camera where it sees everything. */
   frame(side) {
     const { min, max } = this.room;
     const centre = this.room.getCenter(new Vector3());
     const radius = this.room.getSize(new Vector3()).length() / 2;
-    this.floorSize = 10 ** Math.ceil(Math.log10(radius * 4));
-    this.floorPlace = new Vector3(centre.x, min.y - (max.y - min.y) * 0.02, centre.z);
+    if (this.hasSquares) {
+      this.layOut(side);
+    } else {
+      this.floorSize = 10 ** Math.ceil(Math.log10(radius * 4));
+      this.floorSquares = 40;
+      this.floorPlace = new Vector3(centre.x, min.y - (max.y - min.y) * 0.02, centre.z);
+    }
     this.layFloor();
-    const view = new Quaternion().setFromEuler(new Euler(-0.3, 0.4, 0, "YXZ"));
+    const view = new Quaternion().setFromEuler(new Euler(-DOWN, AROUND, 0, "YXZ"));
     const back = view.clone().invert();
     const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2)) * 0.92;
     const point = new Vector3();
@@ -199,13 +220,29 @@ export class Stage {
     this.stale = true;
   }
 
+  /** A floor for joints: squares of 1, 2 or 5 times a power of ten units, at multiples of that, under all places. */
+  layOut(side) {
+    const { min, max } = this.extent;
+    const aside = side ? this.span / 2 : 0;
+    const across = Math.max(max.x - min.x + 2 * aside, max.y - min.y, max.z - min.z, this.room.max.y - this.room.min.y);
+    const power = 10 ** Math.floor(Math.log10(across / 8));
+    this.square = [1, 2, 5, 10].map((times) => times * power).find((square) => square >= across / 8);
+    const middle = (low, high) => Math.round((low + high) / 2 / this.square) * this.square;
+    this.floorPlace = new Vector3(middle(min.x, max.x), min.y, middle(min.z, max.z));
+    // Two squares more to each side than half of it: the middle is off by up to half a square.
+    this.floorSquares = 2 * (Math.ceil(across / 2 / this.square) + 2);
+    this.floorSize = this.floorSquares * this.square;
+  }
+
   /** The grid, in the colours of the theme. */
   layFloor() {
     if (this.floor) {
       this.scene.remove(this.floor);
       this.floor.dispose();
     }
-    this.floor = new GridHelper(this.floorSize, 40, ...this.lines);
+    // The lines through the middle stand out where the middle means something.
+    const lines = this.hasSquares ? [this.lines[1], this.lines[1]] : this.lines;
+    this.floor = new GridHelper(this.floorSize, this.floorSquares, ...lines);
     this.floor.position.copy(this.floorPlace);
     this.scene.add(this.floor);
     this.stale = true;
@@ -238,15 +275,17 @@ export class Stage {
     this.stale = true;
   }
 
-  /** The box at a point of the page, or -1. */
+  /** The box or joint at a point of the page, or -1. */
   pick(x, y) {
     const area = this.renderer.domElement.getBoundingClientRect();
     const point = new Vector2(((x - area.left) / area.width) * 2 - 1, 1 - ((y - area.top) / area.height) * 2);
     const ray = new Raycaster();
     ray.setFromCamera(point, this.camera);
-    for (const boxes of this.groups) boxes.mesh.boundingSphere = null;
-    const [hit] = ray.intersectObjects(this.groups.map((boxes) => boxes.mesh));
-    return hit ? hit.instanceId : -1;
+    const meshes = this.groups.flatMap((group) => group.meshes).filter((mesh) => mesh.visible);
+    for (const mesh of meshes) mesh.boundingSphere = null;
+    const [hit] = ray.intersectObjects(meshes);
+    if (!hit) return -1;
+    return hit.object.userData.joints?.[hit.instanceId] ?? hit.instanceId;
   }
 
   /** Draws if anything has changed; where that takes long, with fewer pixels from then on. */

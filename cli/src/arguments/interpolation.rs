@@ -147,38 +147,68 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// Parses a method's name; help, errors and completions list them all.
-pub(crate) fn method() -> impl TypedValueParser<Value = Method> {
-    PossibleValuesParser::new(names()).try_map(|name| name.parse::<Method>())
-}
-
 /// A method for every channel, or each channel's own.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wanted(pub(crate) Option<Method>);
 
 impl fmt::Display for Wanted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0.map_or(AUTHORED, |method| method.name))
+        f.write_str(self.name())
     }
 }
 
 const AUTHORED: &str = "authored";
 
-/// As [`method`], and `authored`.
-pub(crate) fn wanted() -> impl TypedValueParser<Value = Wanted> {
-    let help = "as the file says of each channel; bessel-overhauser where it says nothing";
-    let authored = PossibleValue::new(AUTHORED).help(help);
-    PossibleValuesParser::new(std::iter::once(authored).chain(names()))
-        .map(|name| Wanted(Method::named(&name)))
+impl Wanted {
+    pub(crate) fn name(self) -> &'static str {
+        self.0.map_or(AUTHORED, |method| method.name)
+    }
+
+    pub(crate) fn summary(self) -> &'static str {
+        let authored = "as the file says of each channel; bessel-overhauser where it says nothing";
+        self.0.map_or(authored, |method| method.summary)
+    }
+
+    /// Each channel's own method, then all methods.
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        let methods = METHODS.into_iter().map(Some);
+        std::iter::once(None).chain(methods).map(Self)
+    }
 }
+
+fn wanted_names() -> impl Iterator<Item = PossibleValue> {
+    Wanted::all().map(|wanted| PossibleValue::new(wanted.name()).help(wanted.summary()))
+}
+
+/// Parses the name of one of [`Wanted::all`]; help, errors and completions list them all.
+pub(crate) fn wanted() -> impl TypedValueParser<Value = Wanted> {
+    PossibleValuesParser::new(wanted_names()).map(|name| Wanted(Method::named(&name)))
+}
+
+/// One of [`Wanted::all`], or all of them.
+#[derive(Debug, Clone)]
+pub(crate) struct WantedSelection(pub(crate) Vec<Wanted>);
+
+/// As [`wanted`], and `all`.
+pub(crate) fn wanted_methods() -> impl TypedValueParser<Value = WantedSelection> {
+    let all = PossibleValue::new(ALL).help("every method");
+    PossibleValuesParser::new(std::iter::once(all).chain(wanted_names())).map(|name| {
+        WantedSelection(match &*name {
+            ALL => Wanted::all().collect(),
+            _ => vec![Wanted(Method::named(&name))],
+        })
+    })
+}
+
+const ALL: &str = "all";
 
 /// One method, or all of them.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection(pub(crate) Vec<Method>);
 
-/// As [`method`], and `all`.
+/// Parses the name of a method, or `all`.
 pub(crate) fn methods() -> impl TypedValueParser<Value = Selection> {
-    let all = PossibleValue::new("all").help("every method");
+    let all = PossibleValue::new(ALL).help("every method");
     PossibleValuesParser::new(std::iter::once(all).chain(names())).map(|name| {
         Selection(Method::named(&name).map_or_else(|| METHODS.to_vec(), |method| vec![method]))
     })
@@ -186,11 +216,16 @@ pub(crate) fn methods() -> impl TypedValueParser<Value = Selection> {
 
 /// The methods of several selections, each once.
 pub(crate) fn chosen(selections: &[Selection]) -> Vec<Method> {
-    let mut methods: Vec<Method> = Vec::new();
-    for method in selections.iter().flat_map(|selection| &selection.0) {
-        if !methods.contains(method) {
-            methods.push(*method);
+    each_once(selections.iter().flat_map(|selection| &selection.0))
+}
+
+/// The first of all that are equal.
+pub(crate) fn each_once<'a, T: Copy + PartialEq + 'a>(all: impl Iterator<Item = &'a T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for one in all {
+        if !found.contains(one) {
+            found.push(*one);
         }
     }
-    methods
+    found
 }

@@ -37,6 +37,9 @@ const OTHERS: [Colour; 9] = [
     [0xa3, 0x00, 0x59],
 ];
 
+/// Of results whose channels each have their own method.
+pub(crate) const AUTHORED: Colour = [0xe7, 0x29, 0x8a];
+
 /// A method has one colour, wherever it is drawn.
 pub(crate) fn of_method(method: Method) -> Colour {
     common(method.name).unwrap_or_else(|| {
@@ -64,7 +67,8 @@ mod tests {
 
     #[test]
     fn no_two_methods_share_a_colour() {
-        let mut colours = METHODS.map(of_method);
+        let mut colours = METHODS.map(of_method).to_vec();
+        colours.push(AUTHORED);
         colours.sort_unstable();
         assert!(colours.windows(2).all(|pair| pair[0] != pair[1]));
     }

@@ -1,38 +1,39 @@
-//! `tumble view`: a page that shows the boxes turning, in any browser.
+//! `tumble view`: a page that shows boxes turning and skeletons moving, in any browser.
 
 pub(crate) mod pack;
 pub(crate) mod page;
+mod shown;
+#[cfg(test)]
+mod tests;
 
 use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use tumble::{Axes, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Quantity, TrackSet};
-use tumble_formats::motion::Motion;
+use tumble::{FrameRate, Method};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::interpolation::{Manner, Wanted, WantedSelection, each_once, wanted_methods};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::batch::place::Place;
-use crate::batch::room;
-use crate::commands::view::page::{Page, StoredResult, StoredSet};
-use crate::messages::exit::{Failure, OUTPUT};
+use crate::commands::view::page::{Page, StoredSet};
+use crate::commands::view::shown::Shown;
+use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
-/// Bytes of rotations and speeds that a page may hold, before they are packed.
+/// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
 const LARGEST: f64 = 256e6;
 /// With no more than this, every method is shown where none is named.
 const SMALL: f64 = 24e6;
-/// Bytes of one rotation and its speed.
-const SAMPLE: f64 = 10.0;
 
-/// Write a page that shows the boxes turning: one HTML file, for any browser
+/// Write a page that shows boxes turning and skeletons moving: one HTML file, for any browser
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file needs no network and nothing beside it. It shows the engine's own rotations, at
-the frames asked for and at the keys between them; it interpolates nothing itself.
+The file needs no network and nothing beside it. It shows the engine's own rotations and
+positions, at the frames asked for and at the keys between them; it interpolates nothing
+itself. Files with skeletons are shown as bones, all their animations in a menu.
 
 Examples:
   tumble view data/pendulum.dat -o pendulum.html
@@ -56,9 +57,9 @@ pub(crate) struct Arguments {
     #[arg(long)]
     open: bool,
     /// The methods to choose from, or all; the first is shown first [default: all where the
-    /// page stays small, else slerp,catmull-rom,bessel-overhauser,b-spline]
-    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = methods())]
-    methods: Vec<Selection>,
+    /// page stays small, else authored,bessel-overhauser,slerp,catmull-rom,b-spline]
+    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = wanted_methods())]
+    methods: Vec<WantedSelection>,
     /// Frames per second, from the first key to the last: a number or a ratio
     #[arg(
         long,
@@ -79,14 +80,6 @@ pub(crate) struct Arguments {
     device: DeviceArguments,
 }
 
-/// One input, and when it is sampled.
-struct Shown {
-    name: String,
-    set: TrackSet,
-    box_length: f64,
-    times: Vec<f64>,
-}
-
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.distinct(false)?;
     let place = arguments.place(&inputs)?;
@@ -94,55 +87,33 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         place.try_out()?;
     }
     let mut shown = Vec::new();
+    let mut refused = 0;
     for path in &inputs {
-        let name = input::name(path);
         let loaded = arguments.inputs.load(path)?;
-        let box_length = loaded.box_length.unwrap_or(1.0);
-        if loaded.clips.len() > 1 {
-            return Err(input::several(path, &loaded));
+        refused += loaded.refused.len();
+        let several = loaded.clips.len() + loaded.refused.len() > 1;
+        for clip in loaded.clips {
+            let one = Shown::new(path, clip, loaded.box_length, several);
+            if one.clip.set.is_empty() {
+                words::note(&format!("{}: nothing moves; it is left out", one.name));
+            } else {
+                shown.push(arguments.sampled(one)?);
+            }
         }
-        let Some(Motion { set, .. }) = loaded.clips.into_iter().next() else {
-            continue;
-        };
-        let times = arguments.times(&set, &name)?;
-        let name = input::file_name(path);
-        shown.push(Shown {
-            name,
-            set,
-            box_length,
-            times,
-        });
     }
-    let rotations: f64 = shown
-        .iter()
-        .map(|one| one.set.track_count() as f64 * one.times.len() as f64)
-        .sum();
-    let methods = arguments.methods(rotations);
-    let bytes = rotations * methods.len() as f64 * SAMPLE;
-    if bytes > LARGEST {
-        return Err(Failure::usage(format!(
-            "{} by {} are {}, more than the {} that a page can hold; ask for fewer methods (-m), \
-             fewer frames (--fps, --start, --end) or fewer inputs",
-            words::count(rotations as usize, "rotation"),
-            words::count(methods.len(), "method"),
-            words::bytes(bytes),
-            words::bytes(LARGEST),
-        )));
-    }
+    let methods = arguments.methods(&shown)?;
     let mut device = arguments.device.open()?;
-    let mut progress = Progress::new("evaluating", (shown.len() * methods.len()) as u64);
-    let mut sets = Vec::new();
-    for one in &shown {
-        sets.push(arguments.stored(one, &methods, &mut device, &mut progress)?);
-    }
-    drop(progress);
-    let page = Page::new(&methods, sets, &device.label);
-    let text = page.html();
+    let menu = if inputs.len() > 1 {
+        "Input"
+    } else {
+        "Animation"
+    };
+    let text = arguments.page(&shown, &methods, menu, &mut device)?;
     place.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
         "{}, {}, on {}, {} → {place}",
         words::count(inputs.len(), "input"),
-        words::count(methods.len(), "method"),
+        words::count(each_once(methods.iter().flatten()).len(), "method"),
         device.label,
         words::bytes(text.len() as f64),
     ));
@@ -152,7 +123,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             Failure::new(OUTPUT, message)
         })?;
     }
-    Ok(())
+    match refused {
+        0 => Ok(()),
+        _ => {
+            let all = words::count(refused + shown.len(), "animation");
+            let message = format!("{refused} of {all} could not be read; the others are shown");
+            Err(Failure::new(SOME_INPUTS, message))
+        }
+    }
 }
 
 impl Arguments {
@@ -170,36 +148,42 @@ impl Arguments {
         Place::new(out, self.overwrite, inputs)
     }
 
-    fn methods(&self, rotations: f64) -> Vec<Method> {
-        let methods = chosen(&self.methods);
-        if !methods.is_empty() {
-            return methods;
+    /// The methods of each clip: those asked for; else all, or the common ones where all would make
+    /// a large page.
+    fn methods(&self, shown: &[Shown]) -> Result<Vec<Vec<Wanted>>, Failure> {
+        if shown.is_empty() {
+            return Err(Failure::usage("there is nothing to show: nothing moves"));
         }
-        let first = ["bessel-overhauser", "slerp", "catmull-rom", "b-spline"];
-        let mut methods: Vec<Method> = first.into_iter().filter_map(Method::named).collect();
-        if rotations * SAMPLE * METHODS.len() as f64 <= SMALL {
-            let others = METHODS
-                .iter()
-                .filter(|method| !first.contains(&method.name));
-            methods.extend(others);
+        let own = |methods: &[Wanted]| -> Vec<Vec<Wanted>> {
+            shown.iter().map(|one| one.methods(methods)).collect()
+        };
+        let asked = each_once(self.methods.iter().flat_map(|selection| &selection.0));
+        if asked.is_empty() {
+            let common = ["bessel-overhauser", "slerp", "catmull-rom", "b-spline"];
+            let mut first = vec![Wanted(None)];
+            first.extend(common.map(|name| Wanted(Method::named(name))));
+            let all: Vec<Wanted> = first.iter().copied().chain(Wanted::all()).collect();
+            let all = own(&each_once(all.iter()));
+            return match bytes(shown, &all) <= SMALL {
+                true => Ok(all),
+                false => fitting(shown, own(&first)),
+            };
         }
-        methods
+        fitting(shown, own(&asked))
     }
 
     /// The frames, and the keys between them where those are not many more: a key is
     /// shown as it is.
-    fn times(&self, set: &TrackSet, name: &str) -> Result<Vec<f64>, Failure> {
-        let frames = in_frames(self.fps, self.start, self.end, set, name);
-        let timeline = frames
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        if set.track_count() as f64 * timeline.len() as f64 * SAMPLE > LARGEST {
-            let samples = timeline.len();
+    fn sampled(&self, one: Shown) -> Result<Shown, Failure> {
+        let name = &one.name;
+        let frames = in_frames(self.fps, self.start, self.end, &one.clip.set, name);
+        let timeline = one.timeline(&frames)?;
+        if one.bytes(timeline.len()) > LARGEST {
             return Err(Failure::usage(format!(
                 "{name}: {} × {} are more than a page can hold; ask for fewer frames (--fps, \
                  --start, --end)",
-                words::boxes(set.track_count()),
-                words::count(samples, "frame")
+                one.tracks(),
+                words::count(timeline.len(), "frame")
             )));
         }
         let mut times: Vec<f64> = (0..timeline.len())
@@ -210,58 +194,63 @@ impl Arguments {
                 "{name}: there are no frames to show"
             )));
         };
-        let end = self
-            .end
-            .or(set.time_span().map(|span| span.1))
-            .unwrap_or(last);
-        let mut keys: Vec<f64> = set
-            .tracks()
-            .flat_map(|track| track.times.iter().copied())
-            .collect();
+        let span = one.clip.set.time_span();
+        let end = self.end.or(span.map(|span| span.1)).unwrap_or(last);
+        let mut keys = one.key_times();
         keys.retain(|&key| key >= first && key <= end);
-        keys.sort_by(f64::total_cmp);
-        keys.dedup();
         if keys.len() <= times.len() {
             times.extend(keys);
             times.sort_by(f64::total_cmp);
             times.dedup();
         }
-        Ok(times)
+        Ok(Shown { times, ..one })
     }
 
-    /// One input's results by every method.
-    fn stored(
+    /// The page of all clips, each by its methods. `menu`: what the choice of clips is called.
+    fn page(
         &self,
-        shown: &Shown,
-        methods: &[Method],
+        shown: &[Shown],
+        methods: &[Vec<Wanted>],
+        menu: &'static str,
         device: &mut Opened,
-        progress: &mut Progress,
-    ) -> Result<StoredSet, Failure> {
-        let frames = Frames::at(shown.times.clone());
-        room::in_memory(&shown.name, &shown.set, &frames, 2)?;
-        let mut results = Vec::new();
-        for &method in methods {
-            let interpolation = self.manner.with(method);
-            let velocity = Interpolation {
-                quantity: Quantity::Velocity(Axes::Body),
-                ..interpolation
-            };
-            let mut evaluate = |interpolation| {
-                device
-                    .collect(&shown.set, interpolation, &frames, Layout::FrameMajor)
-                    .map_err(|error| Failure::evaluating(&shown.name, &error))
-            };
-            let rotations = evaluate(interpolation)?;
-            let velocities = evaluate(velocity)?;
-            let tracks = shown.set.track_count();
-            results.push(StoredResult::new(method, tracks, &rotations, &velocities));
-            progress.advance(1);
+    ) -> Result<String, Failure> {
+        let results: usize = methods.iter().map(Vec::len).sum();
+        let mut progress = Progress::new("evaluating", results as u64);
+        let mut sets = Vec::new();
+        for (one, own) in shown.iter().zip(methods) {
+            let mut results = Vec::new();
+            for &wanted in own {
+                results.push(one.result(wanted, self.manner, device)?);
+                progress.advance(1);
+            }
+            sets.push(StoredSet::new(one, results));
         }
-        Ok(StoredSet::new(
-            &shown.name,
-            (&shown.set, shown.box_length),
-            &shown.times,
-            results,
-        ))
+        drop(progress);
+        Ok(Page::new(&methods.concat(), sets, menu, &device.label).html())
     }
+}
+
+/// Bytes of all results before they are packed.
+fn bytes(shown: &[Shown], methods: &[Vec<Wanted>]) -> f64 {
+    let of_each = shown.iter().zip(methods);
+    of_each
+        .map(|(one, own)| own.len() as f64 * one.bytes(one.times.len()))
+        .sum()
+}
+
+/// The methods of each clip, if a page can hold the results.
+fn fitting(shown: &[Shown], methods: Vec<Vec<Wanted>>) -> Result<Vec<Vec<Wanted>>, Failure> {
+    let bytes = bytes(shown, &methods);
+    if bytes <= LARGEST {
+        return Ok(methods);
+    }
+    let rotations: f64 = shown.iter().map(|one| one.rotations(one.times.len())).sum();
+    Err(Failure::usage(format!(
+        "{} by {} are {}, more than the {} that a page can hold; ask for fewer methods (-m), \
+         fewer frames (--fps, --start, --end) or fewer inputs",
+        words::count(rotations as usize, "rotation"),
+        words::count(each_once(methods.iter().flatten()).len(), "method"),
+        words::bytes(bytes),
+        words::bytes(LARGEST),
+    )))
 }

@@ -1,10 +1,13 @@
 //! The page: what `web/` was built into, and the results in it.
 
-use glam::Quat;
+use glam::{DVec3, Quat};
 use serde::Serialize;
-use tumble::{Encoding, METHODS, Method, TrackSet};
+use tumble::Encoding;
+use tumble_formats::world::WorldPose;
 
+use crate::arguments::interpolation::Wanted;
 use crate::commands::view::pack::{differences, doubles};
+use crate::commands::view::shown::Shown;
 use crate::messages::colours::{self, BOXES, Colour};
 
 /// Built from `web/src` by `npm run build` there.
@@ -17,8 +20,8 @@ const PLACE: &str = "/* DATA */";
 pub(crate) struct Page<'a> {
     version: &'static str,
     device: &'a str,
-    /// The method that is shown first.
-    first: &'static str,
+    /// What the choice of sets is called.
+    menu: &'static str,
     box_colours: Vec<String>,
     methods: Vec<StoredMethod>,
     sets: Vec<StoredSet>,
@@ -31,19 +34,26 @@ struct StoredMethod {
     colour: String,
 }
 
-/// One input.
+/// One clip.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct StoredSet {
     name: String,
     boxes: usize,
     length: f64,
+    /// What each joint hangs on, -1 for roots; empty where tracks are the boxes of a chain.
+    parents: Vec<i64>,
+    /// Of the joints.
+    names: Vec<String>,
+    /// Whether rotations are relative to the world instead of the parent.
+    is_world: bool,
     times: String,
     /// Whether all boxes have the same key times, which are stored once then.
     shared_keys: bool,
     key_counts: Vec<usize>,
     key_times: String,
     keys: String,
+    /// The first of them is shown first.
     results: Vec<StoredResult>,
 }
 
@@ -51,17 +61,32 @@ pub(crate) struct StoredSet {
 #[derive(Serialize)]
 pub(crate) struct StoredResult {
     method: &'static str,
+    #[serde(skip)]
+    boxes: usize,
     /// `[sample][box][xyzw]`, to be divided by 32767.
     rotations: String,
     /// `[sample][box]`, to be divided by 65535 and multiplied with `fastest`, rad/s.
     speeds: String,
     fastest: f32,
+    /// Where the joints are; nothing for the boxes of a chain.
+    positions: Option<StoredPositions>,
+}
+
+/// Where joints are in the world.
+#[derive(Serialize)]
+struct StoredPositions {
+    /// The least coordinates of all, in the file's units.
+    low: [f64; 3],
+    /// How far the largest are from them.
+    size: [f64; 3],
+    /// `[sample][joint][xyz]`, to be divided by 65535, multiplied with `size` and added to `low`.
+    packed: String,
 }
 
 impl StoredResult {
     /// Rotations and angular velocities, `[sample][box]`.
     pub(crate) fn new(
-        method: Method,
+        method: Wanted,
         boxes: usize,
         rotations: &[Quat],
         velocities: &[Quat],
@@ -73,11 +98,39 @@ impl StoredResult {
             _ => (speed / fastest * 65535.0).round() as u16,
         };
         Self {
-            method: method.name,
+            method: method.name(),
+            boxes,
             rotations: differences(&short(rotations), 4 * boxes),
             speeds: differences(&speeds().map(share).collect::<Vec<u16>>(), boxes),
             fastest,
+            positions: None,
         }
+    }
+
+    /// With the poses of joints, `[sample][joint]`; `None` if a position is not finite.
+    pub(crate) fn at(self, poses: &[WorldPose]) -> Option<Self> {
+        let positions = || poses.iter().map(|pose| pose.position.as_dvec3());
+        let low = positions().reduce(DVec3::min).unwrap_or_default();
+        let size = positions().reduce(DVec3::max).unwrap_or_default() - low;
+        if !positions().all(DVec3::is_finite) {
+            return None;
+        }
+        // A coordinate that is always the same has no size to be divided by.
+        let scale = DVec3::select(size.cmpgt(DVec3::ZERO), 65535.0 / size, DVec3::ZERO);
+        let short = |position: DVec3| {
+            let share = (position - low) * scale;
+            share.to_array().map(|share| share.round() as u16)
+        };
+        let packed: Vec<u16> = positions().flat_map(short).collect();
+        let positions = StoredPositions {
+            low: low.to_array(),
+            size: size.to_array(),
+            packed: differences(&packed, 3 * self.boxes),
+        };
+        Some(Self {
+            positions: Some(positions),
+            ..self
+        })
     }
 }
 
@@ -93,12 +146,14 @@ fn short(rotations: &[Quat]) -> Vec<u16> {
 }
 
 impl StoredSet {
-    pub(crate) fn new(
-        name: &str,
-        (set, box_length): (&TrackSet, f64),
-        times: &[f64],
-        results: Vec<StoredResult>,
-    ) -> Self {
+    pub(crate) fn new(shown: &Shown, results: Vec<StoredResult>) -> Self {
+        let (set, skeleton) = (&shown.clip.set, &shown.clip.skeleton);
+        let joints = if shown.has_places() {
+            set.track_count()
+        } else {
+            0
+        };
+        let parent = |track: usize| skeleton.get(track).and_then(|joint| joint.parent);
         let first = set.track(0).times;
         let shared_keys = set.tracks().all(|track| track.times == first);
         let key_times: Vec<f64> = if shared_keys {
@@ -113,10 +168,15 @@ impl StoredSet {
             .flat_map(|track| track.keys.iter().copied())
             .collect();
         Self {
-            name: name.to_owned(),
+            name: shown.title.clone(),
             boxes: set.track_count(),
-            length: box_length,
-            times: doubles(times),
+            length: shown.box_length,
+            parents: (0..joints)
+                .map(|track| parent(track).map_or(-1, |parent| parent as i64))
+                .collect(),
+            names: (0..joints).map(|track| set.track_name(track)).collect(),
+            is_world: shown.clip.is_world,
+            times: doubles(&shown.times),
             shared_keys,
             key_counts: if shared_keys {
                 Vec::new()
@@ -131,20 +191,24 @@ impl StoredSet {
 }
 
 impl<'a> Page<'a> {
-    /// The first of the methods is shown first.
-    pub(crate) fn new(methods: &[Method], sets: Vec<StoredSet>, device: &'a str) -> Self {
-        let stored = |method: &Method| StoredMethod {
-            name: method.name,
-            summary: method.summary,
-            colour: css(colours::of_method(*method)),
+    /// Of clips by these methods.
+    pub(crate) fn new(
+        methods: &[Wanted],
+        sets: Vec<StoredSet>,
+        menu: &'static str,
+        device: &'a str,
+    ) -> Self {
+        let stored = |method: Wanted| StoredMethod {
+            name: method.name(),
+            summary: method.summary(),
+            colour: css(method.0.map_or(colours::AUTHORED, colours::of_method)),
         };
         Self {
             version: env!("CARGO_PKG_VERSION"),
             device,
-            first: methods.first().map_or("", |method| method.name),
+            menu,
             box_colours: BOXES.map(css).to_vec(),
-            methods: METHODS
-                .iter()
+            methods: Wanted::all()
                 .filter(|method| methods.contains(method))
                 .map(stored)
                 .collect(),

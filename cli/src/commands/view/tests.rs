@@ -1,0 +1,300 @@
+//! Skeletons on the page, in a real browser: where joints are drawn, and what the menus say.
+
+use std::path::Path;
+
+use clap::Parser;
+use glam::{DVec3, EulerRot, Quat, Vec3};
+use serde_json::Value;
+use tumble::method::{C2, SLERP};
+use tumble::{Device, Engine, Frames, TrackSet};
+use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::sample::ChannelMethods;
+use tumble_formats::world::{WorldPose, world};
+
+use crate::arguments::interpolation::Wanted;
+use crate::commands::view::shown::Shown;
+
+#[path = "../../../tests/support/browser.rs"]
+#[allow(dead_code)] // the tests of boxes use the rest of it
+mod browser;
+
+#[derive(Parser)]
+struct Line {
+    #[command(flatten)]
+    arguments: super::Arguments,
+}
+
+fn arguments(line: &str) -> super::Arguments {
+    let start = ["view", "fox.glb", "-o", "view.html", "--device", "cpu"];
+    Line::parse_from(start.into_iter().chain(line.split_whitespace())).arguments
+}
+
+/// A walk of a body with two legs: the root moves and grows, and a child comes before its parent.
+fn walk(name: &str, pace: f32) -> Motion {
+    let joints = [
+        ("shin.l", Some(2), Vec3::new(0.0, -4.0, 0.0)),
+        ("hips", None, Vec3::ZERO),
+        ("thigh.l", Some(1), Vec3::new(1.0, -1.0, 0.0)),
+        ("thigh.r", Some(1), Vec3::new(-1.0, -1.0, 0.0)),
+        ("shin.r", Some(3), Vec3::new(0.0, -4.0, 0.0)),
+        ("head", Some(1), Vec3::new(0.0, 5.0, 0.5)),
+    ];
+    let times: Vec<f64> = (0..7)
+        .map(|key| 0.3 + f64::from(key * key) / 20.0)
+        .collect();
+    let keys = |joint: usize| -> Vec<Quat> {
+        let angle = |key: usize| pace * ((key * (joint + 2)) as f32).sin();
+        let turned = |key| Quat::from_euler(EulerRot::XYZ, angle(key), angle(key) * 0.5, 0.1);
+        (0..times.len()).map(turned).collect()
+    };
+    let mut set = TrackSet::new();
+    let mut clip = Motion {
+        name: Some(name.to_owned()),
+        ..Motion::default()
+    };
+    for (joint, (name, parent, translation)) in joints.into_iter().enumerate() {
+        set.push(name, &times, &keys(joint)).unwrap();
+        let rest = Transform {
+            translation,
+            ..Transform::default()
+        };
+        clip.skeleton.push(Joint { parent, rest });
+        clip.channels.push(Channels {
+            rotation: Some(Sampler::Linear),
+            ..Channels::default()
+        });
+    }
+    let steps = times
+        .iter()
+        .map(|&time| Vec3::new(1.0, 100.0, 4.0 * time as f32));
+    let steps: Vec<Vec3> = steps.collect();
+    set.set_translations(1, &times, &steps, &[]).unwrap();
+    set.set_scales(1, &[0.5, 1.0], &[Vec3::ONE, Vec3::splat(1.5)], &[])
+        .unwrap();
+    clip.channels[1].translation = Some(Sampler::Linear);
+    clip.channels[1].scale = Some(Sampler::Step);
+    clip.set = set;
+    clip
+}
+
+/// A thing that moves without a skeleton, keyed for no method.
+fn trajectory() -> Motion {
+    let times = [0.0, 1.0, 2.0];
+    let mut set = TrackSet::new();
+    set.push("camera", &times, &[Quat::IDENTITY; 3]).unwrap();
+    let places = [
+        Vec3::ZERO,
+        Vec3::new(0.0, 0.25, 1.0),
+        Vec3::new(0.5, 0.0, 2.0),
+    ];
+    set.set_translations(0, &times, &places, &[]).unwrap();
+    Motion {
+        set,
+        ..Motion::default()
+    }
+}
+
+fn expected(shown: &Shown, wanted: Wanted) -> Vec<WorldPose> {
+    let manner = arguments("").manner;
+    let with = |method| manner.with(method);
+    let methods = ChannelMethods {
+        method: wanted.0,
+        with: &with,
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let frames = Frames::at(shown.times.clone());
+    let samples = methods.sample(&engine, &shown.clip, &frames).unwrap();
+    world(&shown.clip, &samples).unwrap()
+}
+
+fn point(value: &Value) -> DVec3 {
+    let coordinate = |axis: usize| value[axis].as_f64().unwrap();
+    DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+}
+
+/// The clips as the program shows them, in a browser; nothing where there is none.
+fn opened(clips: Vec<Motion>, folder: &Path) -> (Vec<Shown>, Option<browser::Page>) {
+    let arguments = arguments("--fps 10");
+    let one = |clip| Shown::new(Path::new("clips/fox.glb"), clip, None, false);
+    let shown: Result<Vec<Shown>, _> = clips
+        .into_iter()
+        .map(|clip| arguments.sampled(one(clip)))
+        .collect();
+    let shown = shown.unwrap();
+    let methods = arguments.methods(&shown).unwrap();
+    let mut device = arguments.device.open().unwrap();
+    let page = arguments.page(&shown, &methods, "Animation", &mut device);
+    let path = folder.join("view.html");
+    std::fs::write(&path, page.unwrap()).unwrap();
+    (shown, browser::Page::open(&path))
+}
+
+#[test]
+fn joints_are_drawn_where_the_engine_puts_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let clips = vec![walk("Walk", 0.4), walk("Run", 1.2), trajectory()];
+    let (shown, Some(mut page)) = opened(clips, folder.path()) else {
+        return;
+    };
+    let texts = |selector: &str| {
+        format!("[...document.querySelectorAll('{selector}')].map((e) => e.textContent).join('|')")
+    };
+    let menu = page.value(&texts("#set option"));
+    assert_eq!(menu, "fox.glb: Walk|fox.glb: Run|fox.glb");
+    assert_eq!(page.value(&texts("#set-label")), "Animation");
+    let mut largest = 0.0f64;
+    for (place, one) in shown.iter().enumerate() {
+        page.choose("#set", &place.to_string());
+        page.value("tumble.loaded().then(() => true)");
+        let methods = page.value(&texts("#method option"));
+        let authored = Wanted(None);
+        let has_channels = !one.clip.channels.is_empty();
+        // Where `authored` was shown before and means nothing, the first method is shown instead.
+        let first = match has_channels {
+            true => "authored",
+            false => "bessel-overhauser",
+        };
+        assert_eq!(page.value("tumble.state.method"), first);
+        let starts = methods.as_str().unwrap().starts_with("authored|");
+        assert_eq!(starts, has_channels, "{methods}");
+        let mut shown_by = vec![Wanted(Some(SLERP)), Wanted(Some(C2))];
+        shown_by.extend(has_channels.then_some(authored));
+        for wanted in shown_by {
+            page.choose("#method", wanted.name());
+            page.value("tumble.loaded().then(() => true)");
+            let joints = one.clip.set.track_count();
+            let expected = expected(one, wanted);
+            let positions = || expected.iter().map(|pose| pose.position.as_dvec3());
+            let size =
+                positions().reduce(DVec3::max).unwrap() - positions().reduce(DVec3::min).unwrap();
+            // Half a step of 16 bits, and the rounding of f32, in which matrices are.
+            let most = size.max_element() / 65535.0 / 2.0 + 1e-5;
+            let drawn = page.value(&format!(
+                "Array.from(tumble.state.input.times, (time) => {{ tumble.seek(time); \
+                 return Array.from({{length: {joints}}}, (_, joint) => tumble.ends(joint)) }})"
+            ));
+            for (at, pose) in expected.iter().enumerate() {
+                let (sample, joint) = (at / joints, at % joints);
+                let ends = &drawn[sample][joint];
+                let off = (point(&ends[0]) - pose.position.as_dvec3())
+                    .abs()
+                    .max_element();
+                assert!(off <= most, "{}, sample {sample}: {off}", one.title);
+                largest = largest.max(off);
+                let parent = one.clip.skeleton.get(joint).and_then(|joint| joint.parent);
+                let Some(parent) = parent else {
+                    assert_eq!(ends.as_array().unwrap().len(), 1, "a root has no bone");
+                    continue;
+                };
+                let parent = expected[sample * joints + parent].position.as_dvec3();
+                let off = (point(&ends[1]) - parent).abs().max_element();
+                assert!(off <= 2.0 * most, "{}, parent, {sample}: {off}", one.title);
+            }
+        }
+    }
+    println!("largest distance along an axis: {largest:.1e}");
+    assert!(largest > 0.0, "16 bits leave something");
+    assert_eq!(page.errors, Vec::<String>::new());
+}
+
+#[test]
+fn joints_have_names_and_a_click_chooses_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, Some(mut page)) = opened(vec![walk("Walk", 0.4)], folder.path()) else {
+        return;
+    };
+    let name = "document.querySelector('#box-name').textContent";
+    for (joint, expected) in ["shin.l", "hips", "thigh.l"].iter().enumerate() {
+        page.choose("#box", &(joint + 1).to_string());
+        assert_eq!(page.value(name), *expected);
+    }
+    assert_eq!(
+        page.value("document.querySelector('#box-label').textContent"),
+        "Joint"
+    );
+    let hidden = "!document.querySelector('#arrangement').checkVisibility()";
+    assert_eq!(page.value(hidden), true, "joints are where they are");
+    let before = page.value("JSON.stringify(tumble.ends(0))");
+    page.press("a");
+    page.value("tumble.loaded().then(() => true)");
+    assert_eq!(page.value("JSON.stringify(tumble.ends(0))"), before);
+
+    // Light blue is the fifth joint's; a pixel inside it has such ones all round.
+    let (pixels, width) = page.pixels("#stage");
+    let light_blue = |[r, g, b]: [u8; 3]| r > 25 && b / 2 > r && g > r + r / 2;
+    let inside = (2 * width + 2..pixels.len() - 2 * width - 2).find(|&at| {
+        let round = [at, at - 2, at + 2, at - 2 * width, at + 2 * width];
+        round.iter().all(|&place| light_blue(pixels[place]))
+    });
+    let at = inside.expect("the right shin is seen");
+    let area = page.value("(() => { const r = document.querySelector('#stage').getBoundingClientRect(); return [r.x, r.y] })()");
+    let (x, y) = ((at % width) as f64, (at / width) as f64);
+    page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
+    page.wait(&format!("tumble.state.picked && {name} === 'shin.r'"));
+    // What is told of it is its own rotation.
+    let told = page.value(
+        "tumble.seek(0.5), document.querySelector('#box-values').textContent.replaceAll('−', '-')",
+    );
+    let numbers: Vec<f32> = told
+        .as_str()
+        .unwrap()
+        .split_whitespace()
+        .filter_map(|word| word.trim_end_matches(',').parse().ok())
+        .collect();
+    let own = walk("Walk", 0.4).set.track(4).keys[2];
+    assert_eq!(numbers.len(), 7, "w x y z and a place: {told}");
+    let told = Quat::from_xyzw(numbers[1], numbers[2], numbers[3], numbers[0]);
+    assert!(told.dot(own).abs() > 1.0 - 1e-6, "{told} is not {own}");
+}
+
+#[test]
+fn files_without_a_word_of_channels_show_bessel_overhauser_once() {
+    let one = Shown::new(Path::new("a.tum"), trajectory(), None, false);
+    let named = |names: &[&str]| -> Vec<Wanted> {
+        names
+            .iter()
+            .map(|name| Wanted(tumble::Method::named(name)))
+            .collect()
+    };
+    let own = |names: &[&str]| -> Vec<&str> {
+        one.methods(&named(names))
+            .iter()
+            .map(|own| own.name())
+            .collect()
+    };
+    assert_eq!(own(&["authored", "slerp"]), ["bessel-overhauser", "slerp"]);
+    let both = ["authored", "slerp", "bessel-overhauser"];
+    assert_eq!(own(&both), ["slerp", "bessel-overhauser"]);
+}
+
+#[test]
+fn what_has_no_place_or_no_room_is_refused() {
+    let arguments = arguments("--fps 10");
+    let mut device = arguments.device.open().unwrap();
+    let mut far = walk("Far", 0.4);
+    let times = [0.3, 2.0];
+    for joint in [1, 2] {
+        let places = [Vec3::X, Vec3::splat(3e38)];
+        far.set
+            .set_translations(joint, &times, &places, &[])
+            .unwrap();
+    }
+    let mut circle = walk("Circle", 0.4);
+    circle.skeleton[1].parent = Some(0);
+    for (clip, message) in [
+        (far, "fox.glb Far: a joint is farther away than numbers go"),
+        (circle, "fox.glb Circle: joint 0 hangs on itself"),
+    ] {
+        let one = Shown::new(Path::new("fox.glb"), clip, None, true);
+        let one = arguments.sampled(one).unwrap();
+        let result = one.result(Wanted(None), arguments.manner, &mut device);
+        let found = format!("{:?}", result.err());
+        assert!(found.contains(message), "{found}");
+    }
+    // Positions count: 16 bytes a joint instead of the 10 of a box.
+    let one = Shown::new(Path::new("fox.glb"), walk("Walk", 0.4), None, true);
+    assert!((one.bytes(100) - 6.0 * 100.0 * 16.0).abs() < 1e-9);
+    let shown = [arguments.sampled(one).unwrap()];
+    assert!(arguments.methods(&[]).is_err(), "nothing to show");
+    assert!(arguments.methods(&shown).is_ok());
+}
