@@ -1,0 +1,211 @@
+//! Trajectories: a file from elsewhere, and what is written read back.
+
+use std::fs;
+use std::path::Path;
+
+use glam::{Quat, Vec3};
+use proptest::prelude::*;
+use tumble::{FrameRate, TrackSet};
+use tumble_formats::format::{MotionOptions, WriteError};
+use tumble_formats::keyed::keyed;
+use tumble_formats::keys::Duplicates;
+use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::tum::{FORMAT, open_tum, read_tum};
+use tumble_formats::{Code, Diagnostic, Format, ReadOptions};
+
+use crate::support::shared_data;
+
+fn read(text: &str) -> Motion {
+    let loaded = read_tum("t", text.as_bytes(), &ReadOptions::default()).unwrap();
+    loaded.clips[0].clone()
+}
+
+fn write(clips: &[Sampled<'_>]) -> Result<(String, Vec<Diagnostic>), WriteError> {
+    let mut out = Vec::new();
+    let warnings = FORMAT.write_motion.unwrap()(clips, &MotionOptions::default(), &mut out)?;
+    Ok((String::from_utf8(out).unwrap(), warnings))
+}
+
+/// The keys of a clip as they are.
+fn written(clip: &Motion) -> String {
+    write(&[keyed(clip).unwrap().of(clip, clip.rate, &[])])
+        .unwrap()
+        .0
+}
+
+#[test]
+fn a_path_at_unix_times_keeps_every_digit() {
+    let Some(data) = shared_data() else { return };
+    let path = data.join("tum/freiburg1_xyz-groundtruth.txt");
+    let text = fs::read_to_string(&path).unwrap();
+    let detected = Format::detect(&path, &text.as_bytes()[..64]);
+    assert_eq!(detected.name, "tum");
+    let loaded = open_tum(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(loaded.warnings, []);
+    let clip = &loaded.clips[0];
+    assert_eq!((clip.set.track_count(), clip.set.key_count()), (1, 3000));
+    assert_eq!((clip.time_offset, clip.rate), (1_305_031_098, None));
+    let track = clip.set.track(0);
+    assert_eq!((track.name, track.times[0]), (Some("body"), 0.6659));
+    // 1305031128.7555, of which f64 has 1305031128.7555001.
+    assert_eq!(track.times[2999], 30.7555);
+    let again = written(clip);
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    let found = again.lines().filter(|line| !line.starts_with('#'));
+    let numbers = |line: &str| -> Vec<f64> {
+        let numbers = line.split(' ').skip(1);
+        numbers.map(|number| number.parse().unwrap()).collect()
+    };
+    let mut count = 0;
+    for (line, found) in lines.zip(found) {
+        let [given, shown] = [line, found].map(|line| line.split_once(' ').unwrap().0);
+        let short = |time: &str| time.trim_end_matches('0').trim_end_matches('.').to_owned();
+        assert_eq!(short(given), short(shown));
+        let (given, shown) = (numbers(line), numbers(found));
+        let norm = given[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        for i in 0..7 {
+            let wanted = if i < 3 { given[i] } else { given[i] / norm };
+            // Keys whose norm is within 4e-7 of 1 keep their digits.
+            assert!((shown[i] - wanted).abs() < 5e-7, "{line}: {found}");
+        }
+        count += 1;
+    }
+    assert_eq!(count, 3000);
+    assert_eq!(bits(&read(&again)), bits(clip));
+}
+
+fn bits(clip: &Motion) -> (i64, Vec<u64>, Vec<[u32; 7]>) {
+    let samples = keyed(clip).unwrap();
+    let times = samples.times.iter().map(|time| time.to_bits()).collect();
+    let rows = samples.rotations.iter().enumerate().map(|(row, q)| {
+        let [x, y, z] = samples
+            .translations
+            .get(row)
+            .copied()
+            .unwrap_or_default()
+            .to_array();
+        let [qx, qy, qz, qw] = q.to_array();
+        [x, y, z, qx, qy, qz, qw].map(f32::to_bits)
+    });
+    (clip.time_offset, times, rows.collect())
+}
+
+#[test]
+fn files_are_known_by_their_heading_or_ending() {
+    let detect = |path: &str, start: &str| Format::detect(Path::new(path), start.as_bytes()).name;
+    assert_eq!(
+        detect("path.txt", "# timestamp tx ty tz qx qy qz qw\n"),
+        "tum"
+    );
+    assert_eq!(detect("path.tum", "0 0 0 0 0 0 0 1\n"), "tum");
+    // EuRoC's, which is a table.
+    assert_eq!(
+        detect("data.csv", "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m]"),
+        "csv"
+    );
+    assert_eq!(detect("a.dat", "# 4 3.0\n# tx ty tz"), "dat");
+}
+
+#[test]
+fn times_on_frames_are_frames_of_a_rate() {
+    let clip = read("7.04 0 0 0 0 0 0 1\n7.08 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n");
+    assert_eq!(
+        (clip.time_offset, clip.rate),
+        (7, FrameRate::new(25, 1).ok())
+    );
+    assert_eq!(clip.set.track(0).times, [1.0 / 25.0, 2.0 / 25.0, 1.0]);
+    let before = read("-0.75 0 0 0 0 0 0 1\n.5 0 0 0 0 0 0 1\n");
+    assert_eq!(
+        (before.time_offset, before.set.track(0).times),
+        (-1, &[0.25, 1.5][..])
+    );
+}
+
+#[test]
+fn equal_times_keep_the_pose_that_is_asked_for() {
+    let text = "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n";
+    for (duplicates, kept) in [(Duplicates::First, 1.0), (Duplicates::Last, 2.0)] {
+        let options = ReadOptions {
+            duplicates,
+            ..ReadOptions::default()
+        };
+        let loaded = read_tum("t", text.as_bytes(), &options).unwrap();
+        let positions = keyed(&loaded.clips[0]).unwrap().translations;
+        assert_eq!(positions, [0.0, kept, 3.0].map(|x| Vec3::X * x));
+    }
+}
+
+#[test]
+fn what_a_trajectory_cannot_hold_is_refused() {
+    let clip = read("1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n");
+    let samples = keyed(&clip).unwrap();
+    let notes = [("method", "slerp\nor so".to_owned())];
+    let good = samples.of(&clip, None, &notes);
+    let (text, warnings) = write(&[good.clone()]).unwrap();
+    let expected = "# timestamp tx ty tz qx qy qz qw\n# method: slerp or so\n1 0 0 0 0 0 0 1\n2 1 0 \
+                    0 0 0 0 1\n";
+    assert_eq!((text.as_str(), warnings), (expected, Vec::new()));
+    let refusal = |clips: &[Sampled<'_>]| match write(clips) {
+        Err(WriteError::Refused(error)) => {
+            assert_eq!(error.code, Code::TumWrite);
+            error.message
+        }
+        other => panic!("{other:?}"),
+    };
+    assert!(refusal(&[]).contains("0 clips"));
+    let mut two = clip.clone();
+    two.set.push("other", &[0.0], &[Quat::IDENTITY]).unwrap();
+    let mut bad = good.clone();
+    bad.clip = &two;
+    assert!(refusal(&[bad]).contains("2 tracks"));
+    let mut bad = good.clone();
+    bad.times = &[0.0, 1e30];
+    assert!(refusal(&[bad]).contains("out of range"));
+    let mut bad = good.clone();
+    bad.translations = &[Vec3::ZERO, Vec3::INFINITY];
+    assert!(refusal(&[bad]).contains("not finite"));
+    let mut bad = good.clone();
+    bad.times = &[0.0];
+    assert!(matches!(write(&[bad]), Err(WriteError::Io(_))));
+    let mut scaled = good.clone();
+    let scales = [Vec3::ONE, Vec3::splat(2.0)];
+    scaled.scales = &scales;
+    assert_eq!(write(&[scaled]).unwrap().1[0].code, Code::Scales);
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_reads_back_bit_for_bit(
+        axes in prop::collection::vec(prop::array::uniform3(-4.0f32..4.0), 1..20),
+        positions in prop::array::uniform3(-1e6f32..1e6),
+        offset in prop_oneof![Just(0i64), Just(1_700_000_000), -100i64..100],
+        start in 0.0f64..1.0,
+        step in 1e-6f64..10.0,
+    ) {
+        let keys: Vec<Quat> =
+            axes.iter().map(|&[x, y, z]| Quat::from_scaled_axis([x, y, z].into())).collect();
+        let times: Vec<f64> = (0..keys.len()).map(|i| start + i as f64 * step).collect();
+        let mut set = TrackSet::with_shared_times(&times, &keys).unwrap();
+        let moved: Vec<Vec3> =
+            (0..keys.len()).map(|i| Vec3::from_array(positions) * (i as f32 + 0.1)).collect();
+        set.set_translations(0, &times, &moved, &[]).unwrap();
+        let clip = Motion { set, time_offset: offset, ..Motion::default() };
+        let raw = ReadOptions { raw_times: true, ..ReadOptions::default() };
+        let back = read_tum("t", written(&clip).as_bytes(), &raw).unwrap();
+        prop_assert_eq!(bits(&back.clips[0]), bits(&clip));
+    }
+
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let _ = read_tum("t", &*bytes, &ReadOptions::default());
+    }
+
+    #[test]
+    fn damaged_files_never_panic(place in 0usize..80, byte in any::<u8>(), cut in 0usize..90) {
+        let mut bytes = b"1700000000.125 1 2 3 0 0 0 1\n1.7000000015e9,1e-3,2,3,0,0.6,0,.8 # x\n".to_vec();
+        let place = place % bytes.len();
+        bytes[place] = byte;
+        bytes.truncate(cut);
+        let _ = read_tum("t", &*bytes, &ReadOptions::default());
+    }
+}
