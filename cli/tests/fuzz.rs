@@ -95,13 +95,14 @@ fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &
     input.truncate(LONGEST);
 }
 
-/// Every good and bad file of the fixtures.
-fn fixtures() -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures/dat");
+/// Every good and bad file of a format's fixtures.
+fn fixtures(format: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures");
+    let folder = folder.join(format);
     let paths = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path());
-    let files = paths.filter(|path| path.extension().unwrap() == "dat");
+    let files = paths.filter(|path| path.extension().unwrap() == format);
     files.map(|path| fs::read(path).unwrap()).collect()
 }
 
@@ -136,7 +137,53 @@ fn dat() {
         " 1 0 0 0",
         "0.5 1 0 0 0 0 1 0 0\n",
     ];
-    fuzz("dat", targets::dat, fixtures(), &words);
+    fuzz("dat", targets::dat, fixtures("dat"), &words);
+}
+
+#[test]
+fn bvh() {
+    let words = [
+        "HIERARCHY\n",
+        "ROOT ",
+        "JOINT hand\n",
+        "End Site",
+        "{",
+        "}",
+        "OFFSET 0 1 2\n",
+        "CHANNELS 3 Zrotation Xrotation Yrotation\n",
+        "CHANNELS 0",
+        "Xposition",
+        "MOTION\nFrames: 2\nFrame Time: 0.04\n",
+        "Frames: 3\n",
+        "\n",
+        "\r\n",
+        " 90",
+        " -1e38",
+        " 1e-40",
+        "720.125",
+        "\u{feff}",
+        "\u{e4}",
+    ];
+    fuzz("bvh", targets::motion::bvh, fixtures("bvh"), &words);
+}
+
+#[test]
+fn tum() {
+    let words = [
+        "1700000000.125 0 0 0 0 0 0 1\n",
+        "-1e14",
+        ",",
+        " ",
+        "#",
+        "\n",
+        "\r\n",
+        "0.6 0.8",
+        "1e-24",
+        "1.5e+09",
+        "99999999999999.5",
+        "\u{e4}",
+    ];
+    fuzz("tum", targets::motion::tum, fixtures("tum"), &words);
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! The files that Tumble reads and writes: keyframes in (`.dat`), clips in and out (BVH, TUM), results
-//! out (NPY, CSV),
-//! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
-//! play with ([`generate`](mod@generate)).
+//! out (NPY, CSV), one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any
+//! size to play with ([`generate`](mod@generate)).
 
 pub mod adjust;
 pub mod bvh;

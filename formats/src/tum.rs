@@ -6,7 +6,7 @@ use std::io::{self, BufRead, Write};
 use std::path::Path;
 
 use glam::{DQuat, Vec3};
-use tumble::{TrackError, TrackSet};
+use tumble::{Channel, TrackError, TrackSet};
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
@@ -137,20 +137,27 @@ impl Poses {
         };
         let mut warnings = Warnings::new(name);
         let offset = self.times[0].whole_seconds();
-        let mut times: Vec<f64> = self.times.iter().map(|time| time.since(offset)).collect();
+        let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
+        let rate = match options.raw_times {
+            true => None,
+            false => restore(&mut times, Precision::F64),
+        };
+        let [mut times] = times;
         let mut positions = self.positions;
         let mut keys = origin.unit(self.rotations, &mut warnings)?;
         let equal = |i: usize, j: usize| keys[i] == keys[j] && positions[i] == positions[j];
-        let kept = origin.increasing(&times, equal, &mut warnings)?;
+        let from_offset = |mut said: Diagnostic| {
+            let of_times = [Code::EqualKeys, Code::EqualTimes, Code::TimeNotIncreasing];
+            if offset != 0 && of_times.contains(&said.code) {
+                said.message += &format!(" (times from second {offset} on)");
+            }
+            said
+        };
+        let kept = origin.increasing(&times, equal, &mut warnings);
+        let kept = kept.map_err(from_offset)?;
         select(&mut times, kept.as_deref());
         select(&mut positions, kept.as_deref());
         select(&mut keys, kept.as_deref());
-        let mut lists = [times];
-        let rate = match options.raw_times {
-            true => None,
-            false => restore(&mut lists, Precision::F64),
-        };
-        let [times] = lists;
         let mut set = TrackSet::new();
         // Checked above; a set refuses what slipped through.
         let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
@@ -167,7 +174,9 @@ impl Poses {
             time_offset: offset,
             ..Motion::default()
         };
-        let warnings = of_lines.into_iter().chain(warnings.into_list());
+        let warnings = of_lines
+            .into_iter()
+            .chain(warnings.into_list().into_iter().map(from_offset));
         Ok(Loaded::of(clip, warnings.collect()))
     }
 }
@@ -180,7 +189,7 @@ fn write_motion(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
-    let &[ref sampled] = clips else {
+    let [sampled] = clips else {
         let message = format!("{} clips; a trajectory is one, choose one", clips.len());
         return Err(refuse(message).into());
     };
@@ -216,22 +225,13 @@ fn write_motion(
         let value = value.replace(char::is_control, " ");
         text += &format!("# {key}: {value}\n");
     }
-    let rest = sampled
-        .clip
-        .skeleton
-        .first()
-        .map(|joint| joint.rest.translation);
+    let rest = sampled.clip.rest(Channel::Translation, 0);
     for (sample, &time) in sampled.times.iter().enumerate() {
         let Some(time) = Decimal::of(sampled.clip.time_offset, time) else {
             let message = format!("the time {time} s is out of range");
             return Err(refuse(message).into());
         };
-        let position = sampled
-            .translations
-            .get(sample)
-            .copied()
-            .or(rest)
-            .unwrap_or_default();
+        let position = sampled.translations.get(sample).copied().unwrap_or(rest);
         let rotation = sampled.rotations[sample];
         if !position.is_finite() || !rotation.is_finite() {
             let message = format!("the pose at {time} s is not finite");

@@ -1,6 +1,7 @@
 //! Every test of the files.
 
 mod bvh;
+mod bvh_write;
 mod dat_fixtures;
 mod fixtures;
 mod gltf_new;

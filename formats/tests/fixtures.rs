@@ -83,7 +83,8 @@ fn every_fixture_gets_its_verdict_and_message() {
 #[test]
 fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
     let all: String = fixtures().iter().map(|path| said(path)).collect();
-    // Those that need a system's fault, an option or a size that no fixture has; each has a test.
+    // Those that need a system's fault, an option or a size that no fixture has, and those of
+    // writing; each has a test.
     let elsewhere = [
         Code::Open,
         Code::NotAFile,
@@ -97,6 +98,10 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::TimesInF32,
         Code::TimesBelowZero,
         Code::GlbTooLong,
+        Code::BvhWrite,
+        Code::TumWrite,
+        Code::Scales,
+        Code::StartMoved,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

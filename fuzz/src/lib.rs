@@ -6,6 +6,8 @@ mod targets;
 pub fn target(name: &str, data: &[u8]) {
     let target: targets::Target = match name {
         "dat" => targets::dat,
+        "bvh" => targets::motion::bvh,
+        "tum" => targets::motion::tum,
         "outputs" => targets::outputs,
         "arguments" => targets::arguments,
         "frames" => targets::frames,

@@ -13,6 +13,9 @@ use crate::text::number;
 /// What every file begins with.
 pub(super) const FIRST_WORD: &str = "HIERARCHY";
 
+/// What may come behind channels on their line.
+const AFTER_CHANNELS: [&str; 4] = ["}", "JOINT", "END", "OFFSET"];
+
 /// The joints of a file, parents before their children.
 #[derive(Debug, Default)]
 pub(super) struct Hierarchy {
@@ -90,7 +93,7 @@ impl Hierarchy {
             }
         }
         while parser.statement()? {}
-        if let Some(word) = parser.word_before("") {
+        if let Some(word) = parser.word_before(&[]) {
             let message = format!("`{}` behind MOTION; begin a new line", word.text);
             return Err(parser.refuse(&word, Code::BvhWord, message));
         }
@@ -112,7 +115,7 @@ impl<R: BufRead> Parser<'_, R> {
             "ROOT" if outside => self.joint(&word)?,
             "JOINT" if in_joint => self.joint(&word)?,
             "END" if in_joint => {
-                while self.word_before("{").is_some() {} // `Site`, and perhaps a name
+                while self.word_before(&["{"]).is_some() {} // `Site`, and perhaps a name
                 self.brace(&word, None)?;
             }
             "OFFSET" if block.is_some_and(|block| !block.has_offset) => self.offset(&word)?,
@@ -146,7 +149,7 @@ impl<R: BufRead> Parser<'_, R> {
     /// `ROOT name {` or `JOINT name {`; the name is all that is on the line.
     fn joint(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let mut name = String::new();
-        while let Some(word) = self.word_before("{") {
+        while let Some(word) = self.word_before(&["{"]) {
             name = name + &word.text + " ";
         }
         let parent = self.open.last().and_then(|block| block.joint);
@@ -207,7 +210,7 @@ impl<R: BufRead> Parser<'_, R> {
     fn offset(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let mut offset = [0.0; 3];
         for coordinate in &mut offset {
-            let Some(word) = self.word_before("}") else {
+            let Some(word) = self.word_before(&["}"]) else {
                 let message = "OFFSET lacks a number; it is `OFFSET x y z`".to_owned();
                 return Err(self.refuse(keyword, Code::BvhOffset, message));
             };
@@ -226,12 +229,12 @@ impl<R: BufRead> Parser<'_, R> {
 
     /// `CHANNELS count name…`, on one line.
     fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
-        let Some(count) = self.word_before("}") else {
+        let Some(count) = self.word_before(&AFTER_CHANNELS) else {
             let message = "CHANNELS without their number; write `CHANNELS 0`".to_owned();
             return Err(self.refuse(keyword, Code::BvhChannelCount, message));
         };
         let (mut names, mut named) = (Vec::new(), 0usize);
-        while let Some(word) = self.word_before("}") {
+        while let Some(word) = self.word_before(&AFTER_CHANNELS) {
             named += 1;
             // Of more than six one is there twice.
             if names.len() < 7 {
@@ -276,7 +279,7 @@ impl<R: BufRead> Parser<'_, R> {
     /// The next word, of this line or a later one.
     fn next(&mut self) -> Result<Option<Word>, Diagnostic> {
         loop {
-            if let Some(word) = self.word_before("") {
+            if let Some(word) = self.word_before(&[]) {
                 return Ok(Some(word));
             }
             self.lines.reuse(std::mem::take(&mut self.line));
@@ -287,8 +290,8 @@ impl<R: BufRead> Parser<'_, R> {
         }
     }
 
-    /// The next word of this line, unless it is `stop`. A brace is a word of its own.
-    fn word_before(&mut self, stop: &str) -> Option<Word> {
+    /// The next word of this line, unless it is one of `stops`. A brace is a word of its own.
+    fn word_before(&mut self, stops: &[&str]) -> Option<Word> {
         let rest = &self.line[self.at..];
         let start = rest.find(|c| c != ' ' && c != '\t')?;
         let word = &rest[start..];
@@ -298,7 +301,7 @@ impl<R: BufRead> Parser<'_, R> {
             None => word.len(),
         };
         let text = word[..end].to_owned();
-        if text == stop {
+        if stops.iter().any(|stop| stop.eq_ignore_ascii_case(&text)) {
             return None;
         }
         let column = self.column + start as u64;

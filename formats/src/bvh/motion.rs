@@ -223,7 +223,8 @@ fn read_field<R: BufRead>(
         let value = rest.strip_prefix(':').unwrap_or_default();
         let mut values = tokens(value);
         let (Some((column, text)), None) = (values.next(), values.next()) else {
-            let message = format!("`{example}` stands here, with one number; it is missing");
+            let found: String = line.trim().chars().take(24).collect();
+            let message = format!("`{found}` where `{example}` belongs, with one number");
             return Err(lines.refuse(1, code, message));
         };
         return Ok(Field {

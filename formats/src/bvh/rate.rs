@@ -19,8 +19,11 @@ pub(crate) fn of_period(token: &str, period: f64) -> Option<FrameRate> {
     };
     let multiple_of = |frames: u64, seconds: u64| {
         let multiple = (seconds as f64 / frames as f64 / period).round();
-        let rate = FrameRate::new(multiple as u64 * frames, seconds).ok()?;
-        ((1.0..=1000.0).contains(&multiple) && near(rate.time_of(1))).then_some(rate)
+        let rate = (1.0..=1000.0)
+            .contains(&multiple)
+            .then(|| FrameRate::new(multiple as u64 * frames, seconds))?
+            .ok()?;
+        near(rate.time_of(1)).then_some(rate)
     };
     let ntsc = || multiple_of(1000, 1001);
     multiple_of(1, 1).or_else(ntsc).or_else(|| itself(period))

@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use glam::Vec3;
-use tumble::FrameRate;
+use tumble::{Channel, FrameRate};
 
-use crate::bvh::angles;
+use crate::bvh::{angles, rate};
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
@@ -45,7 +45,7 @@ pub(super) fn write_motion(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let refuse = |message: String| Diagnostic::new(&options.name, Code::BvhWrite, message);
-    let &[ref sampled] = clips else {
+    let [sampled] = clips else {
         let message = format!("{} clips; a BVH file holds one, choose one", clips.len());
         return Err(refuse(message).into());
     };
@@ -62,7 +62,7 @@ pub(super) fn write_motion(
         });
     }
     let mut text = hierarchy(&nodes, axes);
-    let (frames, period) = (sampled.times.len(), rate.time_of(1));
+    let (frames, period) = (sampled.times.len(), frame_time(rate));
     text += &format!("MOTION\nFrames: {frames}\nFrame Time: {period}\n");
     out.write_all(text.as_bytes())?;
     let tracks = sampled.clip.set.track_count();
@@ -86,6 +86,18 @@ pub(super) fn write_motion(
         out.write_all(text.as_bytes())?;
     }
     Ok(warnings.into_list())
+}
+
+/// The shortest digits of a frame's seconds, with zeros behind them where the digits alone would be
+/// read as another rate: 0.0167 is that of 60 frames a second.
+fn frame_time(rate: FrameRate) -> String {
+    let period = rate.time_of(1);
+    let mut digits = period.to_string();
+    if rate::of_period(&digits, period) != Some(rate) {
+        digits += if digits.contains('.') { "" } else { "." };
+        digits += "000000000000";
+    }
+    digits
 }
 
 /// The axes of the angles, each about those before it have turned: fixed axes in the other order are
@@ -167,15 +179,17 @@ fn nodes(sampled: &Sampled<'_>) -> Result<Vec<Node>, String> {
         let first = translation(sampled, 0, track);
         let moves =
             (1..sampled.times.len()).any(|sample| translation(sampled, sample, track) != first);
-        let rest = clip.skeleton.get(track).map(|joint| joint.rest.translation);
+        let rest = clip.rest(Channel::Translation, track);
         let has_positions = depth == 0 || moves;
         nodes.push(Node {
             track,
             depth,
             name: usable_name(clip.set.track(track).name.unwrap_or(""), track, &mut names),
-            offset: rest
-                .filter(|rest| has_positions && rest.is_finite())
-                .unwrap_or(first),
+            offset: if has_positions && !clip.skeleton.is_empty() {
+                rest
+            } else {
+                first
+            },
             has_positions,
         });
     }
@@ -188,25 +202,15 @@ fn nodes(sampled: &Sampled<'_>) -> Result<Vec<Node>, String> {
 
 fn translation(sampled: &Sampled<'_>, sample: usize, track: usize) -> Vec3 {
     let tracks = sampled.clip.set.track_count();
-    let sampled_one = sampled.translations.get(sample * tracks + track).copied();
-    let rest = || {
-        sampled
-            .clip
-            .skeleton
-            .get(track)
-            .map(|joint| joint.rest.translation)
-    };
-    sampled_one.or_else(rest).unwrap_or_default()
+    let found = sampled.translations.get(sample * tracks + track).copied();
+    found.unwrap_or_else(|| sampled.clip.rest(Channel::Translation, track))
 }
 
 fn warn_of_scales(sampled: &Sampled<'_>, nodes: &[Node], warnings: &mut Warnings) {
     let tracks = sampled.clip.set.track_count();
     for node in nodes {
-        let own = sampled.scales.iter().skip(node.track).step_by(tracks);
-        let rest = sampled.clip.skeleton.get(node.track);
-        let rest = rest.filter(|_| sampled.scales.is_empty());
-        let mut all = own.chain(rest.map(|joint| &joint.rest.scale));
-        if all.any(|scale| !scale.abs_diff_eq(Vec3::ONE, UNSCALED)) {
+        let mut own = sampled.scales.iter().skip(node.track).step_by(tracks);
+        if own.any(|scale| !scale.abs_diff_eq(Vec3::ONE, UNSCALED)) {
             warnings.warn(Code::Scales, || {
                 let message = "the joint is scaled; BVH has no scales, they are left out";
                 (Some(Place::Inside(node.name.clone())), message)

@@ -1,0 +1,108 @@
+//! The readers and writers of motion files.
+
+use glam::{Quat, Vec3};
+use tumble_formats::bvh::{self, read_bvh};
+use tumble_formats::format::{Format, Loaded, MotionOptions};
+use tumble_formats::keyed::keyed;
+use tumble_formats::motion::Motion;
+use tumble_formats::tum::{self, read_tum};
+use tumble_formats::{Diagnostic, Limits, ReadOptions};
+
+use super::{place_is_inside, signature};
+
+fn options() -> ReadOptions {
+    ReadOptions {
+        limits: Limits {
+            line: 4096,
+            file: 65_536,
+        },
+        ..ReadOptions::default()
+    }
+}
+
+/// The one clip of a file, its keys written again. What is refused has a place within the input.
+fn written(
+    bytes: &[u8],
+    read: Result<Loaded, Diagnostic>,
+    format: &Format,
+) -> Result<(Motion, Vec<u8>, u64), u64> {
+    let loaded = read.map_err(|error| {
+        place_is_inside(bytes, &error);
+        assert!(!error.message.is_empty());
+        let hint: String = error.message.chars().rev().take(12).collect();
+        signature((error.code, hint))
+    })?;
+    for warning in &loaded.warnings {
+        place_is_inside(bytes, warning);
+    }
+    let codes: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
+    let clip = loaded.clips.into_iter().next().expect("one clip");
+    for track in clip.set.tracks() {
+        assert!(track.times.windows(2).all(|pair| pair[0] < pair[1]));
+        for key in track.keys {
+            assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
+        }
+    }
+    let samples = keyed(&clip).expect("one list of times");
+    let mut out = Vec::new();
+    let write = format.write_motion.expect("it is written");
+    let sampled = samples.of(&clip, clip.rate, &[]);
+    write(&[sampled], &MotionOptions::default(), &mut out).expect("what was read");
+    let of = signature((
+        codes,
+        clip.set.track_count().min(5),
+        samples.times.len().min(3),
+    ));
+    Ok((clip, out, of))
+}
+
+/// The same tracks below the same parents, with the same times and translations.
+fn are_alike(again: &Motion, clip: &Motion) {
+    let [found, wanted] = [again, clip].map(|clip| {
+        let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
+        let parents = clip.skeleton.iter().map(|joint| joint.parent);
+        let mut samples = keyed(clip).expect("one list of times");
+        // A list of zeros, and none, are the same.
+        samples.translations.retain(|&at| at != Vec3::ZERO);
+        let times = (clip.rate, clip.time_offset, samples.times);
+        (
+            names.collect::<Vec<_>>(),
+            parents.collect::<Vec<_>>(),
+            times,
+            samples.translations,
+        )
+    });
+    assert_eq!(found, wanted);
+}
+
+/// The BVH parser: what it takes reads back within a millionth of a radian when it is written.
+pub(crate) fn bvh(bytes: &[u8]) -> u64 {
+    let read = read_bvh("fuzz", bytes, &options());
+    let (clip, out, of) = match written(bytes, read, &bvh::FORMAT) {
+        Ok(found) => found,
+        Err(refused) => return refused,
+    };
+    let again = read_bvh("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    are_alike(&again.clips[0], &clip);
+    let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
+    for (found, wanted) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
+        let [found, wanted] = [found, wanted].map(|q: Quat| q.as_dquat().normalize());
+        let off = 2.0 * (found * wanted.conjugate()).xyz().length();
+        assert!(off < 1e-6, "{wanted} {off:e}");
+    }
+    of
+}
+
+/// The trajectory parser: what it takes reads back bit for bit when it is written.
+pub(crate) fn tum(bytes: &[u8]) -> u64 {
+    let read = read_tum("fuzz", bytes, &options());
+    let (clip, out, of) = match written(bytes, read, &tum::FORMAT) {
+        Ok(found) => found,
+        Err(refused) => return refused,
+    };
+    let again = read_tum("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    are_alike(&again.clips[0], &clip);
+    let [found, wanted] = [&again.clips[0], &clip].map(|clip| clip.set.track(0).keys);
+    assert_eq!(found, wanted);
+    of
+}
