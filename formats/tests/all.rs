@@ -3,6 +3,8 @@
 mod bvh;
 mod dat_fixtures;
 mod fixtures;
+mod gltf;
+mod gltf_bake;
 mod gltf_new;
 mod support;
 mod validator;

@@ -26,7 +26,10 @@ fn numbers<const N: usize>(value: &Value) -> [f64; N] {
 
 /// Radians between two rotations.
 fn angle(a: DQuat, b: DQuat) -> f64 {
-    2.0 * (a.normalize() * b.normalize().conjugate()).xyz().length().asin()
+    2.0 * (a.normalize() * b.normalize().conjugate())
+        .xyz()
+        .length()
+        .asin()
 }
 
 /// Compares a clip with what another program made of it.
@@ -36,7 +39,10 @@ fn compare(name: &str, clip: &Motion, expected: &Value) {
     let frames = expected["frames"].as_u64().unwrap() as usize;
     let frame_time = expected["frame_time"].as_f64().unwrap();
     let rate = clip.rate.unwrap();
-    assert!((rate.time_of(1) - frame_time).abs() < 5e-7, "{name}: {rate}");
+    assert!(
+        (rate.time_of(1) - frame_time).abs() < 5e-7,
+        "{name}: {rate}"
+    );
     for (index, joint) in joints.iter().enumerate() {
         let track = clip.set.track(index);
         assert_eq!(track.name, joint["name"].as_str(), "{name}");
@@ -58,10 +64,17 @@ fn compare(name: &str, clip: &Motion, expected: &Value) {
             }
             let wanted = DQuat::from_array(numbers(&joint["rotations"][place]));
             let off = angle(track.keys[key].as_dquat(), wanted);
-            assert!(off < 3e-7, "{name}, {:?}, frame {frame}: {off:e}", track.name);
+            assert!(
+                off < 3e-7,
+                "{name}, {:?}, frame {frame}: {off:e}",
+                track.name
+            );
             let wanted = Vec3::from_array(numbers(&joint["translations"][place]).map(|x| x as f32));
             let found = at(clip, &[rate.time_of(frame as u64)]).1[index];
-            assert!(found.abs_diff_eq(wanted, 1e-5), "{name}, frame {frame}: {found} {wanted}");
+            assert!(
+                found.abs_diff_eq(wanted, 1e-5),
+                "{name}, frame {frame}: {found} {wanted}"
+            );
         }
     }
 }
@@ -85,7 +98,10 @@ fn files_from_elsewhere_are_what_other_programs_read() {
     assert_eq!(cmu.rate, FrameRate::new(120, 1).ok());
     // Every `.bvh` of the folders was there.
     let files = ["", "made"].map(|part| fs::read_dir(folder.join(part)).unwrap());
-    let files = files.into_iter().flatten().map(|entry| entry.unwrap().path());
+    let files = files
+        .into_iter()
+        .flatten()
+        .map(|entry| entry.unwrap().path());
     let all = files.filter(|path| path.extension().is_some_and(|end| end == "bvh"));
     assert_eq!(all.count(), count + 1);
 }
@@ -113,7 +129,10 @@ fn broken_files_from_elsewhere_are_refused_for_what_they_are() {
     let folder = data.join("bvh/bad");
     assert_eq!(fs::read_dir(&folder).unwrap().count(), verdicts.len());
     for (name, code) in verdicts {
-        let read = open_bvh(&folder.join(name).with_extension("bvh"), &ReadOptions::default());
+        let read = open_bvh(
+            &folder.join(name).with_extension("bvh"),
+            &ReadOptions::default(),
+        );
         let said = match read {
             Ok(loaded) => {
                 assert_eq!(loaded.clips.len(), 1);
@@ -121,7 +140,11 @@ fn broken_files_from_elsewhere_are_refused_for_what_they_are() {
             }
             Err(error) => vec![error],
         };
-        assert_eq!(said.iter().map(|d| d.code).collect::<Vec<_>>(), [code], "{name}");
+        assert_eq!(
+            said.iter().map(|d| d.code).collect::<Vec<_>>(),
+            [code],
+            "{name}"
+        );
     }
 }
 
@@ -174,7 +197,10 @@ fn long_lines_are_read_once() {
     let deep = "JOINT b {".repeat(200_000);
     let error = read(&HEAD.replace("}", &deep), &ReadOptions::default()).unwrap_err();
     assert_eq!(error.code, Code::BvhBraces);
-    let limits = Limits { line: 20, file: 300 };
+    let limits = Limits {
+        line: 20,
+        file: 300,
+    };
     let options = ReadOptions {
         limits,
         ..ReadOptions::default()
@@ -188,7 +214,8 @@ fn clip(parents: &[Option<usize>], names: &[&str], samples: usize, rotations: &[
     let times: Vec<f64> = (0..samples as u64).map(|k| k as f64 / 30.0).collect();
     for (track, name) in names.iter().enumerate() {
         let keys = rotations.iter().skip(track).step_by(names.len());
-        set.push(*name, &times, &keys.copied().collect::<Vec<_>>()).unwrap();
+        set.push(*name, &times, &keys.copied().collect::<Vec<_>>())
+            .unwrap();
     }
     let joint = |(track, &parent): (usize, &Option<usize>)| Joint {
         parent,
@@ -227,9 +254,16 @@ fn write(
 
 /// The angles of the rows, degrees, behind the first `skip` numbers.
 fn rows(text: &str) -> Vec<Vec<f64>> {
-    let lines = text.lines().skip_while(|line| !line.starts_with("Frame Time")).skip(1);
+    let lines = text
+        .lines()
+        .skip_while(|line| !line.starts_with("Frame Time"))
+        .skip(1);
     lines
-        .map(|line| line.split(' ').map(|number| number.parse().unwrap()).collect())
+        .map(|line| {
+            line.split(' ')
+                .map(|number| number.parse().unwrap())
+                .collect()
+        })
         .collect()
 }
 
@@ -258,9 +292,18 @@ fn joints_are_written_below_their_parents_with_usable_names() {
                     CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n    \
                     JOINT joint2\n";
     assert!(text.starts_with(expected), "{text}");
-    assert!(text.contains("\nFrame Time: 0.03333333333333333\n"), "{text}");
-    assert!(text.ends_with(" 0.0000001 0.25 300000000 0 0 0 28.64789 0 0 0.1 0.7 0 0 0 0\n"), "{text}");
-    assert_eq!((warnings.len(), warnings[0].code, warnings[0].count), (1, Code::Scales, 5));
+    assert!(
+        text.contains("\nFrame Time: 0.03333333333333333\n"),
+        "{text}"
+    );
+    assert!(
+        text.ends_with(" 0.0000001 0.25 300000000 0 0 0 28.64789 0 0 0.1 0.7 0 0 0 0\n"),
+        "{text}"
+    );
+    assert_eq!(
+        (warnings.len(), warnings[0].code, warnings[0].count),
+        (1, Code::Scales, 5)
+    );
     let back = read(&text, &ReadOptions::default()).unwrap();
     let parents: Vec<_> = back.skeleton.iter().map(|joint| joint.parent).collect();
     assert_eq!(parents, [None, Some(0), Some(0), Some(2), None]);
@@ -317,7 +360,9 @@ fn what_bvh_cannot_hold_is_refused() {
 #[test]
 fn angles_are_unwrapped_and_exact_after_many_turns() {
     let rotations: Vec<Quat> = (0..4000)
-        .map(|i| (DQuat::from_rotation_x(0.3) * DQuat::from_rotation_y(f64::from(i) * 0.7)).as_quat())
+        .map(|i| {
+            (DQuat::from_rotation_x(0.3) * DQuat::from_rotation_y(f64::from(i) * 0.7)).as_quat()
+        })
         .collect();
     let clip = clip(&[None], &["wheel"], rotations.len(), &rotations);
     let times: Vec<f64> = (0..4000).map(|k| f64::from(k) / 30.0).collect();
@@ -339,7 +384,14 @@ fn angles_are_unwrapped_and_exact_after_many_turns() {
 fn rotation() -> impl Strategy<Value = Quat> {
     let anywhere = prop::array::uniform4(-1.0f64..1.0);
     let anywhere = anywhere.prop_filter("norm", |q| DQuat::from_array(*q).length() > 0.1);
-    let lock = (0..3usize, 0..3usize, -4.0f64..4.0, -4.0f64..4.0, -9.0f64..0.0, any::<bool>());
+    let lock = (
+        0..3usize,
+        0..3usize,
+        -4.0f64..4.0,
+        -4.0f64..4.0,
+        -9.0f64..0.0,
+        any::<bool>(),
+    );
     prop_oneof![
         anywhere.prop_map(|q| DQuat::from_array(q).normalize().as_quat()),
         // Near gimbal lock: a quarter turn about one axis between turns about others.
@@ -349,8 +401,8 @@ fn rotation() -> impl Strategy<Value = Quat> {
                 1 => DQuat::from_rotation_y(angle),
                 _ => DQuat::from_rotation_z(angle),
             };
-            let quarter = (std::f64::consts::FRAC_PI_2 + 10f64.powf(near))
-                * if down { -1.0 } else { 1.0 };
+            let quarter =
+                (std::f64::consts::FRAC_PI_2 + 10f64.powf(near)) * if down { -1.0 } else { 1.0 };
             (turn(first, a) * turn(middle, quarter) * turn(3 - first, b)).as_quat()
         }),
     ]

@@ -97,6 +97,8 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::TimesInF32,
         Code::TimesBelowZero,
         Code::GlbTooLong,
+        Code::GltfFolder,
+        Code::StaysOutside,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

@@ -121,7 +121,7 @@ impl Moved {
         };
         if values.count != needed {
             let message = format!(
-                "{} values for {} times, of which {} is made; there would be {needed}",
+                "{} values for {} times; {} needs {needed}",
                 values.count,
                 times.count,
                 sampler.interpolation.as_deref().unwrap_or("LINEAR"),

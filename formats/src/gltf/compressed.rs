@@ -9,7 +9,10 @@ pub(super) fn decode(bytes: &[u8], view: &MeshoptView, most: u64) -> Result<Vec<
     let filter = filter.map_err(|error| error.to_string())?;
     let length = view.count as u128 * view.byte_stride as u128;
     if length > u128::from(most) {
-        return Err(format!("the view is said to have {length} bytes; more than {most} are not read"));
+        return Err(format!(
+            "the view is said to have {length} bytes; more than {most} are not read"
+        ));
     }
-    decode_attributes(bytes, view.count, view.byte_stride, filter).map_err(|error| error.to_string())
+    decode_attributes(bytes, view.count, view.byte_stride, filter)
+        .map_err(|error| error.to_string())
 }

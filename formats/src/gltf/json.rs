@@ -79,7 +79,7 @@ impl<'a> Json<'a> {
         let members = serde_json::from_str(text).map_err(|error| Diagnostic {
             place: Some(Place::Text {
                 line: error.line() as u64,
-                column: error.column() as u64,
+                column: error.column().max(1) as u64,
             }),
             ..Diagnostic::new(
                 name,
