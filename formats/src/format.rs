@@ -16,13 +16,14 @@ use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::source::Source;
 use crate::text::lines::Limits;
-use crate::{bvh, csv, dat, npy, tum};
+use crate::{bvh, csv, dat, gltf, npy, tum};
 
 /// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
 /// format that can be read is that of inputs which tell neither way, the first that can be written
 /// that of such outputs.
-pub static FORMATS: [&Format; 5] = [
+pub static FORMATS: [&Format; 6] = [
     &dat::FORMAT,
+    &gltf::FORMAT,
     &bvh::FORMAT,
     &npy::FORMAT,
     &csv::FORMAT,

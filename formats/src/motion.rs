@@ -27,6 +27,8 @@ pub struct Motion {
     /// Whole seconds that every time of the set is to be moved by. Clocks that count from 1970
     /// would leave f64 only 0.2 µs; times that count from near their first lose nothing.
     pub time_offset: i64,
+    /// Why poses in the world cannot be told, where they cannot.
+    pub no_world: Option<String>,
 }
 
 /// A joint of a skeleton.

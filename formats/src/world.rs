@@ -18,6 +18,12 @@ pub struct WorldPose {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HierarchyError {
+    /// The file says something that rotations, translations and scales cannot.
+    #[error("{reason}")]
+    Refused {
+        /// What it is.
+        reason: String,
+    },
     /// A joint hangs on itself.
     #[error("joint {joint} hangs on itself")]
     Circle {
@@ -40,8 +46,12 @@ pub enum HierarchyError {
 /// and rounded once. Joints of a clip without a skeleton are roots.
 ///
 /// # Errors
-/// When the parents make no hierarchy.
+/// When the parents make no hierarchy, or the clip says why its poses cannot be told.
 pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
+    if let Some(reason) = &clip.no_world {
+        let reason = reason.clone();
+        return Err(HierarchyError::Refused { reason });
+    }
     let joints = clip.set.track_count();
     let order = parents_first(clip, joints)?;
     let mut poses = Vec::with_capacity(samples.rotations.len());

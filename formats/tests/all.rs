@@ -4,6 +4,8 @@ mod bvh;
 mod bvh_write;
 mod dat_fixtures;
 mod fixtures;
+mod gltf;
+mod gltf_bake;
 mod gltf_new;
 mod support;
 mod validator;

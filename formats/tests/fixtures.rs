@@ -102,6 +102,8 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::TumWrite,
         Code::Scales,
         Code::StartMoved,
+        Code::GltfFolder,
+        Code::StaysOutside,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

@@ -1,8 +1,173 @@
 //! glTF 2.0, as text (`.gltf`) and as GLB.
+//!
+//! A clip for each animation, a track for each node that it moves or that carries such a node. What
+//! is read is checked; what is not read may be anything, and comes back byte for byte when the file
+//! is written with other keys.
 
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "called by the reader of buffer views")
-)]
+mod accessor;
+mod animation;
+mod bake;
+mod channel;
+mod compressed;
+mod container;
+mod data;
+mod edits;
+mod gather;
+mod json;
+mod matrix;
 mod meshopt;
+mod nodes;
+mod reader;
+mod schema;
+mod uri;
 pub mod write_new;
+
+use std::io::BufRead;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Format, Loaded, ReadOptions};
+use crate::gltf::bake::Gltf;
+use crate::gltf::container::Container;
+use crate::gltf::json::Json;
+use crate::gltf::nodes::Nodes;
+use crate::gltf::reader::{MESHOPT, Reader};
+use crate::gltf::schema::Asset;
+use crate::source::Source;
+use crate::warnings::Warnings;
+
+/// Animations of nodes, with all else that makes a scene.
+pub static FORMAT: Format = Format {
+    name: "glb",
+    summary: "glTF 2.0 animations, as GLB or text",
+    extensions: &["gltf"],
+    probe: is_gltf,
+    read: Some(open_gltf),
+    write: None,
+    write_motion: Some(write_new::write_new),
+    many_clips: true,
+};
+
+/// The longest GLB: its header says the length in 32 bits.
+const LONGEST_GLB: u64 = u32::MAX as u64;
+
+/// Required extensions that are known, or say nothing of animations.
+const KNOWN: [&str; 9] = [
+    MESHOPT[0],
+    MESHOPT[1],
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_mesh_quantization",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_materials_unlit",
+    "EXT_texture_webp",
+];
+
+fn is_gltf(start: &[u8]) -> bool {
+    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    let is_object = text.trim_ascii_start().starts_with(b"{");
+    start.starts_with(container::MAGIC)
+        || is_object && text.windows(7).any(|seven| seven == b"\"asset\"")
+}
+
+/// Reads a file; `-` is standard input. Files that it names are read beside it.
+///
+/// # Errors
+/// The first fault that refuses the file; those of single animations are in [`Loaded::refused`].
+pub fn open_gltf(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let mut source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let start = source.reader.fill_buf().unwrap_or_default();
+    let most = match start.starts_with(container::MAGIC) {
+        true => options.limits.file.min(LONGEST_GLB),
+        false => options.limits.file,
+    };
+    let bytes = source.into_bytes(most)?;
+    let folder = (path.as_os_str() != "-").then(|| path.parent().unwrap_or(Path::new("")));
+    read_gltf(&name, bytes, folder, options)
+}
+
+/// Reads the bytes of a file; `name` is what messages call it, and `folder` where the files are
+/// that it names.
+///
+/// # Errors
+/// As [`open_gltf`].
+pub fn read_gltf(
+    name: &str,
+    bytes: Vec<u8>,
+    folder: Option<&Path>,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
+    let mut warnings = Warnings::new(name);
+    let container = Container::parse(name, bytes, &mut warnings)?;
+    let json = Json::parse(name, &container.text)?;
+    check_version(&json)?;
+    let animations = json.entries("animations").len();
+    if animations == 0 {
+        let message = "the file has no animations; is it the right one?";
+        return Err(json.refuse("/animations", Code::NoAnimations, message));
+    }
+    let reader = Reader::new(&json, &container, folder, options.limits.file, warnings)?;
+    for (place, required) in reader.required().iter().enumerate() {
+        if !KNOWN.contains(&required.as_str()) {
+            reader.warn(Code::RequiredExtension, &format!("/extensionsRequired/{place}"), || {
+                format!("the extension {required} is required and not known; animations are read without it")
+            });
+        }
+    }
+    let nodes = Nodes::read(&json)?;
+    let mut loaded = Loaded::default();
+    let mut read = Vec::with_capacity(animations);
+    for index in 0..animations {
+        match animation::read(index, &reader, &nodes, options) {
+            Ok(found) => {
+                let (clip, own) = found.unzip();
+                loaded.clips.extend(clip);
+                read.push(own);
+            }
+            Err(fault) => {
+                read.push(None);
+                // Animations that share a broken buffer have one fault.
+                match loaded
+                    .refused
+                    .iter_mut()
+                    .find(|known| (&known.place, &known.message) == (&fault.place, &fault.message))
+                {
+                    Some(known) => known.count += 1,
+                    None => loaded.refused.push(fault),
+                }
+            }
+        }
+    }
+    loaded.warnings = reader.warnings.into_inner().into_list();
+    loaded.document = Some(Arc::new(Gltf {
+        name: name.to_owned(),
+        container,
+        folder: folder.map(Path::to_owned),
+        most: options.limits.file,
+        animations: read,
+    }));
+    Ok(loaded)
+}
+
+/// # Errors
+/// When the file is of another version of glTF, or of none.
+fn check_version(json: &Json<'_>) -> Result<(), Diagnostic> {
+    let Some(asset) = json.member("asset")? else {
+        let message = "there is no `asset`, which every glTF file has";
+        return Err(json.refuse("/asset", Code::Property, message));
+    };
+    let asset: Asset = json.typed(asset, "/asset")?;
+    let least = asset.min_version.as_deref().unwrap_or("2.0");
+    if asset.version.starts_with("2.") && least == "2.0" {
+        return Ok(());
+    }
+    let (pointer, version) = match least {
+        "2.0" => ("/asset/version", asset.version.as_str()),
+        _ => ("/asset/minVersion", least),
+    };
+    let message = format!("the file is glTF {version}; export it as glTF 2.0");
+    Err(json.refuse(pointer, Code::GltfVersion, message))
+}

@@ -1,0 +1,275 @@
+//! One animation as a clip.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::ReadOptions;
+use crate::gltf::channel::{ChannelKeys, Moved, Path, Times};
+use crate::gltf::nodes::Nodes;
+use crate::gltf::reader::Reader;
+use crate::gltf::schema::{Animation, Channel, Sampler};
+use crate::grid::{Precision, restore};
+use crate::motion::{self, Channels, Joint, Motion};
+
+/// What writing has to know of an animation that was read.
+#[derive(Debug)]
+pub(super) struct Read {
+    /// First and last key time: as the file has them, and as the clip has them.
+    pub(super) stored_span: [f32; 2],
+    pub(super) span: [f64; 2],
+    /// The channels of more than one key that are not STEP.
+    pub(super) sampled: Vec<SampledChannel>,
+}
+
+/// A channel that is sampled when the file is written again.
+#[derive(Debug)]
+pub(super) struct SampledChannel {
+    /// Its place among the animation's channels, and its sampler's.
+    pub(super) channel: usize,
+    pub(super) sampler: usize,
+    /// What of which track it moves.
+    pub(super) track: usize,
+    pub(super) path: Path,
+}
+
+/// Reads the animation of that index; nothing if it moves no node.
+///
+/// # Errors
+/// The first fault that refuses the animation.
+pub(super) fn read(
+    index: usize,
+    reader: &Reader<'_>,
+    nodes: &Nodes,
+    options: &ReadOptions,
+) -> Result<Option<(Motion, Read)>, Diagnostic> {
+    let pointer = format!("/animations/{index}");
+    let animation: Animation<'_> = reader.json.entry("animations", index, &pointer)?;
+    let moved = moved(reader, nodes, &animation, &pointer)?;
+    if moved.is_empty() {
+        reader.warn(
+            Code::NothingMoved,
+            &pointer,
+            || "the animation moves no node; it is kept in the file as it is",
+        );
+        return Ok(None);
+    }
+    let (times, stored, rate) = times(reader, &moved, options)?;
+    let tracks = Tracks::of(nodes, &moved);
+    let mut motion = Motion {
+        name: animation.name.filter(|name| !name.is_empty()),
+        place: index,
+        rate,
+        ..Motion::default()
+    };
+    let mut keys: Vec<ChannelKeys> = Vec::new();
+    for moved in &moved {
+        keys.push(moved.keys(reader, &times[&moved.sampler.input], options.duplicates)?);
+    }
+    let all_times = || keys.iter().flat_map(|keys| keys.times.iter().copied());
+    let start = all_times().fold(f64::INFINITY, f64::min);
+    let start = if start.is_finite() { start } else { 0.0 };
+    for &node in &tracks.nodes {
+        let rest = tracks.rest(node, reader, nodes, &mut motion)?;
+        let own = |path| {
+            let channel = moved
+                .iter()
+                .position(|own| (own.node, own.path) == (node, path))?;
+            Some((&moved[channel], &keys[channel])).filter(|(_, keys)| !keys.times.is_empty())
+        };
+        let sampler = |path| own(path).map(|(moved, _)| moved.interpolation);
+        motion.channels.push(Channels {
+            rotation: sampler(Path::Rotation),
+            translation: sampler(Path::Translation),
+            scale: sampler(Path::Scale),
+        });
+        motion.skeleton.push(Joint {
+            parent: nodes.parent(node).map(|parent| tracks.of_node(parent)),
+            rest,
+        });
+        let name = nodes.name(node);
+        match own(Path::Rotation) {
+            Some((_, keys)) => keys.push(&mut motion.set, name),
+            None => motion.set.push(name, &[start], &[rest.rotation]),
+        }
+        .map_err(|error| {
+            reader
+                .json
+                .refuse(&pointer, Code::NotFinite, error.to_string())
+        })?;
+        for path in [Path::Translation, Path::Scale] {
+            if let Some((moved, keys)) = own(path) {
+                let set = keys.set(&mut motion.set, path);
+                set.map_err(|error| {
+                    reader
+                        .json
+                        .refuse(&moved.output, Code::NotFinite, error.to_string())
+                })?;
+            }
+        }
+    }
+    let sampled = moved.iter().zip(&keys).filter(|(moved, keys)| {
+        keys.times.len() > 1 && moved.interpolation != motion::Sampler::Step
+    });
+    let read = Read {
+        stored_span: stored,
+        span: motion
+            .set
+            .time_span()
+            .map_or([0.0; 2], |(first, last)| [first, last]),
+        sampled: sampled
+            .map(|(moved, _)| SampledChannel {
+                channel: moved.channel,
+                sampler: moved.sampler_index,
+                track: tracks.of_node(moved.node),
+                path: moved.path,
+            })
+            .collect(),
+    };
+    Ok(Some((motion, read)))
+}
+
+/// The channels that move nodes.
+fn moved(
+    reader: &Reader<'_>,
+    nodes: &Nodes,
+    animation: &Animation<'_>,
+    pointer: &str,
+) -> Result<Vec<Moved>, Diagnostic> {
+    let mut all = Vec::new();
+    let mut targets = HashSet::new();
+    for (index, raw) in animation.channels.iter().enumerate() {
+        let own = format!("{pointer}/channels/{index}");
+        let channel: Channel = reader.json.typed(raw, &own)?;
+        let Some((node, path)) = target(reader, &channel, &own) else {
+            continue;
+        };
+        let target = format!("{own}/target");
+        if node >= nodes.count() {
+            return Err(reader.json.no_such("nodes", node, nodes.count(), &target));
+        }
+        if !targets.insert((node, path)) {
+            let message = format!("a second channel for the {path} of node {node}; remove one");
+            return Err(reader.json.refuse(&target, Code::TwoChannels, message));
+        }
+        if nodes.has_matrix(node) {
+            reader.warn(Code::NodeMatrix, &format!("/nodes/{node}/matrix"), || {
+                format!("node {node} is moved and has a matrix; it is split into translation, rotation and scale")
+            });
+        }
+        let Some(sampler) = animation.samplers.get(channel.sampler) else {
+            let (index, count) = (channel.sampler, animation.samplers.len());
+            return Err(reader
+                .json
+                .no_such("samplers", index, count, &format!("{own}/sampler")));
+        };
+        let own = format!("{pointer}/samplers/{}", channel.sampler);
+        let sampler: Sampler = reader.json.typed(sampler, &own)?;
+        all.push(Moved::new(
+            reader,
+            (index, node, path),
+            (channel.sampler, sampler),
+            &own,
+        )?);
+    }
+    Ok(all)
+}
+
+/// The node that a channel moves, and what of it; `None` if it moves something else.
+fn target(reader: &Reader<'_>, channel: &Channel, pointer: &str) -> Option<(usize, Path)> {
+    let target = &channel.target;
+    if target.path == "pointer" {
+        let pointer = target.extensions.pointer.as_ref()?;
+        let mut parts = pointer.pointer.strip_prefix("/nodes/")?.split('/');
+        let node = parts.next()?.parse().ok()?;
+        let path = Path::named(parts.next()?)?;
+        return parts.next().is_none().then_some((node, path));
+    }
+    let node = target.node?;
+    let path = Path::named(&target.path);
+    if path.is_none() && target.path != "weights" {
+        reader.warn(Code::TargetPath, &format!("{pointer}/target/path"), || {
+            format!(
+                "`{}` is not known; the channel is kept as it is",
+                target.path
+            )
+        });
+    }
+    path.map(|path| (node, path))
+}
+
+/// The times of channels, by the accessor that they are in.
+type TimesOf = BTreeMap<usize, Times>;
+
+/// The times of all channels, on the frames of one rate where they are; the first and the last of
+/// them as the file has them; and the rate.
+fn times(
+    reader: &Reader<'_>,
+    moved: &[Moved],
+    options: &ReadOptions,
+) -> Result<(TimesOf, [f32; 2], Option<tumble::FrameRate>), Diagnostic> {
+    let mut stored = BTreeMap::new();
+    for moved in moved {
+        if let std::collections::btree_map::Entry::Vacant(entry) = stored.entry(moved.sampler.input)
+        {
+            entry.insert(moved.stored_times(reader)?);
+        }
+    }
+    let all = || stored.values().flatten().copied();
+    let first = all().fold(f64::INFINITY, f64::min);
+    let last = all().fold(f64::NEG_INFINITY, f64::max);
+    let (indices, mut lists): (Vec<usize>, Vec<Vec<f64>>) = stored.into_iter().unzip();
+    let rate = match options.raw_times {
+        true => None,
+        false => restore(&mut lists, Precision::F32),
+    };
+    let lists = lists.into_iter().map(Times::new);
+    let times = indices.into_iter().zip(lists).collect();
+    Ok((times, [first as f32, last as f32], rate))
+}
+
+/// The nodes that are tracks: those that are moved, and those that carry them.
+struct Tracks {
+    /// In their order in the file.
+    nodes: Vec<usize>,
+}
+
+impl Tracks {
+    fn of(nodes: &Nodes, moved: &[Moved]) -> Self {
+        let mut tracks = BTreeSet::new();
+        for moved in moved {
+            let mut next = Some(moved.node);
+            while let Some(node) = next.filter(|&node| tracks.insert(node)) {
+                next = nodes.parent(node);
+            }
+        }
+        Self {
+            nodes: tracks.into_iter().collect(),
+        }
+    }
+
+    /// The track of a node that is one.
+    fn of_node(&self, node: usize) -> usize {
+        self.nodes.partition_point(|&own| own < node)
+    }
+
+    /// Where a node rests; notes where that is more than a transform can say.
+    fn rest(
+        &self,
+        node: usize,
+        reader: &Reader<'_>,
+        nodes: &Nodes,
+        motion: &mut Motion,
+    ) -> Result<motion::Transform, Diagnostic> {
+        let rest = nodes.rest(node, reader)?;
+        if rest.is_sheared {
+            let pointer = format!("/nodes/{node}/matrix");
+            let message = format!(
+                "the matrix of `{}` shears or projects; poses in the world cannot be told",
+                nodes.name(node)
+            );
+            reader.warn(Code::Shear, &pointer, || message.clone());
+            motion.no_world.get_or_insert(message);
+        }
+        Ok(rest.transform)
+    }
+}

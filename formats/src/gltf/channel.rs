@@ -1,0 +1,307 @@
+//! The keys of one channel: times, values and tangents.
+
+use std::fmt;
+
+use glam::{DQuat, DVec4, Quat, Vec3};
+use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::gltf::reader::Reader;
+use crate::gltf::schema::{Accessor, Sampler};
+use crate::keys::{Duplicates, Origin, select};
+use crate::motion;
+use crate::quaternion::dot;
+use crate::warnings::Warnings;
+
+/// What of a node a channel moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Path {
+    Translation,
+    Rotation,
+    Scale,
+}
+
+impl Path {
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "translation" => Self::Translation,
+            "rotation" => Self::Rotation,
+            "scale" => Self::Scale,
+            _ => return None,
+        })
+    }
+
+    /// Numbers of a value.
+    pub(super) fn width(self) -> usize {
+        match self {
+            Self::Rotation => 4,
+            Self::Translation | Self::Scale => 3,
+        }
+    }
+}
+
+impl fmt::Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+            Self::Scale => "scale",
+        })
+    }
+}
+
+/// A channel that moves a node.
+pub(super) struct Moved {
+    /// Its place among the animation's channels.
+    pub(super) channel: usize,
+    pub(super) node: usize,
+    pub(super) path: Path,
+    /// Its sampler's place among the animation's samplers.
+    pub(super) sampler_index: usize,
+    pub(super) sampler: Sampler,
+    pub(super) interpolation: motion::Sampler,
+    /// Pointers to what the sampler names.
+    input: String,
+    pub(super) output: String,
+    times: Accessor,
+    values: Accessor,
+}
+
+/// Times that several channels may share.
+pub(super) struct Times(Vec<f64>);
+
+impl Times {
+    pub(super) fn new(times: Vec<f64>) -> Self {
+        Self(times)
+    }
+}
+
+/// The keys of one channel.
+pub(super) struct ChannelKeys {
+    /// Seconds, strictly increasing; none for a channel that rests.
+    pub(super) times: Vec<f64>,
+    values: Values,
+}
+
+/// With the tangents with which the curve arrives and leaves, if it has any.
+enum Values {
+    Rotations(Vec<Quat>, Vec<[Quat; 2]>),
+    Vectors(Vec<Vec3>, Vec<[Vec3; 2]>),
+}
+
+impl Moved {
+    /// A channel, its node and what of it; its sampler and its place; where the sampler is.
+    ///
+    /// # Errors
+    /// When the interpolation is not known, or there are not as many values as times say.
+    pub(super) fn new(
+        reader: &Reader<'_>,
+        (channel, node, path): (usize, usize, Path),
+        (sampler_index, sampler): (usize, Sampler),
+        pointer: &str,
+    ) -> Result<Self, Diagnostic> {
+        let interpolation = match sampler.interpolation.as_deref() {
+            None | Some("LINEAR") => motion::Sampler::Linear,
+            Some("STEP") => motion::Sampler::Step,
+            Some("CUBICSPLINE") => motion::Sampler::Cubic,
+            Some(other) => {
+                let message = format!(
+                    "`{other}` is no interpolation; there are LINEAR, STEP and CUBICSPLINE"
+                );
+                let pointer = format!("{pointer}/interpolation");
+                return Err(reader.json.refuse(&pointer, Code::Interpolation, message));
+            }
+        };
+        let (input, output) = (format!("{pointer}/input"), format!("{pointer}/output"));
+        let times = reader.accessor(sampler.input, &input)?;
+        let values = reader.accessor(sampler.output, &output)?;
+        let needed = match interpolation {
+            motion::Sampler::Cubic => times.count.saturating_mul(3),
+            _ => times.count,
+        };
+        if values.count != needed {
+            let message = format!(
+                "{} values for {} times; {} needs {needed}",
+                values.count,
+                times.count,
+                sampler.interpolation.as_deref().unwrap_or("LINEAR"),
+            );
+            return Err(reader.json.refuse(&output, Code::OutputCount, message));
+        }
+        Ok(Self {
+            channel,
+            node,
+            path,
+            sampler_index,
+            sampler,
+            interpolation,
+            input,
+            output,
+            times,
+            values,
+        })
+    }
+
+    /// The times as the file has them.
+    ///
+    /// # Errors
+    /// When they are no floats, or missing.
+    pub(super) fn stored_times(&self, reader: &Reader<'_>) -> Result<Vec<f64>, Diagnostic> {
+        let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
+        if let Some(time) = times.iter().find(|time| **time < 0.0) {
+            reader.warn(Code::NegativeTime, &self.input, || {
+                format!("the time {time} is negative; it is read as it is")
+            });
+        }
+        Ok(times)
+    }
+
+    /// The keys, at times that increase.
+    ///
+    /// # Errors
+    /// When values are missing or broken, or times do not increase.
+    pub(super) fn keys(
+        &self,
+        reader: &Reader<'_>,
+        times: &Times,
+        duplicates: Duplicates,
+    ) -> Result<ChannelKeys, Diagnostic> {
+        let width = self.path.width();
+        let mut times = times.0.clone();
+        if times.is_empty() {
+            reader.warn(Code::EmptySampler, &self.input, || {
+                format!(
+                    "the sampler has no keys; the {} of node {} rests",
+                    self.path, self.node
+                )
+            });
+        }
+        let numbers = reader.numbers(self.sampler.output, &self.values, width, &self.output)?;
+        let is_cubic = self.interpolation == motion::Sampler::Cubic;
+        let key_width = if is_cubic { 3 * width } else { width };
+        let of_key = |key: usize| &numbers[key * key_width..][..key_width];
+        let warnings = &mut *reader.warnings.borrow_mut();
+        let at_input = |_: usize| Place::Inside(self.input.clone());
+        let at_output = |_: usize| Place::Inside(self.output.clone());
+        let origin = Origin {
+            file: reader.json.name,
+            place: &at_input,
+            duplicates,
+        };
+        let kept = origin.increasing(&times, |i, j| of_key(i) == of_key(j), warnings)?;
+        select(&mut times, kept.as_deref());
+        let kept = kept.unwrap_or_else(|| (0..times.len()).collect());
+        if is_cubic && times.len() == 1 {
+            warnings.warn(Code::CubicOfOne, || {
+                (Some(at_output(0)), "CUBICSPLINE of one key; it holds")
+            });
+        }
+        // A cubic's key has three values: the tangent that arrives, the value, the one that leaves.
+        let value = |key: usize, which: usize| {
+            let of = |which: usize| &of_key(kept[key])[which * width..][..width];
+            of(if is_cubic { which } else { 0 })
+        };
+        let keys = || 0..times.len();
+        // Of the first key nothing arrives, and nothing leaves the last.
+        let tangent = |key: usize, which: usize| {
+            let is_used = if which == 0 {
+                key > 0
+            } else {
+                key + 1 < times.len()
+            };
+            is_used.then(|| value(key, which))
+        };
+        let values = match self.path {
+            Path::Rotation => {
+                let stored: Vec<DQuat> =
+                    keys().map(|key| DQuat::from_slice(value(key, 1))).collect();
+                let origin = Origin {
+                    place: &at_output,
+                    ..origin
+                };
+                let mut unit = origin.unit(stored.iter().copied(), warnings)?;
+                if self.interpolation == motion::Sampler::Linear {
+                    half_turns(&mut unit, warnings, &at_output);
+                }
+                let tangents = keys().filter(|_| is_cubic).map(|key| {
+                    // A key that is brought to norm 1 takes its tangents along.
+                    let norm = dot(stored[key], stored[key]).sqrt();
+                    let norm = if (norm - 1.0).abs() <= UNIT_TOLERANCE {
+                        1.0
+                    } else {
+                        norm
+                    };
+                    [0, 2].map(|which| {
+                        let own = tangent(key, which).map_or(DVec4::ZERO, DVec4::from_slice);
+                        Quat::from_vec4((own / norm).as_vec4())
+                    })
+                });
+                let tangents = tangents.collect();
+                Values::Rotations(unit, tangents)
+            }
+            Path::Translation | Path::Scale => {
+                let vector = |numbers: &[f64]| glam::DVec3::from_slice(numbers).as_vec3();
+                let tangents = keys()
+                    .filter(|_| is_cubic)
+                    .map(|key| [0, 2].map(|which| tangent(key, which).map_or(Vec3::ZERO, vector)));
+                let tangents = tangents.collect();
+                Values::Vectors(keys().map(|key| vector(value(key, 1))).collect(), tangents)
+            }
+        };
+        Ok(ChannelKeys { times, values })
+    }
+}
+
+/// A dot product this close to 0 is a half turn within f32 rounding.
+const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
+
+/// Where neighbours are half a turn apart, sets keep the signs that keys have: they get those whose
+/// inner product is not negative, by which glTF says which way round is the shorter.
+fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, place: &dyn Fn(usize) -> Place) {
+    for key in 1..keys.len() {
+        let product = dot(keys[key - 1].as_dquat(), keys[key].as_dquat());
+        if product.abs() > HALF_TURN {
+            continue;
+        }
+        warnings.warn(Code::HalfTurn, || {
+            let message = format!("keys {} and {key} are half a turn apart", key - 1);
+            (Some(place(key)), message)
+        });
+        if product < 0.0 {
+            keys[key] = -keys[key];
+        }
+    }
+}
+
+impl ChannelKeys {
+    /// Appends a track of these rotations.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub(super) fn push(&self, set: &mut TrackSet, name: &str) -> Result<(), TrackError> {
+        let Values::Rotations(keys, tangents) = &self.values else {
+            return Ok(());
+        };
+        let track = set.track_count();
+        set.push(name, &self.times, keys)?;
+        match tangents.is_empty() {
+            true => Ok(()),
+            false => set.set_tangents(track, tangents),
+        }
+    }
+
+    /// Gives the last track these translations or scales.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub(super) fn set(&self, set: &mut TrackSet, path: Path) -> Result<(), TrackError> {
+        let Values::Vectors(keys, tangents) = &self.values else {
+            return Ok(());
+        };
+        let track = set.track_count() - 1;
+        match path {
+            Path::Scale => set.set_scales(track, &self.times, keys, tangents),
+            _ => set.set_translations(track, &self.times, keys, tangents),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The outside of a file: JSON alone (`.gltf`), or JSON, a BIN chunk and perhaps others (GLB).
+
+use std::io::{self, Write};
+use std::ops::Range;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::warnings::Warnings;
+
+/// The first bytes of a GLB.
+pub(super) const MAGIC: &[u8] = b"glTF";
+
+const JSON: u32 = u32::from_le_bytes(*b"JSON");
+const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
+const VERSION: u32 = 2;
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// A file in memory.
+#[derive(Debug)]
+pub(super) struct Container {
+    /// The JSON, without a byte-order mark.
+    pub(super) text: String,
+    /// The other chunks of a GLB; `None` for JSON alone.
+    glb: Option<Chunks>,
+}
+
+#[derive(Debug)]
+struct Chunks {
+    bytes: Vec<u8>,
+    /// Type and place of the data, in the order of the file.
+    list: Vec<(u32, Range<usize>)>,
+}
+
+impl Container {
+    /// Takes a file apart; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// When a GLB is not whole, or the JSON is no UTF-8.
+    pub(super) fn parse(
+        name: &str,
+        bytes: Vec<u8>,
+        warnings: &mut Warnings,
+    ) -> Result<Self, Diagnostic> {
+        let refuse = |code, message: String| Diagnostic::new(name, code, message);
+        let is_glb = bytes.starts_with(MAGIC);
+        let chunks = match is_glb {
+            true => chunks(&bytes).map_err(|(code, message)| refuse(code, message))?,
+            false => Vec::new(),
+        };
+        let json = chunks
+            .first()
+            .map_or(0..bytes.len(), |(_, place)| place.clone());
+        let mut json = &bytes[json];
+        if let Some(rest) = json.strip_prefix(BYTE_ORDER_MARK) {
+            json = rest;
+            warnings.warn(Code::ByteOrderMark, || {
+                (None, "a byte-order mark before the JSON; it is skipped")
+            });
+        }
+        let text = std::str::from_utf8(json).map_err(|error| {
+            let place = error.valid_up_to();
+            let message = format!("byte {place} of the JSON is no UTF-8; save the file as UTF-8");
+            refuse(Code::Encoding, message)
+        })?;
+        let text = text.to_owned();
+        let glb = is_glb.then(|| Chunks {
+            bytes,
+            list: chunks.into_iter().skip(1).collect(),
+        });
+        Ok(Self { text, glb })
+    }
+
+    pub(super) fn is_glb(&self) -> bool {
+        self.glb.is_some()
+    }
+
+    /// The data of the BIN chunk.
+    pub(super) fn bin(&self) -> Option<&[u8]> {
+        let glb = self.glb.as_ref()?;
+        let (_, place) = glb.list.iter().find(|(kind, _)| *kind == BIN)?;
+        Some(&glb.bytes[place.clone()])
+    }
+
+    /// The chunks that are neither the JSON nor the BIN chunk, those before the BIN chunk first.
+    fn others(&self) -> (Vec<(u32, &[u8])>, Vec<(u32, &[u8])>) {
+        let Some(glb) = &self.glb else {
+            return Default::default();
+        };
+        let data = |&(kind, ref place): &(u32, Range<usize>)| (kind, &glb.bytes[place.clone()]);
+        let bin = glb.list.iter().position(|(kind, _)| *kind == BIN);
+        let (before, after) = glb.list.split_at(bin.unwrap_or(0));
+        let after = &after[usize::from(bin.is_some())..];
+        (
+            before.iter().map(data).collect(),
+            after.iter().map(data).collect(),
+        )
+    }
+
+    /// Writes a GLB with this JSON and these parts of a BIN chunk, and the other chunks of the file.
+    ///
+    /// # Errors
+    /// When writing fails, or (`FileTooLarge`) a GLB cannot be so long.
+    pub(super) fn write_glb(
+        &self,
+        text: &str,
+        bin: Option<&[&[u8]]>,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        let (before, after) = self.others();
+        let text = text.trim_end();
+        let mut chunks: Vec<(u32, Vec<&[u8]>)> =
+            vec![(JSON, vec![text.as_bytes(), padding(text.len(), b"   ")])];
+        chunks.extend(before.into_iter().map(|(kind, data)| (kind, vec![data])));
+        chunks.extend(bin.map(|parts| (BIN, parts.to_vec())));
+        chunks.extend(after.into_iter().map(|(kind, data)| (kind, vec![data])));
+        let length = |parts: &[&[u8]]| parts.iter().map(|part| part.len() as u64).sum::<u64>();
+        let total = 12
+            + chunks
+                .iter()
+                .map(|(_, parts)| 8 + length(parts))
+                .sum::<u64>();
+        let word = |value: u64| u32::try_from(value).map_err(|_| io::ErrorKind::FileTooLarge);
+        let total = word(total)?;
+        out.write_all(MAGIC)?;
+        out.write_all(&VERSION.to_le_bytes())?;
+        out.write_all(&total.to_le_bytes())?;
+        for (kind, parts) in chunks {
+            out.write_all(&word(length(&parts))?.to_le_bytes())?;
+            out.write_all(&kind.to_le_bytes())?;
+            for part in parts {
+                out.write_all(part)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What makes a length a multiple of four.
+pub(super) fn padding(length: usize, with: &[u8; 3]) -> &[u8] {
+    &with[..length.wrapping_neg() % 4]
+}
+
+type Fault = (Code, String);
+
+/// The chunks of a GLB; the first is the JSON.
+fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, Fault> {
+    let broken = |message: String| (Code::Glb, message);
+    let word = |place: usize| -> Option<u32> {
+        let four = bytes.get(place..)?.first_chunk()?;
+        Some(u32::from_le_bytes(*four))
+    };
+    let (Some(version), Some(length)) = (word(4), word(8)) else {
+        let message = format!("{} bytes; the header of a GLB alone has 12", bytes.len());
+        return Err(broken(message));
+    };
+    if version != VERSION {
+        let message = format!("a GLB of version {version}; export it as glTF 2.0");
+        return Err((Code::GltfVersion, message));
+    }
+    if length as usize != bytes.len() {
+        let found = bytes.len();
+        let message =
+            format!("the header says {length} bytes, and the file has {found}; copy it again");
+        return Err(broken(message));
+    }
+    let mut chunks = Vec::new();
+    let mut place = 12;
+    while place < bytes.len() {
+        let header = word(place).zip(word(place + 4));
+        let data = header.and_then(|(length, kind)| {
+            let data = place + 8..(place + 8).checked_add(length as usize)?;
+            (data.end <= bytes.len()).then_some((kind, data))
+        });
+        let Some((kind, data)) = data else {
+            return Err(broken(format!(
+                "the chunk at byte {place} is cut; copy the file again"
+            )));
+        };
+        match (chunks.is_empty(), kind == JSON) {
+            (true, false) => {
+                return Err(broken(
+                    "the first chunk is not the JSON; export the file again".into(),
+                ));
+            }
+            (false, true) => {
+                return Err(broken(format!(
+                    "a second JSON chunk at byte {place}; export the file again"
+                )));
+            }
+            _ => {}
+        }
+        place = data.end;
+        chunks.push((kind, data));
+    }
+    match chunks.is_empty() {
+        true => Err(broken(
+            "there is no JSON chunk; export the file again".into(),
+        )),
+        false => Ok(chunks),
+    }
+}

@@ -1,0 +1,112 @@
+//! Changes to the text of a file: everything else stays byte for byte.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde_json::value::RawValue;
+
+use crate::gltf::json::Json;
+
+/// Changes to come, in any order.
+pub(super) struct Edits<'a> {
+    json: &'a Json<'a>,
+    /// What stands in the place of what; insertions at one place in their order.
+    list: Vec<(Range<usize>, String)>,
+    /// How many entries arrays got, by the places of their ends.
+    appended: BTreeMap<usize, usize>,
+    /// Entries of arrays at the top that the file has not.
+    missing: BTreeMap<&'static str, Vec<String>>,
+}
+
+impl<'a> Edits<'a> {
+    pub(super) fn new(json: &'a Json<'a>) -> Self {
+        Self {
+            json,
+            list: Vec::new(),
+            appended: BTreeMap::new(),
+            missing: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn replace(&mut self, value: &RawValue, with: impl ToString) {
+        self.list.push((self.json.range(value), with.to_string()));
+    }
+
+    /// Puts a member behind the others of an object, which has some.
+    pub(super) fn add(&mut self, object: &RawValue, name: &str, value: impl ToString) {
+        let end = self.json.range(object).end - 1;
+        let member = format!(",\"{name}\":{}", value.to_string());
+        self.list.push((end..end, member));
+    }
+
+    /// Puts other members in the place of that whose value this is; `before` is the value of the
+    /// member before it in `object`.
+    pub(super) fn replace_member(
+        &mut self,
+        object: &RawValue,
+        before: Option<&RawValue>,
+        value: &RawValue,
+        with: String,
+    ) {
+        let start = match before {
+            Some(before) => self.json.range(before).end,
+            None => self.json.range(object).start,
+        };
+        let end = self.json.range(value).end;
+        // Between a value and the next there is one name.
+        let quote = self.json.text[start..end].find('"').unwrap_or(0);
+        self.list.push((start + quote..end, with));
+    }
+
+    /// Appends to an array of `count` entries; gives the place of the new one.
+    pub(super) fn append(&mut self, array: &RawValue, count: usize, entry: &str) -> usize {
+        let end = self.json.range(array).end - 1;
+        let appended = self.appended.entry(end).or_default();
+        let place = count + *appended;
+        *appended += 1;
+        let comma = if place == 0 { "" } else { "," };
+        self.list.push((end..end, format!("{comma}{entry}")));
+        place
+    }
+
+    /// Appends to an array at the top; gives the place of the new entry.
+    pub(super) fn append_to(&mut self, list: &'static str, entry: String) -> usize {
+        if let Some(array) = self.json.array(list) {
+            return self.append(array, self.json.entries(list).len(), &entry);
+        }
+        let entries = self.missing.entry(list).or_default();
+        entries.push(entry);
+        entries.len() - 1
+    }
+
+    /// How many entries an array at the top has by now.
+    pub(super) fn count(&self, list: &'static str) -> usize {
+        let array = self
+            .json
+            .array(list)
+            .map(|array| self.json.range(array).end - 1);
+        let appended = array.and_then(|end| self.appended.get(&end));
+        let missing = self.missing.get(list).map_or(0, Vec::len);
+        self.json.entries(list).len() + appended.copied().unwrap_or(0) + missing
+    }
+
+    /// The text with all changes.
+    pub(super) fn finish(mut self) -> String {
+        let text = self.json.text;
+        // The object at the top has members: `asset` was read.
+        let end = text.trim_end().len() - 1;
+        for (list, entries) in self.missing {
+            let member = format!(",\"{list}\":[{}]", entries.join(","));
+            self.list.push((end..end, member));
+        }
+        self.list.sort_by_key(|(place, _)| place.start);
+        let mut edited = String::with_capacity(text.len());
+        let mut done = 0;
+        for (place, with) in self.list {
+            edited += &text[done..place.start];
+            edited += &with;
+            done = place.end;
+        }
+        edited + &text[done..]
+    }
+}

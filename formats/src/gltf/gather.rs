@@ -1,0 +1,203 @@
+//! A `.gltf` and its files as one: buffers are gathered into a BIN chunk, images embedded.
+
+use std::borrow::Cow;
+
+use serde_json::value::RawValue;
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::gltf::container::padding;
+use crate::gltf::data::{Data, check_length};
+use crate::gltf::edits::Edits;
+use crate::gltf::json::Members;
+use crate::gltf::reader::{MESHOPT, Reader};
+use crate::gltf::schema::Buffer;
+use crate::gltf::uri;
+
+/// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
+pub(super) struct Gathered {
+    /// What the first gathered buffer says of itself beside its length and URI.
+    members: String,
+    kept: Vec<String>,
+}
+
+impl Gathered {
+    /// The list of buffers, for a BIN chunk of so many bytes.
+    pub(super) fn buffers(&self, length: u64) -> String {
+        let bin = format!("{{\"byteLength\":{length}{}}}", self.members);
+        let all = std::iter::once(&bin).chain(&self.kept);
+        let all: Vec<&str> = all.map(String::as_str).collect();
+        format!("[{}]", all.join(","))
+    }
+}
+
+/// Gathers all buffers that can be; views of them are changed to where they are now.
+///
+/// # Errors
+/// When a buffer or a view is broken, or all are more than a GLB can hold.
+pub(super) fn buffers<'a>(
+    reader: &Reader<'a>,
+    edits: &mut Edits<'a>,
+) -> Result<Data<'a>, Diagnostic> {
+    let json = reader.json;
+    let mut bytes = Vec::new();
+    let mut members = None;
+    let mut kept = Vec::new();
+    // For each buffer, its new place and how far its bytes moved.
+    let mut places: Vec<(usize, usize)> = Vec::new();
+    for (index, raw) in json.entries("buffers").iter().enumerate() {
+        let pointer = format!("/buffers/{index}");
+        let buffer: Buffer<'_> = json.typed(raw, &pointer)?;
+        let found = match &buffer.uri {
+            Some(_) => stays_outside(reader, reader.buffer(index, &pointer)),
+            // Nothing is behind it: it stands for what meshopt decodes.
+            None => None,
+        };
+        let Some(found) = found else {
+            kept.push(raw.get().to_owned());
+            places.push((kept.len(), 0));
+            continue;
+        };
+        bytes.extend_from_slice(padding(bytes.len(), &[0; 3]));
+        check_length(json, (bytes.len() + found.len()) as u64)?;
+        places.push((0, bytes.len()));
+        bytes.extend_from_slice(found);
+        if members.is_none() {
+            let own: Members<'_> = json.typed(raw, &pointer)?;
+            members = Some(others(&own));
+        }
+    }
+    let Some(members) = members else {
+        return Ok(Data::in_uri(json));
+    };
+    for (index, view) in json.entries("bufferViews").iter().enumerate() {
+        let pointer = format!("/bufferViews/{index}");
+        let own: Members<'a> = json.typed(view, &pointer)?;
+        move_view(reader, edits, (view, &own), &places, &pointer)?;
+        let Some(extensions) = own.get("extensions") else {
+            continue;
+        };
+        let extensions: Members<'a> = json.typed(extensions, &pointer)?;
+        for compressed in MESHOPT.iter().filter_map(|name| extensions.get(name)) {
+            let own: Members<'a> = json.typed(compressed, &pointer)?;
+            move_view(reader, edits, (compressed, &own), &places, &pointer)?;
+        }
+    }
+    Ok(Data::gathered(Gathered { members, kept }, bytes))
+}
+
+/// What was found; of a fault a warning that the URI is kept.
+fn stays_outside<T>(reader: &Reader<'_>, found: Result<T, Diagnostic>) -> Option<T> {
+    found
+        .map_err(|fault| {
+            let pointer = match fault.place {
+                Some(Place::Inside(pointer)) => pointer,
+                _ => String::new(),
+            };
+            reader.warn(Code::StaysOutside, &pointer, || {
+                format!("{}; the URI is kept", fault.message)
+            });
+        })
+        .ok()
+}
+
+/// The members of a buffer that stay, each with a comma before it.
+fn others(members: &Members<'_>) -> String {
+    let stay = members
+        .0
+        .iter()
+        .filter(|(name, _)| name != "uri" && name != "byteLength");
+    stay.map(|(name, value)| {
+        format!(
+            ",{}:{}",
+            serde_json::Value::from(name.as_str()),
+            value.get()
+        )
+    })
+    .collect()
+}
+
+/// Changes the buffer and the offset of a view, or of what a view is compressed as.
+fn move_view<'a>(
+    reader: &Reader<'a>,
+    edits: &mut Edits<'a>,
+    (object, members): (&RawValue, &Members<'a>),
+    places: &[(usize, usize)],
+    pointer: &str,
+) -> Result<(), Diagnostic> {
+    let number = |raw: Option<&'a RawValue>| match raw {
+        Some(raw) => reader.json.typed::<usize>(raw, pointer),
+        None => Ok(0),
+    };
+    let (buffer, offset) = (members.get("buffer"), members.get("byteOffset"));
+    let old = number(buffer)?;
+    let (Some(buffer), Some(&(new, by))) = (buffer, places.get(old)) else {
+        return Ok(());
+    };
+    if new != old {
+        edits.replace(buffer, new);
+    }
+    let moved = number(offset)?.saturating_add(by);
+    match offset {
+        _ if by == 0 => {}
+        Some(offset) => edits.replace(offset, moved),
+        None => edits.add(object, "byteOffset", moved),
+    }
+    Ok(())
+}
+
+/// Embeds the images that are files.
+///
+/// # Errors
+/// When an image's entry is broken, or all are more than a GLB can hold.
+pub(super) fn images<'a>(
+    reader: &Reader<'a>,
+    edits: &mut Edits<'a>,
+    data: &mut Data<'_>,
+) -> Result<(), Diagnostic> {
+    let json = reader.json;
+    for (index, image) in json.entries("images").iter().enumerate() {
+        let pointer = format!("/images/{index}");
+        let members: Members<'a> = json.typed(image, &pointer)?;
+        let Some(place) = members.0.iter().position(|(name, _)| name == "uri") else {
+            continue;
+        };
+        let value = members.0[place].1;
+        let uri: Cow<'a, str> = json.typed(value, &pointer)?;
+        if uri::is_data(&uri) {
+            continue;
+        }
+        let found = reader.follow(&uri, &pointer).and_then(|bytes| {
+            let message =
+                || format!("{uri}: neither PNG nor JPEG nor another kind of image that is known");
+            let kind = kind(&bytes).ok_or_else(|| json.refuse(&pointer, Code::Uri, message()))?;
+            Ok((bytes, kind))
+        });
+        let Some((bytes, kind)) = stays_outside(reader, found) else {
+            continue;
+        };
+        check_length(json, data.length_with(bytes.len() as u64))?;
+        let view = data.append(edits, &bytes);
+        let kind = match members.get("mimeType") {
+            Some(_) => String::new(),
+            None => format!(",\"mimeType\":\"{kind}\""),
+        };
+        let before = place.checked_sub(1).map(|before| members.0[before].1);
+        edits.replace_member(image, before, value, format!("\"bufferView\":{view}{kind}"));
+    }
+    Ok(())
+}
+
+/// The media type of an image, by its first bytes.
+fn kind(image: &[u8]) -> Option<&'static str> {
+    let kinds: [(&[u8], &str); 4] = [
+        (b"\x89PNG\r\n\x1a\n", "image/png"),
+        (b"\xff\xd8\xff", "image/jpeg"),
+        (b"\xabKTX 20\xbb", "image/ktx2"),
+        (b"DDS ", "image/vnd-ms.dds"),
+    ];
+    if image.starts_with(b"RIFF") && image.get(8..12) == Some(b"WEBP") {
+        return Some("image/webp");
+    }
+    let known = kinds.iter().find(|(start, _)| image.starts_with(start));
+    known.map(|(_, kind)| *kind)
+}

@@ -1,0 +1,195 @@
+//! The JSON of a file: values are found by their places in the text, so that what is not touched
+//! comes back byte for byte, and what is read is typed, with a pointer to each fault.
+
+use std::fmt;
+use std::ops::Range;
+
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use serde_json::value::RawValue;
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+
+/// The arrays at the top that are read or written.
+const LISTS: [&str; 6] = [
+    "nodes",
+    "animations",
+    "accessors",
+    "bufferViews",
+    "buffers",
+    "images",
+];
+
+/// An object's names and values in their order; names may occur twice.
+#[derive(Default)]
+pub(super) struct Members<'a>(pub(super) Vec<(String, &'a RawValue)>);
+
+impl<'de: 'a, 'a> Deserialize<'de> for Members<'a> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder;
+
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = Vec<(String, &'de RawValue)>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Self::Value, M::Error> {
+                let mut members = Vec::new();
+                while let Some(member) = map.next_entry()? {
+                    members.push(member);
+                }
+                Ok(members)
+            }
+        }
+
+        deserializer.deserialize_map(InOrder).map(Self)
+    }
+}
+
+impl<'a> Members<'a> {
+    /// The first value of that name.
+    pub(super) fn get(&self, name: &str) -> Option<&'a RawValue> {
+        let found = self.0.iter().find(|(own, _)| own == name);
+        found.map(|(_, value)| *value)
+    }
+}
+
+/// One array at the top.
+struct List<'a> {
+    name: &'static str,
+    /// `None` where the file has no such array.
+    array: Option<&'a RawValue>,
+    entries: Vec<&'a RawValue>,
+}
+
+/// The text of a file, its arrays taken apart.
+pub(super) struct Json<'a> {
+    /// What messages call the file.
+    pub(super) name: &'a str,
+    pub(super) text: &'a str,
+    members: Members<'a>,
+    lists: Vec<List<'a>>,
+}
+
+impl<'a> Json<'a> {
+    /// # Errors
+    /// What is no JSON, no object, or has something else for one of the arrays.
+    pub(super) fn parse(name: &'a str, text: &'a str) -> Result<Self, Diagnostic> {
+        let members = serde_json::from_str(text).map_err(|error| Diagnostic {
+            place: Some(Place::Text {
+                line: error.line() as u64,
+                column: error.column().max(1) as u64,
+            }),
+            ..Diagnostic::new(
+                name,
+                Code::Json,
+                format!("the JSON cannot be read: {}", without_place(&error)),
+            )
+        })?;
+        let mut json = Self {
+            name,
+            text,
+            members,
+            lists: Vec::new(),
+        };
+        for name in LISTS {
+            let array = json.member(name)?;
+            let entries = array.map(|raw| json.typed(raw, &format!("/{name}")));
+            json.lists.push(List {
+                name,
+                array,
+                entries: entries.transpose()?.unwrap_or_default(),
+            });
+        }
+        Ok(json)
+    }
+
+    /// A value at the top.
+    ///
+    /// # Errors
+    /// When the file has it twice.
+    pub(super) fn member(&self, name: &str) -> Result<Option<&'a RawValue>, Diagnostic> {
+        let mut found = self.members.0.iter().filter(|(own, _)| own == name);
+        let first = found.next().map(|(_, value)| *value);
+        match found.next() {
+            Some(_) => {
+                let message = format!("`{name}` is there twice; remove one of them");
+                Err(self.refuse(&format!("/{name}"), Code::Property, message))
+            }
+            None => Ok(first),
+        }
+    }
+
+    /// The entries of an array at the top; none where the file has no such array.
+    pub(super) fn entries(&self, list: &str) -> &[&'a RawValue] {
+        let list = self.lists.iter().find(|own| own.name == list);
+        list.map_or(&[], |list| &list.entries)
+    }
+
+    /// The text of an array at the top.
+    pub(super) fn array(&self, list: &str) -> Option<&'a RawValue> {
+        self.lists.iter().find(|own| own.name == list)?.array
+    }
+
+    /// An entry of an array at the top that `from`, a pointer, names.
+    ///
+    /// # Errors
+    /// When there is no such entry, or it is not of this type.
+    pub(super) fn entry<T: Deserialize<'a>>(
+        &self,
+        list: &str,
+        index: usize,
+        from: &str,
+    ) -> Result<T, Diagnostic> {
+        let entries = self.entries(list);
+        match entries.get(index) {
+            Some(raw) => self.typed(raw, &format!("/{list}/{index}")),
+            None => Err(self.no_such(list, index, entries.len(), from)),
+        }
+    }
+
+    pub(super) fn no_such(&self, list: &str, index: usize, count: usize, from: &str) -> Diagnostic {
+        let message = format!("number {index} of {list} is named, and there are {count} from 0 on");
+        self.refuse(from, Code::IndexRange, message)
+    }
+
+    /// A value of the type that it is to have.
+    ///
+    /// # Errors
+    /// When it is not, lacks a property or has one twice; properties that are not read may be
+    /// anything.
+    pub(super) fn typed<T: Deserialize<'a>>(
+        &self,
+        raw: &'a RawValue,
+        pointer: &str,
+    ) -> Result<T, Diagnostic> {
+        serde_json::from_str(raw.get()).map_err(|error| {
+            let message = format!("is not as glTF 2.0 has it: {}", without_place(&error));
+            self.refuse(pointer, Code::Property, message)
+        })
+    }
+
+    pub(super) fn refuse(
+        &self,
+        pointer: &str,
+        code: Code,
+        message: impl Into<String>,
+    ) -> Diagnostic {
+        Diagnostic::new(self.name, code, message).inside(pointer)
+    }
+
+    /// Where a value stands in the text.
+    pub(super) fn range(&self, raw: &RawValue) -> Range<usize> {
+        // Values are borrowed from the text, so that their addresses tell their places.
+        let start = raw.get().as_ptr() as usize - self.text.as_ptr() as usize;
+        start..start + raw.get().len()
+    }
+}
+
+/// The message of an error, without line and column, which count within one value.
+fn without_place(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let end = text.rfind(" at line ").unwrap_or(text.len());
+    text[..end].to_owned()
+}

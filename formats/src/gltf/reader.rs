@@ -1,0 +1,231 @@
+//! From indices to bytes: buffers, and the views of them, each found, loaded and decoded once, and
+//! only if it is needed.
+
+use std::borrow::Cow;
+use std::cell::{OnceCell, RefCell};
+use std::path::Path;
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::gltf::compressed;
+use crate::gltf::container::Container;
+use crate::gltf::json::Json;
+use crate::gltf::schema::{Buffer, BufferView, MeshoptView};
+use crate::gltf::uri;
+use crate::source::Source;
+use crate::warnings::Warnings;
+
+/// The extensions that compress a buffer view.
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Bytes that a BIN chunk may have behind what its buffer says: it is padded.
+const PADDING: u64 = 3;
+
+/// A file that is being read.
+pub(super) struct Reader<'a> {
+    pub(super) json: &'a Json<'a>,
+    container: &'a Container,
+    /// Where files beside are; there are none beside standard input.
+    folder: Option<&'a Path>,
+    /// The longest file beside that is read.
+    most: u64,
+    /// The extensions that the file requires.
+    required: Vec<String>,
+    buffers: Vec<OnceCell<Result<Cow<'a, [u8]>, Diagnostic>>>,
+    /// Of compressed views.
+    decoded: Vec<OnceCell<Result<Vec<u8>, Diagnostic>>>,
+    pub(super) warnings: RefCell<Warnings>,
+}
+
+/// The bytes of a buffer view.
+pub(super) struct View<'a> {
+    pub(super) bytes: &'a [u8],
+    /// From one element to the next, where they are not packed.
+    pub(super) stride: Option<usize>,
+}
+
+impl<'a> Reader<'a> {
+    /// # Errors
+    /// When the list of required extensions is none.
+    pub(super) fn new(
+        json: &'a Json<'a>,
+        container: &'a Container,
+        folder: Option<&'a Path>,
+        most: u64,
+        warnings: Warnings,
+    ) -> Result<Self, Diagnostic> {
+        let required = json.member("extensionsRequired")?;
+        let required = required.map(|raw| json.typed(raw, "/extensionsRequired"));
+        let cells = |list| json.entries(list).len();
+        Ok(Self {
+            json,
+            container,
+            folder,
+            most,
+            required: required.transpose()?.unwrap_or_default(),
+            buffers: (0..cells("buffers")).map(|_| OnceCell::new()).collect(),
+            decoded: (0..cells("bufferViews")).map(|_| OnceCell::new()).collect(),
+            warnings: RefCell::new(warnings),
+        })
+    }
+
+    pub(super) fn required(&self) -> &[String] {
+        &self.required
+    }
+
+    pub(super) fn warn<M: Into<String>>(
+        &self,
+        code: Code,
+        pointer: &str,
+        message: impl FnOnce() -> M,
+    ) {
+        let place = || Some(Place::Inside(pointer.to_owned()));
+        self.warnings
+            .borrow_mut()
+            .warn(code, || (place(), message()));
+    }
+
+    /// More elements than the whole file has bytes are refused where no bytes stand for them.
+    pub(super) fn holds(&self, count: u64) -> bool {
+        let bin = self.container.bin().map_or(0, <[u8]>::len);
+        count <= (self.json.text.len() + bin) as u64
+    }
+
+    /// The bytes of a buffer, as many as it says; `from` points at what names it.
+    ///
+    /// # Errors
+    /// When they cannot be found, or are too few.
+    pub(super) fn buffer(&self, index: usize, from: &str) -> Result<&[u8], Diagnostic> {
+        let Some(cell) = self.buffers.get(index) else {
+            let count = self.buffers.len();
+            return Err(self.json.no_such("buffers", index, count, from));
+        };
+        let loaded = cell.get_or_init(|| self.load(index));
+        loaded.as_deref().map_err(Clone::clone)
+    }
+
+    fn load(&self, index: usize) -> Result<Cow<'a, [u8]>, Diagnostic> {
+        let pointer = format!("/buffers/{index}");
+        let buffer: Buffer<'a> = self.json.entry("buffers", index, &pointer)?;
+        let (bytes, spare) = match &buffer.uri {
+            Some(uri) => (Cow::Owned(self.follow(uri, &pointer)?), 0),
+            None => match self.bin(index, &buffer) {
+                Some(bin) => (Cow::Borrowed(bin), PADDING),
+                None => {
+                    let message = "the buffer has no URI and is not the BIN chunk; export the file \
+                                   again";
+                    return Err(self.json.refuse(&pointer, Code::Uri, message));
+                }
+            },
+        };
+        let (said, found) = (buffer.byte_length, bytes.len() as u64);
+        if found < said {
+            let message =
+                format!("the buffer says {said} bytes, and there are {found}; is it cut?");
+            return Err(self.json.refuse(&pointer, Code::TooShort, message));
+        }
+        if found - said > spare {
+            self.warn(Code::BufferLong, &pointer, || {
+                format!("the buffer says {said} bytes, and there are {found}; the rest is not read")
+            });
+        }
+        Ok(match bytes {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[..said as usize]),
+            Cow::Owned(mut bytes) => {
+                bytes.truncate(said as usize);
+                Cow::Owned(bytes)
+            }
+        })
+    }
+
+    /// The BIN chunk, if this buffer is it.
+    pub(super) fn bin(&self, index: usize, buffer: &Buffer<'_>) -> Option<&'a [u8]> {
+        let is_bin = index == 0 && buffer.uri.is_none() && !buffer.extensions.is_fallback();
+        self.container.bin().filter(|_| is_bin)
+    }
+
+    /// What a URI stands for; `pointer` is that of the object that has it.
+    ///
+    /// # Errors
+    /// When it is not followed, or cannot be read.
+    pub(super) fn follow(&self, uri: &str, pointer: &str) -> Result<Vec<u8>, Diagnostic> {
+        let pointer = format!("{pointer}/uri");
+        let refuse = |message| self.json.refuse(&pointer, Code::Uri, message);
+        if uri::is_data(uri) {
+            return uri::data(uri).map_err(refuse);
+        }
+        let path = uri::relative(uri).map_err(refuse)?;
+        let Some(folder) = self.folder else {
+            let message =
+                format!("`{uri}` is a file beside, and standard input has none beside it");
+            return Err(refuse(message));
+        };
+        let read =
+            Source::open(&folder.join(&path), false).and_then(|file| file.into_bytes(self.most));
+        read.map_err(|error| {
+            let message = format!("{}: {}", path.display(), error.message);
+            self.json.refuse(&pointer, error.code, message)
+        })
+    }
+
+    /// The bytes of a buffer view, decoded if they are compressed; `from` points at what names it.
+    ///
+    /// # Errors
+    /// When it or its buffer is broken, or needs an extension that is not known.
+    pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, Diagnostic> {
+        let view: BufferView<'a> = self.json.entry("bufferViews", index, from)?;
+        let pointer = format!("/bufferViews/{index}");
+        for (name, extension) in &view.extensions.0 {
+            if MESHOPT.contains(&name.as_str()) {
+                let pointer = format!("{pointer}/extensions/{name}");
+                let own: MeshoptView = self.json.typed(extension, &pointer)?;
+                let decoded = self.decoded[index].get_or_init(|| self.decode(&own, &pointer));
+                return Ok(View {
+                    bytes: decoded.as_deref().map_err(Clone::clone)?,
+                    stride: Some(own.byte_stride),
+                });
+            }
+            if self.required.contains(name) {
+                let message =
+                    format!("the data is to be read by the extension {name}, which is not known");
+                return Err(self.json.refuse(&pointer, Code::Extension, message));
+            }
+        }
+        let bytes = self.part(view.buffer, view.byte_offset, view.byte_length, &pointer)?;
+        if let Some(stride) = view.byte_stride {
+            self.warn(Code::ByteStride, &format!("{pointer}/byteStride"), || {
+                format!("a stride of {stride} bytes is for vertices alone; it is honoured")
+            });
+        }
+        Ok(View {
+            bytes,
+            stride: view.byte_stride,
+        })
+    }
+
+    fn decode(&self, view: &MeshoptView, pointer: &str) -> Result<Vec<u8>, Diagnostic> {
+        let bytes = self.part(view.buffer, view.byte_offset, view.byte_length, pointer)?;
+        compressed::decode(bytes, view, self.most)
+            .map_err(|message| self.json.refuse(pointer, Code::Meshopt, message))
+    }
+
+    /// A part of a buffer; `pointer` is that of the object that names it.
+    fn part(
+        &self,
+        buffer: usize,
+        offset: u64,
+        length: u64,
+        pointer: &str,
+    ) -> Result<&[u8], Diagnostic> {
+        let bytes = self.buffer(buffer, &format!("{pointer}/buffer"))?;
+        let end = offset.checked_add(length);
+        let part = end
+            .and_then(|end| bytes.get(usize::try_from(offset).ok()?..usize::try_from(end).ok()?));
+        part.ok_or_else(|| {
+            let message = format!(
+                "{length} bytes from byte {offset} on lie outside buffer {buffer}, which has {}",
+                bytes.len()
+            );
+            self.json.refuse(pointer, Code::TooShort, message)
+        })
+    }
+}

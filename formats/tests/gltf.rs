@@ -1,0 +1,515 @@
+//! glTF files are read as their specification says: values of real files and of edge cases at given
+//! times, computed elsewhere; broken files; and what no fixture holds.
+
+use std::collections::HashMap;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3, Vec3};
+use proptest::prelude::*;
+use serde_json::Value;
+use tumble::{Channel, Device, Engine, Frames, Interpolation, NORM_TOLERANCE};
+use tumble_formats::gltf::{open_gltf, read_gltf};
+use tumble_formats::keys::Duplicates;
+use tumble_formats::motion::{Motion, Sampler};
+use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::world;
+use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
+
+use crate::support::shared_data;
+
+pub(crate) fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures/glb")
+        .join(name)
+}
+
+pub(crate) fn open(path: &Path) -> Loaded {
+    open_gltf(path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub(crate) fn raw() -> ReadOptions {
+    ReadOptions {
+        raw_times: true,
+        ..ReadOptions::default()
+    }
+}
+
+/// A clip's channels at these times, each by its own sampler.
+pub(crate) fn sample(clip: &Motion, times: Vec<f64>) -> Samples {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let methods = ChannelMethods {
+        method: None,
+        with: &|method| Interpolation::from(method),
+    };
+    methods.sample(&engine, clip, &Frames::at(times)).unwrap()
+}
+
+pub(crate) fn json_of(path: &Path) -> Value {
+    let bytes = fs::read(path).unwrap();
+    let text = match bytes.starts_with(b"glTF") {
+        true => {
+            let length = u32::from_le_bytes(*bytes[12..].first_chunk().unwrap());
+            &bytes[20..20 + length as usize]
+        }
+        false => &bytes,
+    };
+    serde_json::from_slice(text).unwrap()
+}
+
+/// The track of a node, by the names that nodes have.
+pub(crate) fn track_of(clip: &Motion, json: &Value, node: usize) -> usize {
+    let own = json["nodes"][node]["name"].as_str().unwrap_or_default();
+    let names = match own {
+        "" => [format!("node{node}"), String::new()],
+        own => [format!("{own}#{node}"), own.to_owned()],
+    };
+    let found = names.iter().find_map(|name| {
+        let mut tracks = clip.set.tracks();
+        tracks.position(|track| track.name == Some(name))
+    });
+    found.unwrap_or_else(|| panic!("node {node} is no track"))
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().unwrap();
+    list.iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+/// The key times of one channel.
+pub(crate) fn keys_of<'a>(clip: &'a Motion, track: usize, path: &str) -> &'a [f64] {
+    let vectors = |channel| clip.set.vector_keys(channel, track).map(|keys| keys.times);
+    let times = match path {
+        "rotation" => Some(clip.set.track(track).times),
+        "translation" => vectors(Channel::Translation),
+        _ => vectors(Channel::Scale),
+    };
+    times.unwrap_or_default()
+}
+
+/// The largest distance of a file's channels from the values that it should have, radians for
+/// rotations, lengths relative to 1 or the value for the others.
+fn error_of(clip: &Motion, json: &Value, channel: &Value) -> f64 {
+    let track = track_of(clip, json, channel["node"].as_u64().unwrap() as usize);
+    let mut times = numbers(&channel["times"]);
+    // Those at a key were rounded to 12 digits, which a step does not forgive.
+    let keys = keys_of(clip, track, channel["path"].as_str().unwrap());
+    for time in &mut times {
+        let key = keys.iter().find(|key| (**key - *time).abs() < 1e-9);
+        *time = key.copied().unwrap_or(*time);
+    }
+    let found = sample(clip, times.clone());
+    let tracks = clip.set.track_count();
+    let mut worst = 0.0f64;
+    for (place, expected) in channel["values"].as_array().unwrap().iter().enumerate() {
+        let expected = numbers(expected);
+        let at = place * tracks + track;
+        let error = match channel["path"].as_str().unwrap() {
+            "rotation" => {
+                let expected = DQuat::from_slice(&expected).normalize();
+                let found = found.rotations[at].as_dquat().normalize();
+                2.0 * (found - expected).length().min((found + expected).length())
+            }
+            path => {
+                let list: &[Vec3] = match path {
+                    "translation" => &found.translations,
+                    _ => &found.scales,
+                };
+                let expected = DVec3::from_slice(&expected);
+                (list[at].as_dvec3() - expected).length() / expected.length().max(1.0)
+            }
+        };
+        worst = worst.max(error);
+    }
+    worst
+}
+
+fn compare(folder: &Path, bound: f64, options: &ReadOptions) -> usize {
+    let expected = fs::read_to_string(folder.join("expected.json")).unwrap();
+    let files: HashMap<String, Value> = serde_json::from_str(&expected).unwrap();
+    let mut compared = 0;
+    for (file, animations) in &files {
+        let path = folder.join(file);
+        let json = json_of(&path);
+        let loaded = open_gltf(&path, options).unwrap_or_else(|error| panic!("{error}"));
+        assert!(loaded.refused.is_empty(), "{file}: {:?}", loaded.refused);
+        let animations = animations.as_array().unwrap();
+        assert_eq!(loaded.clips.len(), animations.len(), "{file}");
+        for (clip, animation) in loaded.clips.iter().zip(animations) {
+            let name = animation["name"].as_str().filter(|name| !name.is_empty());
+            assert_eq!(clip.name.as_deref(), name, "{file}");
+            for channel in animation["channels"].as_array().unwrap() {
+                // Beside a step even the smallest change of a time changes everything.
+                if channel["interpolation"] == "STEP" && !options.raw_times {
+                    continue;
+                }
+                let error = error_of(clip, &json, channel);
+                assert!(error < bound, "{file}: {error:e} in {channel}");
+                compared += 1;
+            }
+        }
+    }
+    compared
+}
+
+#[test]
+fn real_files_have_the_values_of_the_specification() {
+    let Some(data) = shared_data() else { return };
+    assert_eq!(compare(&data.join("gltf"), 1e-6, &raw()), 29);
+    assert!(compare(&data.join("gltf"), 2e-5, &ReadOptions::default()) >= 20);
+}
+
+#[test]
+fn edge_cases_have_the_values_of_the_specification() {
+    let Some(data) = shared_data() else { return };
+    assert_eq!(compare(&data.join("gltf/made"), 1e-6, &raw()), 35);
+    assert!(compare(&data.join("gltf/made"), 2e-5, &ReadOptions::default()) >= 30);
+}
+
+#[test]
+fn broken_files_are_refused_or_read_with_a_warning() {
+    let Some(data) = shared_data() else { return };
+    let verdicts = [
+        ("bom.glb", Code::NoAnimations, "/animations"),
+        (
+            "channel_duplicate_targets.gltf",
+            Code::TwoChannels,
+            "/animations/0/channels/1/target",
+        ),
+        (
+            "channel_node_matrix.gltf",
+            Code::NodeMatrix,
+            "/nodes/0/matrix",
+        ),
+        (
+            "invalid_input_values.gltf",
+            Code::NegativeTime,
+            "/animations/0/samplers/0/input",
+        ),
+        ("invalid_length.gltf", Code::NoAnimations, "/animations"),
+        ("invalid_magic.glb", Code::Json, "1:1"),
+        (
+            "invalid_sparse_count_and_stride.gltf",
+            Code::NoAnimations,
+            "/animations",
+        ),
+        ("invalid_uri_data.gltf", Code::NoAnimations, "/animations"),
+        ("length_mismatch.glb", Code::Glb, ""),
+        ("no_bin_chunk.glb", Code::NoAnimations, "/animations"),
+        ("not_found.gltf", Code::NoAnimations, "/animations"),
+        ("only_bin_chunk.glb", Code::Glb, ""),
+        (
+            "quaternion_non_unit_values.gltf",
+            Code::EqualTimes,
+            "/animations/0/samplers/0/input",
+        ),
+        (
+            "sampler_input_format_invalid.gltf",
+            Code::AccessorType,
+            "/animations/0/samplers/0/input",
+        ),
+        (
+            "sampler_output_count_invalid.gltf",
+            Code::OutputCount,
+            "/animations/0/samplers/0/output",
+        ),
+        (
+            "sampler_too_few_cubic_frames.gltf",
+            Code::KeyNorm,
+            "/animations/0/samplers/0/output",
+        ),
+        ("truncated_chunk_data.glb", Code::Glb, ""),
+        (
+            "unresolved_channel_target.gltf",
+            Code::IndexRange,
+            "/animations/0/channels/0/target",
+        ),
+        (
+            "unresolved_sampler_input.gltf",
+            Code::IndexRange,
+            "/animations/0/samplers/0/input",
+        ),
+    ];
+    for (file, code, place) in verdicts {
+        let path = data.join("gltf/bad").join(file);
+        let said = match open_gltf(&path, &ReadOptions::default()) {
+            Err(error) => vec![error],
+            Ok(loaded) => [loaded.refused, loaded.warnings].concat(),
+        };
+        let said: Vec<_> = said.iter().map(|own| (own.code, place_of(own))).collect();
+        assert!(said.contains(&(code, place.to_owned())), "{file}: {said:?}");
+    }
+}
+
+fn place_of(diagnostic: &Diagnostic) -> String {
+    let place = diagnostic.place.as_ref();
+    place.map(ToString::to_string).unwrap_or_default()
+}
+
+/// Every view that a real file compresses is decoded as meshoptimizer does.
+#[test]
+fn compressed_files_have_the_keys_of_other_decoders() {
+    let Some(data) = shared_data() else { return };
+    let expected = fs::read_to_string(data.join("gltf/fox_meshopt.expected.json")).unwrap();
+    let files: HashMap<String, Value> = serde_json::from_str(&expected).unwrap();
+    for (file, expected) in files {
+        let path = data.join("gltf").join(&file);
+        let json = json_of(&path);
+        let loaded = open(&path);
+        assert!(loaded.refused.is_empty(), "{file}: {:?}", loaded.refused);
+        let mut compared = 0;
+        for (clip, animation) in loaded
+            .clips
+            .iter()
+            .zip(expected["animations"].as_array().unwrap())
+        {
+            for channel in animation["channels"].as_array().unwrap() {
+                let track = track_of(clip, &json, channel["node"].as_u64().unwrap() as usize);
+                if channel["path"] != "rotation" {
+                    continue;
+                }
+                let keys = clip.set.track(track);
+                assert_eq!(keys.keys.len() as u64, channel["keys"].as_u64().unwrap());
+                let last = keys.keys.len() - 1;
+                for (place, key) in [("first", 0), ("last", last)] {
+                    let expected = &channel[place];
+                    let value = DQuat::from_slice(&numbers(&expected[1])).normalize();
+                    let found = keys.keys[key].as_dquat().normalize();
+                    assert!((found - value).length() < 1e-6, "{file}: {channel}");
+                    let time = expected[0].as_f64().unwrap();
+                    assert!((keys.times[key] - time).abs() < 1e-6, "{file}: {channel}");
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 100, "{file}: {compared}");
+    }
+}
+
+/// A file of many tracks: the same skeleton, and the same curves, as whole numbers.
+#[test]
+fn quantized_keys_are_near_those_of_the_file_they_were_made_of() {
+    let Some(data) = shared_data() else { return };
+    let fox = open(&data.join("gltf/Fox.glb"));
+    let quantized = open(&data.join("gltf/fox_quantized.glb"));
+    assert_eq!(fox.clips.len(), 3);
+    for (own, other) in fox.clips.iter().zip(&quantized.clips) {
+        assert_eq!(own.name, other.name);
+        // Its last key comes between two frames of 24 fps.
+        let rate = if own.name.as_deref() == Some("Run") {
+            120
+        } else {
+            24
+        };
+        assert_eq!(own.rate, tumble::FrameRate::new(rate, 1).ok());
+        let (first, last) = own.set.time_span().unwrap();
+        let times: Vec<f64> = (0..50)
+            .map(|i| first + (last - first) * f64::from(i) / 49.0)
+            .collect();
+        let [mine, others] = [own, other].map(|clip| sample(clip, times.clone()));
+        let track = |name: &str| {
+            other
+                .set
+                .tracks()
+                .position(|track| track.name == Some(name))
+        };
+        let mut compared = 0;
+        for index in 0..own.set.track_count() {
+            let Some(same) = track(own.set.track(index).name.unwrap()) else {
+                continue;
+            };
+            for sample in 0..times.len() {
+                let a = mine.rotations[sample * own.set.track_count() + index];
+                let b = others.rotations[sample * other.set.track_count() + same];
+                let angle = 2.0 * a.as_dquat().dot(b.as_dquat()).abs().min(1.0).acos();
+                assert!(angle < 2e-3, "{:?}, track {index}: {angle}", own.name);
+            }
+            compared += 1;
+        }
+        assert!(compared >= 19, "{compared}");
+    }
+}
+
+#[test]
+fn tracks_are_nodes_that_are_moved_or_carry_such() {
+    let loaded = open(&fixture("matrix_that_rests.gltf"));
+    let clip = &loaded.clips[0];
+    let names: Vec<_> = clip.set.tracks().map(|track| track.name.unwrap()).collect();
+    assert_eq!(names, ["base", "arm"]);
+    assert_eq!(clip.skeleton[1].parent, Some(0));
+    assert_eq!(clip.skeleton[0].parent, None);
+    assert_eq!(clip.channels[0].rotation, None);
+    assert_eq!(clip.channels[1].rotation, Some(Sampler::Linear));
+    // The base stands still, turned, moved and doubled; its one key is at the clip's first time.
+    let rest = clip.skeleton[0].rest;
+    assert_eq!(
+        (rest.translation, rest.scale),
+        (Vec3::new(3.0, 4.0, 5.0), Vec3::splat(2.0))
+    );
+    assert_eq!(
+        (clip.set.track(0).times, clip.set.track(0).keys),
+        (&[0.0][..], &[rest.rotation][..])
+    );
+    let poses = world(clip, &sample(clip, vec![0.0])).unwrap();
+    assert_eq!(poses[1].position, rest.translation);
+    let sheared = open(&fixture("matrix_that_shears.gltf"));
+    let clip = &sheared.clips[0];
+    let refused = world(clip, &sample(clip, vec![0.0])).unwrap_err();
+    assert!(refused.to_string().contains("`base` shears"), "{refused}");
+}
+
+#[test]
+fn names_are_those_of_nodes_and_told_apart() {
+    let Some(data) = shared_data() else { return };
+    let loaded = open(&data.join("gltf/made/names_twice_and_none.gltf"));
+    let tracks = loaded.clips[0].set.tracks();
+    let names: Vec<_> = tracks.map(|track| track.name.unwrap()).collect();
+    assert_eq!(names, ["hand", "hand#1", "node2"]);
+}
+
+#[test]
+fn times_are_on_their_frames_unless_they_are_wanted_raw() {
+    let bytes = fs::read(fixture("one_key.gltf")).unwrap();
+    let read = |options: &ReadOptions| {
+        let loaded = read_gltf("t", bytes.clone(), None, options).unwrap();
+        (loaded.clips[0].set.track(0).times[0], loaded.clips[0].rate)
+    };
+    assert_eq!(
+        read(&ReadOptions::default()),
+        (0.7, tumble::FrameRate::new(30, 1).ok())
+    );
+    assert_eq!(read(&raw()), (f64::from(0.7f32), None));
+}
+
+#[test]
+fn of_different_keys_at_one_time_the_one_that_is_asked_for_stays() {
+    let bytes = fs::read(fixture("different_keys_at_one_time.gltf")).unwrap();
+    for (duplicates, x) in [(Duplicates::First, 0.6), (Duplicates::Last, 0.0)] {
+        let options = ReadOptions {
+            duplicates,
+            ..ReadOptions::default()
+        };
+        let loaded = read_gltf("t", bytes.clone(), None, &options).unwrap();
+        let track = loaded.clips[0].set.track(0);
+        assert_eq!((track.keys.len(), track.keys[1].x), (2, x));
+    }
+}
+
+#[test]
+fn half_turns_go_the_way_of_a_product_that_is_not_negative() {
+    let Some(data) = shared_data() else { return };
+    for (file, count) in [("box_animated.gltf", 1), ("made/half_turns.gltf", 1)] {
+        let loaded = open(&data.join("gltf").join(file));
+        let found = loaded
+            .warnings
+            .iter()
+            .filter(|own| own.code == Code::HalfTurn);
+        assert_eq!(found.count(), count, "{file}: {:?}", loaded.warnings);
+    }
+}
+
+/// What is missing or not followed is said of the buffer that names it, once for all animations.
+#[test]
+fn files_beside_that_are_missing_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("walk.gltf");
+    fs::copy(fixture("uri_beside.gltf"), &path).unwrap();
+    let loaded = open(&path);
+    assert!(loaded.clips.is_empty());
+    let refused = loaded.refused[0].to_string();
+    assert!(
+        refused
+            .contains("/buffers/0/uri: error[E001]: keys beside.bin: cannot be read: No such file"),
+        "{refused}"
+    );
+    let bytes = fs::read(&path).unwrap();
+    let loaded = read_gltf("-", bytes, None, &ReadOptions::default()).unwrap();
+    assert_eq!(loaded.refused[0].code, Code::Uri);
+}
+
+#[test]
+fn limits_refuse_before_memory_runs_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.glb");
+    let mut file = File::create(&path).unwrap();
+    file.write_all(b"glTF\x02\0\0\0").unwrap();
+    // A file of holes: it takes no room.
+    file.set_len((1 << 32) + 8).unwrap();
+    let refused = open_gltf(&path, &ReadOptions::default()).unwrap_err();
+    assert_eq!(refused.code, Code::FileTooLong);
+    let options = ReadOptions {
+        limits: Limits {
+            file: 100,
+            ..Limits::default()
+        },
+        ..ReadOptions::default()
+    };
+    let refused = open_gltf(&fixture("whole.glb"), &options).unwrap_err();
+    assert_eq!(refused.code, Code::FileTooLong);
+}
+
+#[test]
+fn files_are_known_by_their_first_bytes() {
+    let named = |start: &[u8]| Format::detect(Path::new("walk"), start).name;
+    for start in [
+        &b"glTF\x02"[..],
+        b"{\"asset\":",
+        b"\xef\xbb\xbf \n{ \"asset\" :",
+    ] {
+        assert_eq!(named(start), "glb");
+    }
+    assert_ne!(named(b"{\"nodes\":"), "glb");
+    assert_eq!(Format::of(Path::new("walk.gltf")).unwrap().name, "glb");
+}
+
+fn damaged() -> impl Strategy<Value = Vec<u8>> {
+    let names = [
+        "sparse.gltf",
+        "cubic.gltf",
+        "whole.glb",
+        "matrix_that_shears.gltf",
+    ];
+    let edits = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4);
+    let digits = prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..4);
+    (prop::sample::select(names.to_vec()), edits, digits).prop_map(|(name, edits, digits)| {
+        let mut bytes = fs::read(fixture(name)).unwrap();
+        for (place, byte) in edits {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        // Other numbers reach deeper than other letters.
+        for (place, digit) in digits {
+            let all = bytes
+                .iter()
+                .enumerate()
+                .filter(|(_, byte)| byte.is_ascii_digit());
+            let places: Vec<usize> = all.map(|(place, _)| place).collect();
+            bytes[places[place.index(places.len())]] = digit;
+        }
+        bytes
+    })
+}
+
+proptest! {
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), glb: bool) {
+        let mut file = if glb { b"glTF\x02\0\0\0".to_vec() } else { b"{\"asset\":".to_vec() };
+        file.extend(bytes);
+        let _ = read_gltf("t", file, None, &ReadOptions::default());
+    }
+
+    #[test]
+    fn damaged_files_never_panic_and_what_is_read_is_whole(bytes in damaged()) {
+        if let Ok(loaded) = read_gltf("t", bytes, None, &ReadOptions::default()) {
+            for clip in &loaded.clips {
+                let tracks = clip.set.track_count();
+                prop_assert_eq!((tracks, tracks), (clip.skeleton.len(), clip.channels.len()));
+                for track in clip.set.tracks() {
+                    let unit = |key: &glam::Quat| (f64::from(key.length()) - 1.0).abs() < NORM_TOLERANCE;
+                    prop_assert!(track.keys.iter().all(unit));
+                }
+            }
+        }
+    }
+}
