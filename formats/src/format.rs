@@ -15,12 +15,12 @@ use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::text::lines::Limits;
-use crate::{csv, dat, npy};
+use crate::{csv, dat, npy, npz};
 
 /// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
 /// format that can be read is that of inputs which tell neither way, the first that can be written
 /// that of such outputs.
-pub static FORMATS: [&Format; 3] = [&dat::FORMAT, &npy::FORMAT, &csv::FORMAT];
+pub static FORMATS: [&Format; 4] = [&dat::FORMAT, &npz::FORMAT, &npy::FORMAT, &csv::FORMAT];
 
 /// A file format.
 pub struct Format {
@@ -133,6 +133,7 @@ pub trait Document: fmt::Debug + Send + Sync {
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
+        options: &MotionOptions,
         format: &str,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError>;
@@ -149,6 +150,9 @@ pub struct MotionOptions {
     pub name: String,
     /// The axes of the angles, for formats that have angles (BVH) [default: ZXY].
     pub sequence: Option<EulerSequence>,
+    /// Arrays of a [`Document`] that hold a number a frame, of which the format does not know what
+    /// they are (`dmpls`): they are interpolated linearly instead of being left out.
+    pub linear: Vec<String>,
 }
 
 /// Why samples could not be written.

@@ -1,4 +1,4 @@
-//! The files that Tumble reads and writes: keyframes in (`.dat`), results out (NPY, CSV),
+//! The files that Tumble reads and writes: keyframes in (`.dat`, NPZ, NPY), results out (NPZ, NPY, CSV),
 //! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
 //! play with ([`generate`](mod@generate)).
 
@@ -9,8 +9,10 @@ pub mod format;
 pub mod generate;
 mod grid;
 pub mod keys;
+pub mod map;
 pub mod motion;
 pub mod npy;
+pub mod npz;
 pub mod output;
 pub mod poses;
 mod quaternion;

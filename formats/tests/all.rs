@@ -2,4 +2,5 @@
 
 mod dat_fixtures;
 mod fixtures;
+mod npz;
 mod support;
