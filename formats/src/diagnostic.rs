@@ -151,6 +151,7 @@ codes! {
     EqualTimes = "E028", "two keys at one time", "The values differ, so one of the keys has to go: --duplicates first or last says which.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Unrecognised = "E031", "an unknown format", "Neither the first bytes nor the ending of the name tell a format that can be read; --format names it.";
+    Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     // E1xx and W1xx: glTF.
     Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks behind it.";
     GltfVersion = "E101", "not glTF 2.0", "Only version 2.0 is read; every exporter of today writes it.";
@@ -189,6 +190,23 @@ codes! {
     BvhSecond = "E211", "a second HIERARCHY", "Two files in one? Split it.";
     BvhWrite = "E212", "not to be written as BVH", "A BVH file holds one clip, whose samples are frames of one rate, with angles about three different axes.";
     // E3xx and W3xx: NPY and NPZ.
+    Archive = "E301", "not a ZIP archive that can be read", "An NPZ file is a ZIP archive of NPY arrays, stored or deflated. A copy that ended early lacks the directory at its end.";
+    Encrypted = "E302", "an encrypted member", "Passwords are not asked for; save the file without one.";
+    RepeatedMember = "E303", "two members of one name", "Programs differ in which of them they read.";
+    MemberSize = "E304", "a member of the wrong size", "The archive's directory says how long a member is, packed and unpacked, and what its checksum is. What its bytes cannot hold is refused before it is unpacked.";
+    ArrayHeader = "E305", "not an NPY array", "An array begins with `\\x93NUMPY`, a version and a header that says the type, the order and the shape.";
+    Pickled = "E306", "pickled Python objects", "To read a pickle is to run what it says. None is ever looked into; save numbers and texts as arrays of their own types.";
+    ArraySize = "E307", "an array of the wrong size", "The header's shape and type tell how many bytes follow it.";
+    ElementType = "E308", "an array of the wrong type", "Keys and vectors are floats (f2, f4, f8), rates and parents numbers, names text.";
+    Shape = "E309", "an array of the wrong shape", "Arrays of one clip have as many frames and tracks as each other, at least one of each.";
+    UnknownArrays = "E310", "arrays of unknown names", "Motion of SMPL bodies (`poses`), of bodies in the world (`body_rotations`) and our own layout (`rotations`) are known by the names of their arrays; of others `--map` says what they are.";
+    NoRate = "E311", "no times", "Neither a list of times nor a frame rate is there, or the unit of the times is not known: `--source-fps` and `--time-unit` say them.";
+    FrameRate = "E312", "not a frame rate", "A rate is one number of frames per second over 0.";
+    Ambiguous = "E313", "tracks and frames cannot be told apart", "Each of the two axes may be that of the frames; `--map` says which comes first.";
+    Parents = "E314", "parents that make no hierarchy", "Each track hangs on another one, or has the parent -1.";
+    OneClip = "E315", "not one clip", "An NPZ file holds one clip.";
+    Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
+    NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear` names arrays of numbers with an entry for each frame, which are not keys.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     // E5xx and W5xx: trajectories.
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
@@ -223,6 +241,9 @@ codes! {
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
     Scales = "W203", "scales are left out", "The format has rotations and translations only.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0.";
+    UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
+    LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME` interpolates them linearly.";
+    ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
 }
 
 impl Code {

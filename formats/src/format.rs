@@ -16,15 +16,16 @@ use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::source::Source;
 use crate::text::lines::Limits;
-use crate::{bvh, csv, dat, gltf, npy, tum};
+use crate::{bvh, csv, dat, gltf, npy, npz, tum};
 
 /// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
 /// format that can be read is that of inputs which tell neither way, the first that can be written
 /// that of such outputs.
-pub static FORMATS: [&Format; 6] = [
+pub static FORMATS: [&Format; 7] = [
     &dat::FORMAT,
     &gltf::FORMAT,
     &bvh::FORMAT,
+    &npz::FORMAT,
     &npy::FORMAT,
     &csv::FORMAT,
     &tum::FORMAT,
@@ -146,6 +147,7 @@ pub trait Document: fmt::Debug + Send + Sync {
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
+        options: &MotionOptions,
         path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError>;
@@ -165,6 +167,9 @@ pub struct MotionOptions {
     pub format: String,
     /// The axes of the angles, for formats that have angles (BVH) [default: ZXY].
     pub sequence: Option<EulerSequence>,
+    /// Arrays of a [`Document`] that hold a number a frame, of which the format does not know what
+    /// they are (`dmpls`): they are interpolated linearly instead of being left out.
+    pub linear: Vec<String>,
 }
 
 /// Why samples could not be written.

@@ -79,12 +79,19 @@ pub(crate) fn rate_of(
         .filter_map(|&(frames, seconds)| FrameRate::new(frames, seconds).ok());
     rates
         .filter(|rate| precision.ulp(largest) * rate.per_second() < 0.01)
-        .find(|&rate| {
-            times.clone().all(|time| {
-                let exact = frame_time(rate, frame(rate, time));
-                (time - exact).abs() <= precision.ulp(exact)
-            })
-        })
+        .find(|&rate| fits(times.clone(), rate, precision))
+}
+
+/// Whether all times are within one ulp of frames of the rate.
+pub(crate) fn fits(
+    mut times: impl Iterator<Item = f64>,
+    rate: FrameRate,
+    precision: Precision,
+) -> bool {
+    times.all(|time| {
+        let exact = frame_time(rate, frame(rate, time));
+        (time - exact).abs() <= precision.ulp(exact)
+    })
 }
 
 /// The nearest frame, negative before time 0.

@@ -1,6 +1,7 @@
-//! The files that Tumble reads and writes: keyframes in (`.dat`), clips in and out (BVH, TUM), results
-//! out (NPY, CSV), one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any
-//! size to play with ([`generate`](mod@generate)).
+//! The files that Tumble reads and writes, one file or folder a format, and the table of them
+//! ([`FORMATS`]); what is wrong with an input ([`Diagnostic`]); clips of motion files
+//! ([`Motion`](motion::Motion)), and how they are sampled ([`sample`]); and sets of any size to play
+//! with ([`generate`](mod@generate)).
 
 pub mod adjust;
 pub mod bvh;
@@ -14,9 +15,11 @@ pub mod gltf;
 mod grid;
 pub mod keyed;
 pub mod keys;
+pub mod map;
 pub mod motion;
 mod names;
 pub mod npy;
+pub mod npz;
 pub mod output;
 pub mod poses;
 mod quaternion;

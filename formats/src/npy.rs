@@ -9,6 +9,7 @@ use npyz::WriterBuilder;
 use tumble::{ComponentType, Encoding, Layout};
 
 use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
+use crate::npz::open_npy;
 
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -26,7 +27,7 @@ pub static FORMAT: Format = Format {
     summary: "NumPy's, float32",
     extensions: &[],
     probe: |start| start.starts_with(b"\x93NUMPY"),
-    read: None,
+    read: Some(open_npy),
     write: Some(WriteResults {
         is_text: false,
         layout: None,

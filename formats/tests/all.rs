@@ -7,5 +7,7 @@ mod fixtures;
 mod gltf;
 mod gltf_bake;
 mod gltf_new;
+mod npz;
 mod support;
+mod tum;
 mod validator;

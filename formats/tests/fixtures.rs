@@ -104,6 +104,11 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::StartMoved,
         Code::GltfFolder,
         Code::StaysOutside,
+        Code::Map,
+        Code::OneClip,
+        Code::Layout,
+        Code::NotPerFrame,
+        Code::LeftOut,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

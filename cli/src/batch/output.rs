@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
 use tumble::{Chunk, Encoding, Error};
-use tumble_formats::format::{Format, ResultShape, ResultWriter, WriteResults};
+use tumble_formats::format::{Format, MotionOptions, ResultShape, ResultWriter, WriteResults};
 use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::gather::{Found, Gathered};
@@ -224,6 +224,16 @@ impl Target {
     /// Where it goes.
     pub(crate) fn path(&self) -> &Path {
         self.place.path()
+    }
+
+    /// How messages call it, and by which of its format's endings it is called.
+    pub(crate) fn motion_options(&self) -> MotionOptions {
+        let ending = self.path().extension().unwrap_or_default();
+        MotionOptions {
+            name: self.to_string(),
+            format: ending.to_string_lossy().to_lowercase(),
+            ..MotionOptions::default()
+        }
     }
 
     /// How its format holds rotations as they come.

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use clap::Args;
-use tumble_formats::format::{MotionOptions, WriteError};
+use tumble_formats::format::WriteError;
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::sample::Samples;
@@ -64,10 +64,7 @@ fn convert(name: &str, clips: &[&Motion], target: &Target) -> Result<Evaluated, 
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&keys))
         .map(|(clip, keys)| keys.of(clip, clip.rate, &notes))
         .collect();
-    let options = MotionOptions {
-        name: target.to_string(),
-        ..MotionOptions::default()
-    };
+    let options = target.motion_options();
     let mut bytes = Vec::new();
     let warnings = match target.format().write_motion {
         Some(write) => write(&sampled, &options, &mut bytes),

@@ -8,7 +8,7 @@ use serde_json::value::RawValue;
 use tumble::FrameRate;
 
 use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::format::{Document, Format, WriteError};
+use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::{Read, SampledChannel};
 use crate::gltf::channel::Path;
@@ -79,6 +79,7 @@ impl Document for Gltf {
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
+        _: &MotionOptions,
         path: &FilePath,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {

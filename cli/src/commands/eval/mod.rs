@@ -75,6 +75,10 @@ pub(crate) struct Arguments {
     encoding: Encoding,
     #[command(flatten)]
     what: What,
+    /// NPZ in and out: arrays with a number for each frame that are interpolated linearly, instead
+    /// of being left out
+    #[arg(long, value_name = "ARRAYS", value_delimiter = ',')]
+    linear: Vec<String>,
     /// Also say which way each input takes to its rotations; all ways give the same bits
     #[arg(long)]
     explain_route: bool,
@@ -160,9 +164,10 @@ impl Arguments {
             Samples::Rate { .. } => String::new(),
         };
         format!(
-            "{} {:?} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
+            "{} {:?} {:?} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
             self.method,
             self.inputs.reading,
+            self.linear,
             self.sampling,
             self.manner,
             self.layout,

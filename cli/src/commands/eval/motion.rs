@@ -50,11 +50,8 @@ impl Job<'_> {
             Samples::Times(_) => None,
         };
         let write = target.format().write_motion;
+        let options = self.options(target);
         self.written(name, clips, &times, rate, target, |sampled, out| {
-            let options = MotionOptions {
-                name: target.to_string(),
-                sequence: self.arguments.what.sequence(),
-            };
             match write {
                 Some(write) => write(sampled, &options, out),
                 None => Ok(Vec::new()),
@@ -86,6 +83,7 @@ impl Job<'_> {
         let at = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);
         let times: Result<Vec<Frames>, _> = clips.iter().map(at).collect();
         let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+        let options = self.options(target);
         let places: Vec<usize> = clips.iter().map(|clip| clip.place).collect();
         self.written(name, clips, &times, Some(rate), target, |sampled, out| {
             let clips: Vec<(usize, Sampled<'_>)> = places
@@ -93,8 +91,16 @@ impl Job<'_> {
                 .copied()
                 .zip(sampled.iter().cloned())
                 .collect();
-            document.write(&clips, target.path(), out)
+            document.write(&clips, &options, target.path(), out)
         })
+    }
+
+    fn options(&self, target: &Target) -> MotionOptions {
+        MotionOptions {
+            sequence: self.arguments.what.sequence(),
+            linear: self.arguments.linear.clone(),
+            ..target.motion_options()
+        }
     }
 
     /// Samples clips and writes them.

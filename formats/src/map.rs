@@ -1,0 +1,237 @@
+//! What a person says of a file's arrays or columns, for files that do not say it themselves:
+//! `rotations=keys:wxyz,time=t`.
+//!
+//! Entries are separated by commas. Each is `name=source`, then perhaps some of the source's last
+//! axis (`[3:7]` from 3 and before 7, `[0]` one alone), then perhaps `:xyzw` or `:wxyz`, the order of
+//! a quaternion, and `:track` or `:frame`, the axis that comes first.
+
+use std::ops::Range;
+use std::str::FromStr;
+
+use tumble::Layout;
+
+use crate::npy::ComponentOrder;
+
+/// What each of some names is made of.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Map {
+    /// In the order in which they were given; no name comes twice.
+    pub entries: Vec<Entry>,
+}
+
+/// `name=source[3:7]:order`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// What the source is: `rotations`, `time`, or the name of a track.
+    pub name: String,
+    /// The array or column in the file.
+    pub source: String,
+    /// Which numbers of the source's last axis are meant; all of them, if nothing is said.
+    pub columns: Option<Range<usize>>,
+    /// The order of a quaternion's components, if it is said.
+    pub order: Option<ComponentOrder>,
+    /// Whether tracks or frames come first, if it is said.
+    pub layout: Option<Layout>,
+}
+
+/// Why a text is no map.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// An entry lacks its name or its source.
+    #[error("`{entry}` is not `name=source`; give entries such as `rotations=keys:wxyz`")]
+    Entry {
+        /// The entry as given.
+        entry: String,
+    },
+    /// The columns are no range.
+    #[error("`{columns}` in `{entry}` is no range of columns; give one such as `[3:7]` or `[0]`")]
+    Columns {
+        /// The entry as given.
+        entry: String,
+        /// What stands for the columns.
+        columns: String,
+    },
+    /// A word behind the source is neither an order nor a layout.
+    #[error("`{word}` in `{entry}` is neither an order (xyzw, wxyz) nor a layout (track, frame)")]
+    Word {
+        /// The entry as given.
+        entry: String,
+        /// The word.
+        word: String,
+    },
+    /// Two entries have one name.
+    #[error("`{name}` is given twice; give each name once")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+}
+
+impl Map {
+    /// The map of a source that holds rotations.
+    pub(crate) fn of_rotations(source: &str) -> Self {
+        let entry = Entry {
+            name: "rotations".to_owned(),
+            source: source.to_owned(),
+            columns: None,
+            order: None,
+            layout: None,
+        };
+        Self {
+            entries: vec![entry],
+        }
+    }
+
+    /// The entry of that name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.name == name)
+    }
+}
+
+impl FromStr for Map {
+    type Err = MapError;
+
+    fn from_str(text: &str) -> Result<Self, MapError> {
+        let mut map = Self::default();
+        for entry in text.split(',') {
+            let entry: Entry = entry.trim().parse()?;
+            if map.get(&entry.name).is_some() {
+                return Err(MapError::Twice { name: entry.name });
+            }
+            map.entries.push(entry);
+        }
+        Ok(map)
+    }
+}
+
+impl FromStr for Entry {
+    type Err = MapError;
+
+    fn from_str(text: &str) -> Result<Self, MapError> {
+        let entry = || text.to_owned();
+        let wrong = || MapError::Entry { entry: entry() };
+        let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
+        let end = rest.find(['[', ':']).unwrap_or(rest.len());
+        let (source, rest) = rest.split_at(end);
+        let (name, source) = (name.trim(), source.trim());
+        if name.is_empty() || source.is_empty() {
+            return Err(wrong());
+        }
+        let (bracketed, words) = match rest.find(']') {
+            Some(end) if rest.starts_with('[') => rest.split_at(end + 1),
+            _ => rest.split_at(if rest.starts_with('[') { rest.len() } else { 0 }),
+        };
+        let columns = (!bracketed.is_empty()).then(|| {
+            columns(bracketed).ok_or_else(|| MapError::Columns {
+                entry: entry(),
+                columns: bracketed.to_owned(),
+            })
+        });
+        let mut parsed = Self {
+            name: name.to_owned(),
+            source: source.to_owned(),
+            columns: columns.transpose()?,
+            order: None,
+            layout: None,
+        };
+        let mut words = words.split(':');
+        // What stands before the first colon is glued to the bracket.
+        let glued = words.next().filter(|glued| !glued.is_empty());
+        let unknown = |word: &str| MapError::Word {
+            entry: entry(),
+            word: word.to_owned(),
+        };
+        if let Some(glued) = glued {
+            return Err(unknown(glued));
+        }
+        for word in words {
+            match (word.trim(), parsed.order, parsed.layout) {
+                ("xyzw", None, _) => parsed.order = Some(ComponentOrder::Xyzw),
+                ("wxyz", None, _) => parsed.order = Some(ComponentOrder::Wxyz),
+                ("track", _, None) => parsed.layout = Some(Layout::TrackMajor),
+                ("frame", _, None) => parsed.layout = Some(Layout::FrameMajor),
+                _ => return Err(unknown(word)),
+            }
+        }
+        Ok(parsed)
+    }
+}
+
+/// `[3:7]` or `[0]`.
+fn columns(bracketed: &str) -> Option<Range<usize>> {
+    let inner = bracketed.strip_prefix('[')?.strip_suffix(']')?;
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    let range = match inner.split_once(':') {
+        Some((start, end)) => number(start)?..number(end)?,
+        None => {
+            let column = number(inner)?;
+            column..column.checked_add(1)?
+        }
+    };
+    (!range.is_empty()).then_some(range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_say_source_columns_order_and_layout() {
+        let map: Map =
+            "rotations=keys:wxyz:frame, time = t ,hand=observation.state[3:7]:xyzw,z=a[0]"
+                .parse()
+                .unwrap();
+        let names: Vec<&str> = map.entries.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["rotations", "time", "hand", "z"]);
+        let keys = map.get("rotations").unwrap();
+        assert_eq!(keys.source, "keys");
+        assert_eq!(keys.order, Some(ComponentOrder::Wxyz));
+        assert_eq!(keys.layout, Some(Layout::FrameMajor));
+        assert_eq!(map.get("time").unwrap().source, "t");
+        let hand = map.get("hand").unwrap();
+        assert_eq!(
+            (hand.source.as_str(), &hand.columns),
+            ("observation.state", &Some(3..7))
+        );
+        assert_eq!(hand.order, Some(ComponentOrder::Xyzw));
+        assert_eq!(map.get("z").unwrap().columns, Some(0..1));
+    }
+
+    #[test]
+    fn errors_name_the_piece() {
+        let error = |text: &str| text.parse::<Map>().unwrap_err();
+        for text in ["", "keys", "=keys", "rotations=", "a=b,", "a=:xyzw"] {
+            assert!(matches!(error(text), MapError::Entry { .. }), "{text}");
+        }
+        for columns in [
+            "[7:3]",
+            "[3:3]",
+            "[]",
+            "[a]",
+            "[3:7",
+            "[-1]",
+            "[99999999999999999999]",
+        ] {
+            let found = error(&format!("a=b{columns}"));
+            let MapError::Columns { columns: piece, .. } = found else {
+                panic!("{columns}: {found}");
+            };
+            assert_eq!(piece, columns);
+        }
+        for word in ["zyxw", "xyzw:wxyz", "track:frame", ""] {
+            let found = error(&format!("a=b:{word}"));
+            let last = word.rsplit(':').next().unwrap();
+            assert!(
+                matches!(&found, MapError::Word { word, .. } if word == last),
+                "{found}"
+            );
+        }
+        assert!(matches!(error("a=b[0]xyzw"), MapError::Word { .. }));
+        let twice = MapError::Twice {
+            name: "a".to_owned(),
+        };
+        assert_eq!(error("a=b,a=c"), twice);
+    }
+}

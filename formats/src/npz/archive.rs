@@ -1,0 +1,305 @@
+//! The arrays of a file: the members of a ZIP archive, or the one array of an NPY file.
+//!
+//! An archive is taken in whole, and its directory is checked before anything is unpacked: names,
+//! encryption, and sizes that its bytes cannot hold. Members are unpacked one at a time, when they
+//! are asked for.
+
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::io::{Cursor, Read};
+use std::ops::Range;
+
+use flate2::Crc;
+use flate2::read::DeflateDecoder;
+use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::npz::array::Array;
+use crate::npz::header::{Element, Header, LONGEST_START};
+
+/// An open archive, all of whose bytes are held.
+pub(crate) struct Archive {
+    /// What messages call it.
+    pub(crate) file: String,
+    bytes: Vec<u8>,
+    pub(crate) members: Vec<Member>,
+}
+
+/// One file in the archive.
+pub(crate) struct Member {
+    /// What the archive calls it.
+    pub(crate) path: String,
+    /// What its array is called: the path without `.npy`.
+    pub(crate) name: String,
+    /// The array's header, or why there is none.
+    pub(crate) header: Result<Header, String>,
+    pub(crate) is_deflated: bool,
+    data: Range<usize>,
+    size: u64,
+    checksum: Option<u32>,
+}
+
+/// What the only array of an NPY file is called: as `numpy.savez` calls arrays without a name.
+pub(crate) const ONLY_ARRAY: &str = "arr_0";
+
+/// No deflated byte stands for more bytes than this: 258 by two bits.
+const LARGEST_RATIO: u64 = 1032;
+
+impl Archive {
+    /// Reads the directory of an NPZ file. All members together may be `most` bytes long.
+    pub(crate) fn open(file: &str, bytes: Vec<u8>, most: u64) -> Result<Self, Diagnostic> {
+        let refuse = |code, message: String| Diagnostic::new(file, code, message);
+        let broken = |error: ZipError| {
+            let message = format!("the ZIP archive cannot be read: {error}; save the file again");
+            refuse(Code::Archive, message)
+        };
+        let mut zip = ZipArchive::new(Cursor::new(&*bytes)).map_err(broken)?;
+        if zip.has_duplicate_names() {
+            let name = repeated_name(&bytes, zip.central_directory_start());
+            let message = "two members have this name; save the file again with one";
+            return Err(refuse(Code::RepeatedMember, message.to_owned()).inside(name));
+        }
+        let mut members = Vec::new();
+        let mut total = 0u64;
+        for index in 0..zip.len() {
+            let entry = zip.by_index_data(index).map_err(broken)?;
+            let path = entry.name().map_err(broken)?.into_owned();
+            let is_encrypted = entry.encrypted();
+            let refuse = |code, message: String| refuse(code, message).inside(&path);
+            if is_encrypted {
+                let message = "the member is encrypted; save the file without a password";
+                return Err(refuse(Code::Encrypted, message.to_owned()));
+            }
+            let entry = zip.by_index_raw(index).map_err(broken)?;
+            let is_deflated = match entry.compression() {
+                CompressionMethod::Stored => false,
+                CompressionMethod::Deflated => true,
+                other => {
+                    let message = format!(
+                        "the member is packed by {other}; stored and deflated ones are read"
+                    );
+                    return Err(refuse(Code::Archive, message));
+                }
+            };
+            let (held, size) = (entry.compressed_size(), entry.size());
+            let most_held = match is_deflated {
+                true => held.saturating_mul(LARGEST_RATIO),
+                false => held,
+            };
+            if size > most_held || !is_deflated && size != held {
+                let message = format!("the member has {held} bytes, which do not unpack to {size}");
+                return Err(refuse(Code::MemberSize, message));
+            }
+            total = total.saturating_add(size);
+            if total > most {
+                let message = format!(
+                    "unpacked, the input is longer than {most} bytes: this member has {size}"
+                );
+                return Err(refuse(Code::FileTooLong, message));
+            }
+            let start = entry.data_start().unwrap_or(u64::MAX) as usize;
+            let end = start.saturating_add(usize::try_from(held).unwrap_or(usize::MAX));
+            if end > bytes.len() {
+                let message =
+                    format!("the member's {held} bytes pass the end of the file; it is cut");
+                return Err(refuse(Code::MemberSize, message));
+            }
+            let array = path.strip_suffix(".npy");
+            let mut member = Member {
+                name: array.unwrap_or(&path).to_owned(),
+                header: Err("it is no NPY array".to_owned()),
+                is_deflated,
+                data: start..end,
+                size,
+                checksum: Some(entry.crc32()),
+                path,
+            };
+            if member.path.ends_with(".npy") {
+                member.header = Header::parse(&member.start(&bytes));
+            }
+            members.push(member);
+        }
+        drop(zip);
+        Ok(Self {
+            file: file.to_owned(),
+            bytes,
+            members,
+        })
+    }
+
+    /// An NPY file.
+    pub(crate) fn single(file: &str, bytes: Vec<u8>) -> Self {
+        let member = Member {
+            path: String::new(),
+            name: ONLY_ARRAY.to_owned(),
+            header: Header::parse(&bytes),
+            is_deflated: false,
+            data: 0..bytes.len(),
+            size: bytes.len() as u64,
+            checksum: None,
+        };
+        Self {
+            file: file.to_owned(),
+            bytes,
+            members: vec![member],
+        }
+    }
+
+    /// The place of the array of that name.
+    pub(crate) fn find(&self, name: &str) -> Option<usize> {
+        let mut members = self.members.iter();
+        members.position(|member| member.name == name && member.path != name)
+    }
+
+    /// The shape of the array of that name.
+    pub(crate) fn shape(&self, name: &str) -> Option<&[usize]> {
+        let header = self.members[self.find(name)?].header.as_ref();
+        Some(&header.ok()?.shape)
+    }
+
+    /// A fault of a member.
+    pub(crate) fn refuse(&self, member: usize, code: Code, message: String) -> Diagnostic {
+        let refusal = Diagnostic::new(&self.file, code, message);
+        match &*self.members[member].path {
+            "" => refusal,
+            path => refusal.inside(path),
+        }
+    }
+
+    /// The header of a member that is an array whose bytes may be looked into.
+    pub(crate) fn header(&self, member: usize) -> Result<&Header, Diagnostic> {
+        let header = self.members[member].header.as_ref().map_err(|why| {
+            let message = format!("the array's header cannot be read: {why}");
+            self.refuse(member, Code::ArrayHeader, message)
+        })?;
+        if header.element == Element::Object {
+            let message = "the array holds pickled Python objects, which may run any program when \
+                           they are read; save numbers (dtype=float)";
+            return Err(self.refuse(member, Code::Pickled, message.to_owned()));
+        }
+        Ok(header)
+    }
+
+    /// The array of a member, unpacked.
+    pub(crate) fn array(&self, member: usize) -> Result<Array<'_>, Diagnostic> {
+        let header = self.header(member)?;
+        let bytes = self.unpack(member)?;
+        let held = bytes.len() - header.start;
+        match header.byte_count() {
+            Some(count) if count == held => Ok(Array { header, bytes }),
+            None if header.element.size().is_none() => Ok(Array { header, bytes }),
+            said => {
+                let said = match said {
+                    Some(said) => format!("{said} bytes"),
+                    None => "more than any file has".to_owned(),
+                };
+                let message = format!(
+                    "an array {header} takes {said}; there are {held} bytes behind the header"
+                );
+                Err(self.refuse(member, Code::ArraySize, message))
+            }
+        }
+    }
+
+    /// The array of that name, if there is one.
+    pub(crate) fn array_named(&self, name: &str) -> Result<Option<Array<'_>>, Diagnostic> {
+        self.find(name).map(|member| self.array(member)).transpose()
+    }
+
+    /// The bytes of a member.
+    pub(crate) fn unpack(&self, member: usize) -> Result<Cow<'_, [u8]>, Diagnostic> {
+        let Member { size, checksum, .. } = self.members[member];
+        let refuse = |message: String| self.refuse(member, Code::MemberSize, message);
+        let packed = &self.bytes[self.members[member].data.clone()];
+        let bytes = if self.members[member].is_deflated {
+            let mut bytes = Vec::new();
+            // Checked: the packed bytes can stand for as many.
+            let reserved = bytes.try_reserve_exact(size as usize);
+            let unpacked = reserved.map_err(std::io::Error::from).and_then(|()| {
+                DeflateDecoder::new(packed)
+                    .take(size + 1)
+                    .read_to_end(&mut bytes)
+            });
+            unpacked.map_err(|error| refuse(format!("the member cannot be unpacked: {error}")))?;
+            Cow::Owned(bytes)
+        } else {
+            Cow::Borrowed(packed)
+        };
+        if bytes.len() as u64 != size {
+            let more = if bytes.len() as u64 > size {
+                "more than "
+            } else {
+                ""
+            };
+            let count = size.min(bytes.len() as u64);
+            return Err(refuse(format!(
+                "the member unpacks to {more}{count} bytes; the archive's directory says {size}"
+            )));
+        }
+        if let Some(said) = checksum {
+            let mut crc = Crc::new();
+            crc.update(&bytes);
+            if crc.sum() != said {
+                let message = "the member's checksum is wrong: the file is damaged; copy it again";
+                return Err(refuse(message.to_owned()));
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// All arrays with their shapes, for messages.
+    pub(crate) fn listing(&self) -> String {
+        const MOST: usize = 24;
+        let arrays = self.members.iter().filter_map(|member| {
+            let header = member.header.as_ref().ok()?;
+            Some(format!("`{}` {header}", member.name))
+        });
+        let mut list: Vec<String> = arrays.take(MOST + 1).collect();
+        match list.len() {
+            0 => "none".to_owned(),
+            length => {
+                list.truncate(MOST);
+                let rest = if length > MOST { " …" } else { "" };
+                format!("{}{rest}", list.join(", "))
+            }
+        }
+    }
+}
+
+impl Member {
+    /// The first bytes, as many as a header has at most.
+    fn start<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+        let packed = &bytes[self.data.clone()];
+        if !self.is_deflated {
+            return Cow::Borrowed(packed);
+        }
+        let mut start = Vec::new();
+        let mut unpacked = DeflateDecoder::new(packed).take(LONGEST_START as u64);
+        // What cannot be unpacked ends early, and its header is cut.
+        let _ = unpacked.read_to_end(&mut start);
+        Cow::Owned(start)
+    }
+}
+
+/// A name that two entries of the central directory share. APPNOTE.TXT 4.3.12: a signature, and at
+/// 28, 30 and 32 the lengths of the name, the extra field and the comment behind 46 bytes.
+fn repeated_name(bytes: &[u8], directory: u64) -> String {
+    let mut names = HashSet::new();
+    let mut at = usize::try_from(directory).unwrap_or(usize::MAX);
+    while let Some(entry) = bytes
+        .get(at..)
+        .filter(|rest| rest.starts_with(b"PK\x01\x02"))
+    {
+        let Some(fixed) = entry.get(..46) else { break };
+        let length = |at: usize| usize::from(u16::from_le_bytes([fixed[at], fixed[at + 1]]));
+        let Some(name) = entry.get(46..46 + length(28)) else {
+            break;
+        };
+        if !names.insert(name) {
+            return String::from_utf8_lossy(name).into_owned();
+        }
+        at += 46 + length(28) + length(30) + length(32);
+    }
+    "the directory".to_owned()
+}

@@ -1,0 +1,196 @@
+//! The numbers and texts of an array.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use half::f16;
+use rayon::prelude::*;
+
+use crate::npz::header::{Element, Header};
+
+/// An array whose bytes are all there.
+pub(crate) struct Array<'a> {
+    pub(crate) header: &'a Header,
+    /// With the header.
+    pub(crate) bytes: Cow<'a, [u8]>,
+}
+
+/// Where the numbers of each track and frame are, counted in numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Strides {
+    /// The first component of the first frame of the first track.
+    pub(crate) first: usize,
+    pub(crate) track: usize,
+    pub(crate) frame: usize,
+    pub(crate) component: usize,
+}
+
+impl Header {
+    /// How many numbers apart neighbours along each axis are.
+    pub(crate) fn strides(&self) -> Vec<usize> {
+        let mut strides = vec![1; self.shape.len()];
+        let mut next = 1;
+        let mut set = |axis: usize| {
+            strides[axis] = next;
+            // Saturates only beside a length of 0, where there is no number to find.
+            next = usize::saturating_mul(next, self.shape[axis].max(1));
+        };
+        match self.is_fortran {
+            true => (0..self.shape.len()).for_each(&mut set),
+            false => (0..self.shape.len()).rev().for_each(&mut set),
+        }
+        strides
+    }
+}
+
+/// Tracks that are read side by side: of rows of many tracks each cache line is then used whole.
+const TOGETHER: usize = 8;
+
+impl Array<'_> {
+    fn values(&self) -> &[u8] {
+        &self.bytes[self.header.start..]
+    }
+
+    /// For each track, `finish` of the list of `make` of the numbers of every frame, on all threads.
+    /// Numbers must lie within the array, which must be of floats.
+    pub(crate) fn tracks<const N: usize, T, U: Send>(
+        &self,
+        at: Strides,
+        tracks: Range<usize>,
+        frames: usize,
+        make: impl Fn([f64; N]) -> T + Sync,
+        finish: impl Fn(Vec<T>) -> U + Sync,
+    ) -> Vec<U> {
+        let asked = (at, tracks, frames);
+        let big = self.header.is_big_endian;
+        match (&self.header.element, big) {
+            (Element::F16, false) => {
+                self.gather(asked, |b| f16::from_le_bytes(b).to_f64(), make, finish)
+            }
+            (Element::F16, true) => {
+                self.gather(asked, |b| f16::from_be_bytes(b).to_f64(), make, finish)
+            }
+            (Element::F32, false) => {
+                self.gather(asked, |b| f32::from_le_bytes(b).into(), make, finish)
+            }
+            (Element::F32, true) => {
+                self.gather(asked, |b| f32::from_be_bytes(b).into(), make, finish)
+            }
+            (Element::F64, false) => self.gather(asked, f64::from_le_bytes, make, finish),
+            (Element::F64, true) => self.gather(asked, f64::from_be_bytes, make, finish),
+            _ => Vec::new(),
+        }
+    }
+
+    fn gather<const SIZE: usize, const N: usize, T, U: Send>(
+        &self,
+        (at, tracks, frames): (Strides, Range<usize>, usize),
+        number: impl Fn([u8; SIZE]) -> f64 + Sync,
+        make: impl Fn([f64; N]) -> T + Sync,
+        finish: impl Fn(Vec<T>) -> U + Sync,
+    ) -> Vec<U> {
+        let (numbers, _) = self.values().as_chunks::<SIZE>();
+        let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
+        let block = |&start: &usize| {
+            let own = start..(start + TOGETHER).min(tracks.end);
+            let mut lists: Vec<Vec<T>> = own.clone().map(|_| Vec::with_capacity(frames)).collect();
+            for frame in 0..frames {
+                for (track, list) in own.clone().zip(&mut lists) {
+                    let first = at.first + track * at.track + frame * at.frame;
+                    let component = |i: usize| number(numbers[first + i * at.component]);
+                    list.push(make(std::array::from_fn(component)));
+                }
+            }
+            lists.into_iter().map(&finish).collect::<Vec<U>>()
+        };
+        starts.par_iter().flat_map_iter(block).collect()
+    }
+
+    /// Every number in C order; `None` for what are no numbers.
+    pub(crate) fn numbers(&self) -> Option<Vec<f64>> {
+        let values = self.values();
+        let big = self.header.is_big_endian;
+        let size = self.header.element.size().filter(|&size| size > 0)?;
+        let word = |bytes: &[u8]| {
+            let mut word = [0; 8];
+            word[..size].copy_from_slice(bytes);
+            if big {
+                word[..size].reverse();
+            }
+            u64::from_le_bytes(word)
+        };
+        let unused = 64 - 8 * size.min(8) as u32;
+        let number = |word: u64| match self.header.element {
+            Element::F16 => f16::from_bits(word as u16).to_f64(),
+            Element::F32 => f32::from_bits(word as u32).into(),
+            Element::F64 => f64::from_bits(word),
+            Element::Signed(_) => ((word << unused) as i64 >> unused) as f64,
+            _ => word as f64,
+        };
+        if matches!(self.header.element, Element::Unicode(_) | Element::Bytes(_)) {
+            return None;
+        }
+        let stored: Vec<f64> = values
+            .chunks_exact(size)
+            .map(|bytes| number(word(bytes)))
+            .collect();
+        Some(self.header.in_c_order(stored))
+    }
+
+    /// Every text in C order, without the zeros that fill it up.
+    ///
+    /// # Errors
+    /// What is no text, in words.
+    pub(crate) fn texts(&self) -> Result<Vec<String>, String> {
+        let big = self.header.is_big_endian;
+        let size = self.header.element.size().unwrap_or(0);
+        let text = |bytes: &[u8]| match self.header.element {
+            Element::Unicode(_) => {
+                let (words, _) = bytes.as_chunks::<4>();
+                let character = |&word: &[u8; 4]| {
+                    let code = match big {
+                        true => u32::from_be_bytes(word),
+                        false => u32::from_le_bytes(word),
+                    };
+                    char::from_u32(code).ok_or_else(|| format!("U+{code:X} is no character"))
+                };
+                words.iter().map(character).collect::<Result<String, _>>()
+            }
+            Element::Bytes(_) => {
+                String::from_utf8(bytes.to_vec()).map_err(|_| "a text is no UTF-8".to_owned())
+            }
+            _ => Err(format!("it is an array {}, no text", self.header)),
+        };
+        let whole = |text: String| text.trim_end_matches('\0').to_owned();
+        if size == 0 {
+            // Texts without a character take no bytes: how many there are is the file's word alone.
+            let empty = text(&[])?;
+            return Ok(vec![empty; usize::from(self.header.shape.is_empty())]);
+        }
+        let all = self
+            .values()
+            .chunks_exact(size)
+            .map(|bytes| text(bytes).map(whole));
+        Ok(self.header.in_c_order(all.collect::<Result<_, _>>()?))
+    }
+}
+
+impl Header {
+    /// Elements as they are stored, in C order.
+    pub(crate) fn in_c_order<T: Clone>(&self, stored: Vec<T>) -> Vec<T> {
+        if !self.is_fortran || self.shape.len() < 2 {
+            return stored;
+        }
+        let strides = self.strides();
+        let place = |index: usize| {
+            let axes = self.shape.iter().zip(&strides).rev();
+            let walk = axes.fold((index, 0), |(rest, place), (&length, stride)| {
+                (rest / length, place + rest % length * stride)
+            });
+            walk.1
+        };
+        (0..stored.len())
+            .map(|index| stored[place(index)].clone())
+            .collect()
+    }
+}

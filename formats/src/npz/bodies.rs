@@ -1,0 +1,29 @@
+//! Motion of bodies in the world, as robot learning has it: `body_rotations` (frames, bodies,
+//! w x y z), `body_positions`, `body_names` and `fps`.
+
+use tumble::Layout;
+
+use crate::diagnostic::Diagnostic;
+use crate::npy::ComponentOrder;
+use crate::npz::archive::Archive;
+use crate::npz::plan::{Part, Plan, Values};
+
+/// The plan of such a file; `None` for another.
+pub(crate) fn plan(archive: &Archive) -> Result<Option<Plan>, Diagnostic> {
+    let array = |name, values| Part::of(archive, name, values, 0, Layout::FrameMajor);
+    let quaternions = Values::Quaternion(ComponentOrder::Wxyz);
+    let Some(rotations) = array("body_rotations", quaternions)? else {
+        return Ok(None);
+    };
+    let mut plan = Plan {
+        is_world: true,
+        ..Plan::default()
+    };
+    plan.add(archive, rotations)?;
+    if let Some(positions) = array("body_positions", Values::Translation)? {
+        plan.add(archive, positions)?;
+    }
+    plan.read_names(archive, "body_names")?;
+    plan.read_rate(archive, &["fps"])?;
+    Ok(Some(plan))
+}

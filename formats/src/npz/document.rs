@@ -1,0 +1,332 @@
+//! A file that is written again in the layout that it was read in.
+
+use std::fmt;
+use std::io::Write;
+use std::path::Path;
+
+use tumble::{FrameRate, Frames, Layout};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Document, Format, MotionOptions, WriteError};
+use crate::motion::{Motion, Sampled};
+use crate::npz::archive::{Archive, Member};
+use crate::npz::header::{Element, Header};
+use crate::npz::plan::{Part, Plan, Values};
+use crate::npz::write::{Members, check, keys, note_name, notes, times};
+use crate::npz::{FORMAT, linear, smpl};
+use crate::warnings::Warnings;
+
+/// The archive, all of whose members are there, and what they mean.
+pub(super) struct NpzDocument {
+    archive: Archive,
+    plan: Plan,
+    /// First and last time of the clip, seconds.
+    span: Option<(f64, f64)>,
+}
+
+impl fmt::Debug for NpzDocument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("NpzDocument")
+            .field(&self.archive.file)
+            .finish()
+    }
+}
+
+/// What becomes of a member.
+enum Fate<'a> {
+    /// New keys.
+    Keys(&'a Part),
+    Rate,
+    Times,
+    /// The same bytes.
+    Constant,
+    /// Numbers for each frame, interpolated linearly.
+    Linear(usize),
+    /// What nobody can tell how to sample.
+    LeftOut,
+    /// Nothing: another array says it.
+    Replaced,
+}
+
+impl NpzDocument {
+    pub(super) fn new(archive: Archive, plan: Plan, clip: &Motion) -> Self {
+        let span = clip.set.time_span();
+        Self {
+            archive,
+            plan,
+            span,
+        }
+    }
+
+    /// Warns of pickled objects, which are not looked into.
+    pub(super) fn warn_of_objects(&self, warnings: &mut Warnings) {
+        for member in &self.archive.members {
+            let is_object = |header: &Header| header.element == Element::Object;
+            if member.header.as_ref().is_ok_and(is_object) {
+                let message = format!(
+                    "`{}` holds pickled objects, which are not read",
+                    member.name
+                );
+                warnings.warn(Code::ObjectsBeside, || (None, message));
+            }
+        }
+    }
+
+    fn refuse(&self, code: Code, message: String) -> WriteError {
+        Diagnostic::new(&self.archive.file, code, message).into()
+    }
+
+    /// The arrays that hold keys: those that were read, and those that repeat parts of them.
+    fn parts(&self) -> Result<Vec<Part>, Diagnostic> {
+        let mut parts = self.plan.parts.clone();
+        let is_whole = |part: &&Part| {
+            part.values == Values::RotationVector && part.tracks.len() == self.plan.tracks
+        };
+        let Some(whole) = self.plan.parts.iter().find(is_whole) else {
+            return Ok(parts);
+        };
+        let poses = self.archive.array(whole.member)?;
+        for (name, first) in smpl::repeated_pieces(self.plan.tracks) {
+            let shape = self.archive.shape(name);
+            let is_beside = shape.is_some_and(|shape| shape.first() == Some(&self.plan.frames));
+            let vectors = Values::RotationVector;
+            if !is_beside || self.archive.find(name) == Some(whole.member) {
+                continue;
+            }
+            // One that is no such array is judged as any other.
+            let piece = Part::of(&self.archive, name, vectors, first, Layout::FrameMajor);
+            let Ok(Some((piece, frames))) = piece else {
+                continue;
+            };
+            if piece.tracks.end > self.plan.tracks || frames != self.plan.frames {
+                continue;
+            }
+            let array = self.archive.array(piece.member)?;
+            let own = array.tracks(piece.at, 0..piece.tracks.len(), frames, bits, |list| list);
+            let same = poses.tracks(whole.at, piece.tracks.clone(), frames, bits, |list| list);
+            if own == same {
+                parts.push(piece);
+            }
+        }
+        Ok(parts)
+    }
+
+    /// What becomes of each member.
+    fn fates<'a>(
+        &self,
+        parts: &'a [Part],
+        sampled: &Sampled<'_>,
+        options: &MotionOptions,
+    ) -> Result<Vec<Fate<'a>>, WriteError> {
+        let fate = |(place, member): (usize, &Member)| {
+            if let Some(part) = parts.iter().find(|part| part.member == place) {
+                return Fate::Keys(part);
+            }
+            if self.plan.times.is_some_and(|list| list.member == place) {
+                return Fate::Times;
+            }
+            if self.plan.rate_member == Some(place) {
+                return if sampled.rate.is_some() {
+                    Fate::Rate
+                } else {
+                    Fate::Replaced
+                };
+            }
+            let mut new_notes = sampled.notes.iter().map(|(note, _)| note_name(note));
+            if self.plan.is_own && new_notes.any(|note| note == member.name) {
+                return Fate::Replaced;
+            }
+            match self.frame_axis(place) {
+                None => Fate::Constant,
+                Some(axis) if options.linear.contains(&member.name) => Fate::Linear(axis),
+                Some(_) => Fate::LeftOut,
+            }
+        };
+        let members = self.archive.members.iter().enumerate();
+        let fates: Vec<Fate<'_>> = members.map(fate).collect();
+        for name in &options.linear {
+            let member = self.archive.find(name);
+            let is_linear = |&member: &usize| matches!(fates[member], Fate::Linear(_));
+            if member.filter(is_linear).is_none() {
+                let candidates = self.named(&fates, |fate| {
+                    matches!(fate, Fate::LeftOut | Fate::Linear(_))
+                });
+                let message = format!(
+                    "--linear {name}: no array beside the keys has this name and an entry for each \
+                     frame; there are {candidates}"
+                );
+                return Err(self.refuse(Code::NotPerFrame, message));
+            }
+        }
+        Ok(fates)
+    }
+
+    /// The members of some fate, for messages.
+    fn named(&self, fates: &[Fate<'_>], is_meant: impl Fn(&Fate<'_>) -> bool) -> String {
+        let members = self.archive.members.iter().zip(fates);
+        let meant = members.filter(|(_, fate)| is_meant(fate));
+        let names: Vec<String> = meant
+            .map(|(member, _)| format!("`{}`", member.name))
+            .collect();
+        match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        }
+    }
+
+    /// The axis along which an array has an entry for each frame, if it has.
+    fn frame_axis(&self, member: usize) -> Option<usize> {
+        // Of one frame, every list of one entry would be such.
+        if self.plan.constants.contains(&member) || self.plan.frames < 2 {
+            return None;
+        }
+        let header = self.archive.members[member].header.as_ref().ok()?;
+        let axes = if self.plan.is_own { 2 } else { 1 };
+        let mut first = header.shape.iter().take(axes);
+        first.rposition(|&length| length == self.plan.frames)
+    }
+
+    /// Writes the members, then the rate or the times where none of them says when frames are.
+    fn write_members(
+        &self,
+        fates: &[Fate<'_>],
+        sampled: &Sampled<'_>,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        let mut members = Members::new();
+        let frames = sampled.times.len();
+        for (place, fate) in fates.iter().enumerate() {
+            let member = &self.archive.members[place];
+            let (path, deflated) = (&*member.path, member.is_deflated);
+            match *fate {
+                Fate::Keys(part) => {
+                    let array = self.archive.array(place)?;
+                    let mut shape = array.header.shape.clone();
+                    shape[usize::from(part.layout == Layout::TrackMajor)] = frames;
+                    let array = (&array.header.element, &*shape);
+                    members.numbers(path, array, deflated, |put| {
+                        keys(part.values, part.tracks.clone(), part.layout, sampled, put)
+                    })?;
+                }
+                Fate::Rate => {
+                    let array = self.archive.array(place)?;
+                    let shape = &*array.header.shape;
+                    let element = rate_element(&array.header.element, sampled.rate);
+                    members.numbers(path, (&element, shape), deflated, |put| {
+                        sampled
+                            .rate
+                            .into_iter()
+                            .try_for_each(|rate| put(rate.per_second()))
+                    })?;
+                }
+                Fate::Times => times(&mut members, sampled)?,
+                Fate::Constant => members.bytes(path, &self.archive.unpack(place)?, deflated)?,
+                Fate::Linear(axis) => {
+                    let array = self.archive.array(place)?;
+                    if !array.header.element.is_float() {
+                        let message = format!(
+                            "--linear {}: the array is of {}; floats are interpolated",
+                            member.name, array.header.element
+                        );
+                        return Err(self.refuse(Code::NotPerFrame, message));
+                    }
+                    let mut shape = array.header.shape.clone();
+                    shape[axis] = frames;
+                    let new = (&array.header.element, &*shape);
+                    members.numbers(path, new, deflated, |put| {
+                        linear::resample(&array, axis, &self.plan.all_times, sampled.times, put)
+                    })?;
+                }
+                Fate::LeftOut | Fate::Replaced => {}
+            }
+        }
+        match sampled.rate {
+            Some(rate) if self.plan.rate_member.is_none() => {
+                let scalar = (&Element::F64, &[][..]);
+                members.numbers("fps.npy", scalar, false, |put| put(rate.per_second()))?;
+            }
+            None if self.plan.times.is_none() => times(&mut members, sampled)?,
+            _ => {}
+        }
+        if self.plan.is_own {
+            notes(&mut members, sampled)?;
+        }
+        Ok(members.finish(out)?)
+    }
+}
+
+impl Document for NpzDocument {
+    /// Whole frames of the rate from the first time on: arrays of frames have no room for a last
+    /// one that is shorter.
+    fn times(&self, _clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
+        let frames = Frames::rate(rate).resolve(self.plan.tracks, self.span);
+        let timeline = frames.map_err(|error| {
+            Diagnostic::new(&self.archive.file, Code::Layout, error.to_string())
+        })?;
+        Ok((0..timeline.len())
+            .map(|frame| timeline.time(0, frame))
+            .collect())
+    }
+
+    fn writes(&self, format: &Format) -> bool {
+        std::ptr::eq(format, &FORMAT)
+    }
+
+    fn write(
+        &self,
+        clips: &[(usize, Sampled<'_>)],
+        options: &MotionOptions,
+        _: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let [(0, sampled)] = clips else {
+            let message = format!("{} clips; the file has the clip 0 alone", clips.len());
+            return Err(self.refuse(Code::OneClip, message));
+        };
+        check(sampled, &options.name)?;
+        let tracks = sampled.clip.set.track_count();
+        if tracks != self.plan.tracks {
+            let message = format!(
+                "{tracks} tracks; the layout that was read is kept, of {} tracks",
+                self.plan.tracks
+            );
+            return Err(self.refuse(Code::Layout, message));
+        }
+        if sampled.rate.is_none() && self.plan.times.is_none() && !self.plan.is_own {
+            let message = "the layout tells times by a rate alone; give --fps, not times";
+            return Err(self.refuse(Code::Layout, message.to_owned()));
+        }
+        let parts = self.parts()?;
+        let fates = self.fates(&parts, sampled, options)?;
+        self.write_members(&fates, sampled, out)?;
+        let mut warnings = Warnings::new(&self.archive.file);
+        if fates.iter().any(|fate| matches!(fate, Fate::LeftOut)) {
+            let names = self.named(&fates, |fate| matches!(fate, Fate::LeftOut));
+            warnings.warn(Code::LeftOut, || {
+                let message = format!(
+                    "left out, because it is not known how to sample them: {names}; --linear NAME \
+                     interpolates numbers"
+                );
+                (None, message)
+            });
+        }
+        Ok(warnings.into_list())
+    }
+}
+
+fn bits(vector: [f64; 3]) -> [u64; 3] {
+    vector.map(f64::to_bits)
+}
+
+/// The type of a rate: as it was, if it can hold the new one.
+fn rate_element(was: &Element, rate: Option<FrameRate>) -> Element {
+    let is_whole = rate.is_some_and(|rate| rate.per_second().fract() == 0.0);
+    let is_small = rate.is_some_and(|rate| rate.per_second() < 128.0);
+    match was {
+        Element::F32 => Element::F32,
+        Element::Signed(size) | Element::Unsigned(size) if is_whole && (is_small || *size > 2) => {
+            was.clone()
+        }
+        _ => Element::F64,
+    }
+}

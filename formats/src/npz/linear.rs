@@ -1,0 +1,62 @@
+//! Numbers for each frame, of which nothing is known, at other times: straight lines between them.
+
+use std::io;
+
+use crate::npz::array::Array;
+
+/// Gives the numbers of an array at new times, in C order; `axis` is that of the frames, whose times
+/// are `times`. Before the first and after the last frame they hold.
+pub(super) fn resample(
+    array: &Array<'_>,
+    axis: usize,
+    times: &[f64],
+    new_times: &[f64],
+    put: &mut dyn FnMut(f64) -> io::Result<()>,
+) -> io::Result<()> {
+    let numbers = array.numbers().unwrap_or_default();
+    let shape = &array.header.shape;
+    let inner: usize = shape[axis + 1..].iter().product();
+    let places: Vec<(usize, f64)> = new_times.iter().map(|&time| place(times, time)).collect();
+    for outer in numbers.chunks_exact((inner * times.len()).max(1)) {
+        for &(frame, part) in &places {
+            for i in 0..inner {
+                let from = outer[frame * inner + i];
+                put(match part > 0.0 {
+                    true => from + (outer[(frame + 1) * inner + i] - from) * part,
+                    false => from,
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The frame at or before a time, and how much of the way to the next one has passed.
+fn place(times: &[f64], time: f64) -> (usize, f64) {
+    let after = times.partition_point(|&other| other <= time);
+    match (after.checked_sub(1), times.get(after)) {
+        (None, _) => (0, 0.0),
+        (Some(frame), None) => (frame, 0.0),
+        (Some(frame), Some(&next)) => (frame, (time - times[frame]) / (next - times[frame])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::place;
+
+    #[test]
+    fn times_lie_between_frames_or_are_held() {
+        let times = [0.0, 1.0, 3.0];
+        for (time, expected) in [
+            (-1.0, (0, 0.0)),
+            (0.0, (0, 0.0)),
+            (0.25, (0, 0.25)),
+            (2.0, (1, 0.5)),
+            (3.0, (2, 0.0)),
+            (9.0, (2, 0.0)),
+        ] {
+            assert_eq!(place(&times, time), expected);
+        }
+    }
+}

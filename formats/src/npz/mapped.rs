@@ -1,0 +1,210 @@
+//! Arrays that a person tells the meaning of: `rotations=keys:wxyz,time=t`.
+//!
+//! `rotations`, `translations`, `scales`, `time`, `names`, `parents` and `fps` are what they say;
+//! any other name is that of a track, whose quaternions the array holds.
+
+use tumble::Layout;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::map::{Entry, Map};
+use crate::npz::archive::Archive;
+use crate::npz::array::Strides;
+use crate::npz::header::shape_text;
+use crate::npz::plan::{Part, Plan, TimeList, Values, check_float};
+
+/// Names in a map that are no tracks.
+const ROLES: [&str; 7] = [
+    "rotations",
+    "translations",
+    "scales",
+    "time",
+    "names",
+    "parents",
+    "fps",
+];
+
+/// The plan that a map makes.
+pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
+    let mut plan = Plan::default();
+    if let Some(time) = map.get("time") {
+        let member = source(archive, time)?;
+        let columns = time.columns.clone().unwrap_or(0..1);
+        plan.times = Some(TimeList {
+            member,
+            column: columns.start,
+        });
+        let shape = shape_of(archive, member)?;
+        let is_list = match *shape {
+            [_] => time.columns.is_none(),
+            [_, width] => columns.len() == 1 && columns.start < width && time.columns.is_some(),
+            _ => false,
+        };
+        if !is_list {
+            let message = format!(
+                "the array has shape {}; times are a list, or a column such as [0] of one",
+                shape_text(shape)
+            );
+            return Err(archive.refuse(member, Code::Shape, message));
+        }
+    }
+    let lengths = Lengths {
+        frames: match plan.times {
+            Some(list) => shape_of(archive, list.member)?.first().copied(),
+            None => None,
+        },
+        tracks: match map.get("names").or(map.get("parents")) {
+            Some(entry) => shape_of(archive, source(archive, entry)?)?.first().copied(),
+            None => None,
+        },
+    };
+    if let Some(entry) = map.get("rotations") {
+        let order = Values::Quaternion(entry.order.unwrap_or_default());
+        let part = part(archive, entry, order, 0, lengths)?;
+        plan.add(archive, part)?;
+    }
+    let mut names = vec![String::new(); plan.tracks];
+    for entry in &map.entries {
+        if ROLES.contains(&&*entry.name) {
+            continue;
+        }
+        let order = Values::Quaternion(entry.order.unwrap_or_default());
+        let part = part(archive, entry, order, plan.tracks, lengths)?;
+        plan.add(archive, part)?;
+        names.resize(plan.tracks, entry.name.clone());
+    }
+    if plan.tracks == 0 {
+        let message = "the map names no rotations; give `rotations=ARRAY` or `TRACK=ARRAY`";
+        return Err(Diagnostic::new(&archive.file, Code::Map, message));
+    }
+    plan.names = names;
+    for (name, values) in [
+        ("translations", Values::Translation),
+        ("scales", Values::Scale),
+    ] {
+        if let Some(entry) = map.get(name) {
+            let part = part(archive, entry, values, 0, lengths)?;
+            plan.add(archive, part)?;
+        }
+    }
+    for (name, read) in [
+        ("names", Plan::read_names as fn(&mut _, &_, &str) -> _),
+        ("parents", Plan::read_parents),
+        ("fps", |plan: &mut Plan, archive: &Archive, name: &str| {
+            plan.read_rate(archive, &[name])
+        }),
+    ] {
+        if let Some(entry) = map.get(name) {
+            source(archive, entry)?;
+            read(&mut plan, archive, &entry.source)?;
+        }
+    }
+    Ok(plan)
+}
+
+/// What is known of the axes of arrays before they are looked at.
+#[derive(Clone, Copy)]
+struct Lengths {
+    frames: Option<usize>,
+    tracks: Option<usize>,
+}
+
+/// The member that an entry names.
+fn source(archive: &Archive, entry: &Entry) -> Result<usize, Diagnostic> {
+    archive.find(&entry.source).ok_or_else(|| {
+        let message = format!(
+            "the map's array `{}` is not in the file; there are {}",
+            entry.source,
+            archive.listing()
+        );
+        Diagnostic::new(&archive.file, Code::Map, message)
+    })
+}
+
+fn shape_of(archive: &Archive, member: usize) -> Result<&[usize], Diagnostic> {
+    Ok(&archive.header(member)?.shape)
+}
+
+/// An array of one track (frames, numbers), or of several, whose axes are told by their lengths.
+fn part(
+    archive: &Archive,
+    entry: &Entry,
+    values: Values,
+    first_track: usize,
+    lengths: Lengths,
+) -> Result<(Part, usize), Diagnostic> {
+    let member = source(archive, entry)?;
+    check_float(archive, member)?;
+    let array = archive.array(member)?;
+    let (shape, strides) = (&*array.header.shape, array.header.strides());
+    let refuse = |code, message: String| archive.refuse(member, code, message);
+    if shape.contains(&0) {
+        let message = format!("the array has shape {}: no keys", shape_text(shape));
+        return Err(refuse(Code::Shape, message));
+    }
+    let axes = shape.len();
+    let width = values.width();
+    let last = shape.last().copied().unwrap_or(0);
+    let columns = entry.columns.clone().unwrap_or(0..last);
+    if !(axes == 2 || axes == 3) || columns.end > last || columns.len() != width {
+        let message = format!(
+            "the array has shape {}; {width} numbers a key are read, (frames, {width}) or with an \
+             axis of tracks, `[3:7]` chooses some of a longer axis",
+            shape_text(shape)
+        );
+        return Err(refuse(Code::Shape, message));
+    }
+    let layout = match (axes, entry.layout) {
+        (2, _) => Layout::FrameMajor,
+        (_, Some(layout)) => layout,
+        _ => told_by_lengths(shape, lengths).map_err(|(code, why)| refuse(code, why))?,
+    };
+    let (track, frame) = match (axes, layout) {
+        (2, _) => ((0, 1), (strides[0], shape[0])),
+        (_, Layout::TrackMajor) => ((strides[0], shape[0]), (strides[1], shape[1])),
+        (_, Layout::FrameMajor) => ((strides[1], shape[1]), (strides[0], shape[0])),
+    };
+    let part = Part {
+        member,
+        values,
+        tracks: first_track..first_track + track.1,
+        layout,
+        at: Strides {
+            first: columns.start * strides[axes - 1],
+            track: track.0,
+            frame: frame.0,
+            component: strides[axes - 1],
+        },
+    };
+    Ok((part, frame.1))
+}
+
+/// Which axis is that of the frames: the one that is as long as the times are, or the one beside
+/// that of the names.
+fn told_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code, String)> {
+    let fits = |tracks: usize, frames: usize| {
+        lengths.frames.is_none_or(|known| known == frames)
+            && lengths.tracks.is_none_or(|known| known == tracks)
+    };
+    let text = shape_text(shape);
+    match (fits(shape[0], shape[1]), fits(shape[1], shape[0])) {
+        (true, false) => Ok(Layout::TrackMajor),
+        (false, true) => Ok(Layout::FrameMajor),
+        (true, true) => {
+            let message = format!(
+                "shape {text} may be (tracks, frames, …) or (frames, tracks, …); --map tells by \
+                 `rotations=ARRAY:track` or `:frame`, which comes first"
+            );
+            Err((Code::Ambiguous, message))
+        }
+        (false, false) => {
+            let known = |what, known: Option<usize>| known.map(|n| format!("{n} {what}"));
+            let known = [
+                known("times", lengths.frames),
+                known("names", lengths.tracks),
+            ];
+            let known: Vec<String> = known.into_iter().flatten().collect();
+            let message = format!("shape {text} does not go with {}", known.join(" and "));
+            Err((Code::Shape, message))
+        }
+    }
+}

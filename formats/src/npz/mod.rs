@@ -1,0 +1,119 @@
+//! NPZ, `NumPy`'s archives of arrays, and arrays alone (NPY): motion of SMPL bodies, of bodies in the
+//! world, our own layout, and whatever else a person tells the meaning of.
+
+mod archive;
+mod array;
+mod bodies;
+mod clip;
+mod document;
+mod header;
+mod linear;
+mod mapped;
+mod own;
+mod plan;
+mod rate;
+mod rotation_vector;
+mod smpl;
+pub mod write;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Format, Loaded, ReadOptions};
+use crate::map::Map;
+use crate::npz::archive::{Archive, ONLY_ARRAY};
+use crate::npz::document::NpzDocument;
+use crate::source::Source;
+use crate::warnings::Warnings;
+
+/// `NumPy`'s archives of arrays.
+pub static FORMAT: Format = Format {
+    name: "npz",
+    summary: "NumPy's archives: AMASS and SMPL motion, bodies, our own arrays",
+    extensions: &[],
+    // A local file header, or the end of an archive without files.
+    probe: |start| start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06"),
+    read: Some(open_npz),
+    write: None,
+    write_motion: Some(write::write_npz),
+    many_clips: false,
+};
+
+/// Reads an NPZ file.
+///
+/// # Errors
+/// The first fault that refuses it.
+fn open_npz(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let file = source.name.clone();
+    read_npz(&file, source.into_bytes(options.limits.file)?, options)
+}
+
+/// Reads an NPZ file that is in memory; `file` is what messages call it.
+///
+/// # Errors
+/// The first fault that refuses it.
+pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let archive = Archive::open(file, bytes, options.limits.file)?;
+    let mut warnings = Warnings::new(file);
+    if let Some(map) = map(file, options)? {
+        let mut plan = mapped::plan(&archive, &map)?;
+        let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
+        return Ok(Loaded::of(clip, warnings.into_list()));
+    }
+    let plan = match own::plan(&archive)? {
+        Some(plan) => Some(plan),
+        None => match smpl::plan(&archive, &mut warnings)? {
+            Some(plan) => Some(plan),
+            None => bodies::plan(&archive)?,
+        },
+    };
+    let mut plan = plan.ok_or_else(|| {
+        let message = format!(
+            "no arrays whose names are known (poses, rotations, body_rotations); --map \
+             rotations=ARRAY:wxyz,time=ARRAY tells what they are; there are {}",
+            archive.listing()
+        );
+        Diagnostic::new(file, Code::UnknownArrays, message)
+    })?;
+    let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
+    let document = NpzDocument::new(archive, plan, &clip);
+    document.warn_of_objects(&mut warnings);
+    Ok(Loaded {
+        document: Some(Arc::new(document)),
+        ..Loaded::of(clip, warnings.into_list())
+    })
+}
+
+/// Reads an NPY file.
+///
+/// # Errors
+/// The first fault that refuses it.
+pub(crate) fn open_npy(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let file = source.name.clone();
+    read_npy(&file, source.into_bytes(options.limits.file)?, options)
+}
+
+/// Reads an NPY file that is in memory: its array is called `arr_0`, and holds x y z w unless the map
+/// says otherwise.
+///
+/// # Errors
+/// The first fault that refuses it.
+pub fn read_npy(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let archive = Archive::single(file, bytes);
+    let mut warnings = Warnings::new(file);
+    let map = match map(file, options)? {
+        Some(map) => map,
+        None => Map::of_rotations(ONLY_ARRAY),
+    };
+    let mut plan = mapped::plan(&archive, &map)?;
+    let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
+    Ok(Loaded::of(clip, warnings.into_list()))
+}
+
+fn map(file: &str, options: &ReadOptions) -> Result<Option<Map>, Diagnostic> {
+    let parsed = options.map.as_deref().map(str::parse::<Map>).transpose();
+    parsed.map_err(|error| Diagnostic::new(file, Code::Map, format!("--map: {error}")))
+}

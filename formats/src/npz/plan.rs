@@ -1,0 +1,301 @@
+//! What the arrays of a file mean: which of them hold the rotations of which tracks, and how. Every
+//! layout becomes a plan, from which clips are read, and by which files are written again.
+
+use std::ops::Range;
+
+use tumble::{FrameRate, Layout};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::Transform;
+use crate::npy::ComponentOrder;
+use crate::npz::archive::Archive;
+use crate::npz::array::Strides;
+use crate::npz::header::shape_text;
+
+/// One clip, as arrays.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Plan {
+    /// The clip's name.
+    pub(crate) name: Option<String>,
+    pub(crate) tracks: usize,
+    pub(crate) frames: usize,
+    /// The arrays that hold keys. Those of rotations come first, in the order of their tracks.
+    pub(crate) parts: Vec<Part>,
+    /// An entry for each track, or none.
+    pub(crate) names: Vec<String>,
+    /// Likewise.
+    pub(crate) parents: Vec<Option<usize>>,
+    /// Likewise.
+    pub(crate) rest: Vec<Transform>,
+    /// The member of the times, seconds.
+    pub(crate) times: Option<TimeList>,
+    /// The member of the rate.
+    pub(crate) rate_member: Option<usize>,
+    pub(crate) rate: Option<FrameRate>,
+    /// The times of all frames, those that are left out of the clip too.
+    pub(crate) all_times: Vec<f64>,
+    /// Members that hold the same for all frames, whatever their shape looks like.
+    pub(crate) constants: Vec<usize>,
+    pub(crate) is_world: bool,
+    /// The layout is ours: what made the samples is written beside them.
+    pub(crate) is_own: bool,
+}
+
+/// Where the times of all frames are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TimeList {
+    pub(crate) member: usize,
+    /// The one of its columns, where it has several.
+    pub(crate) column: usize,
+}
+
+/// An array of keys.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) member: usize,
+    pub(crate) values: Values,
+    pub(crate) tracks: Range<usize>,
+    pub(crate) layout: Layout,
+    pub(crate) at: Strides,
+}
+
+/// What each key is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Values {
+    /// A quaternion.
+    Quaternion(ComponentOrder),
+    /// An axis of rotation, as long as the angle in radians.
+    RotationVector,
+    Translation,
+    Scale,
+}
+
+impl Values {
+    pub(crate) fn is_rotation(self) -> bool {
+        matches!(self, Self::Quaternion(_) | Self::RotationVector)
+    }
+
+    /// Numbers of a key.
+    pub(crate) fn width(self) -> usize {
+        match self {
+            Self::Quaternion(_) => 4,
+            _ => 3,
+        }
+    }
+}
+
+impl Part {
+    /// All of an array: of shape (frames, numbers of all tracks), (frames, tracks, numbers), or,
+    /// track by track, (tracks, frames, numbers). `first` is the first of its tracks. Gives the
+    /// number of frames too.
+    ///
+    /// # Errors
+    /// When the shape is none of these, or the elements are no floats.
+    pub(crate) fn of(
+        archive: &Archive,
+        name: &str,
+        values: Values,
+        first: usize,
+        layout: Layout,
+    ) -> Result<Option<(Self, usize)>, Diagnostic> {
+        let Some(member) = archive.find(name) else {
+            return Ok(None);
+        };
+        check_float(archive, member)?;
+        let width = values.width();
+        let array = archive.array(member)?;
+        let (header, shape) = (array.header, &*array.header.shape);
+        let strides = header.strides();
+        let found = match (shape, layout) {
+            _ if shape.contains(&0) => None,
+            (&[frames, numbers], Layout::FrameMajor) if numbers % width == 0 => {
+                let at = Strides {
+                    first: 0,
+                    track: width * strides[1],
+                    frame: strides[0],
+                    component: strides[1],
+                };
+                Some((at, numbers / width, frames))
+            }
+            (&[outer, inner, numbers], _) if numbers == width => {
+                let axes = [(strides[0], outer), (strides[1], inner)];
+                let [track, frame] = match layout {
+                    Layout::TrackMajor => axes,
+                    Layout::FrameMajor => [axes[1], axes[0]],
+                };
+                let at = Strides {
+                    first: 0,
+                    track: track.0,
+                    frame: frame.0,
+                    component: strides[2],
+                };
+                Some((at, track.1, frame.1))
+            }
+            _ => None,
+        };
+        let Some((at, tracks, frames)) = found else {
+            let shape = shape_text(shape);
+            let wanted = match layout {
+                Layout::TrackMajor => format!("(tracks, frames, {width})"),
+                Layout::FrameMajor => {
+                    format!("(frames, {width} numbers a track) or (frames, tracks, {width})")
+                }
+            };
+            let message = format!(
+                "the array has shape {shape}; {wanted} is read, --map tells of other arrays"
+            );
+            return Err(archive.refuse(member, Code::Shape, message));
+        };
+        let part = Self {
+            member,
+            values,
+            tracks: first..first + tracks,
+            layout,
+            at,
+        };
+        Ok(Some((part, frames)))
+    }
+
+    /// Where the key of a track is, as `NumPy` would index it.
+    pub(crate) fn place(&self, archive: &Archive, track: usize, frame: usize) -> String {
+        let member = &archive.members[self.member];
+        let own = track - self.tracks.start;
+        let axes = member
+            .header
+            .as_ref()
+            .map_or(0, |header| header.shape.len());
+        let width = self.values.width();
+        let index = match (axes, self.layout) {
+            (3, Layout::TrackMajor) => format!("{own}, {frame}"),
+            (3, Layout::FrameMajor) => format!("{frame}, {own}"),
+            _ => {
+                let first = self.at.first / self.at.component.max(1) + own * width;
+                format!("{frame}, {first}:{}", first + width)
+            }
+        };
+        format!("{}[{index}]", member.name)
+    }
+}
+
+/// Refuses arrays of keys that are no floats.
+pub(crate) fn check_float(archive: &Archive, member: usize) -> Result<(), Diagnostic> {
+    let element = &archive.header(member)?.element;
+    if element.is_float() {
+        return Ok(());
+    }
+    let message =
+        format!("the array is of {element}; keys are of f2, f4 or f8: convert it with astype");
+    Err(archive.refuse(member, Code::ElementType, message))
+}
+
+impl Plan {
+    /// Adds the keys of an array that has as many tracks and frames as the others.
+    pub(crate) fn add(
+        &mut self,
+        archive: &Archive,
+        (part, frames): (Part, usize),
+    ) -> Result<(), Diagnostic> {
+        if self.parts.is_empty() {
+            self.frames = frames;
+        }
+        let end = part.tracks.end;
+        let is_rotation = part.values.is_rotation();
+        if frames != self.frames || !is_rotation && end > self.tracks {
+            let name = &archive.members[self.parts[0].member].name;
+            let message = format!(
+                "the array has {frames} frames of {} tracks; `{name}` has {} of {}",
+                end, self.frames, self.tracks
+            );
+            return Err(archive.refuse(part.member, Code::Shape, message));
+        }
+        if is_rotation {
+            self.tracks = end;
+        }
+        self.parts.push(part);
+        Ok(())
+    }
+
+    /// The names of all tracks, from an array of texts.
+    pub(crate) fn read_names(&mut self, archive: &Archive, name: &str) -> Result<(), Diagnostic> {
+        let Some(member) = archive.find(name) else {
+            return Ok(());
+        };
+        let texts = archive.array(member)?.texts();
+        let names = texts.map_err(|why| archive.refuse(member, Code::ElementType, why))?;
+        self.check_count(archive, member, names.len())?;
+        self.constants.push(member);
+        self.names = names;
+        Ok(())
+    }
+
+    /// The parents of all tracks, from an array of whole numbers, negative for roots.
+    pub(crate) fn read_parents(&mut self, archive: &Archive, name: &str) -> Result<(), Diagnostic> {
+        let Some(member) = archive.find(name) else {
+            return Ok(());
+        };
+        let numbers = read_numbers(archive, member)?;
+        self.check_count(archive, member, numbers.len())?;
+        self.constants.push(member);
+        let refuse = |message: String| archive.refuse(member, Code::Parents, message);
+        for (track, &parent) in numbers.iter().enumerate() {
+            let is_track = parent >= 0.0 && parent < self.tracks as f64 && parent.fract() == 0.0;
+            if !is_track && parent >= 0.0 || parent.is_nan() {
+                let message = format!(
+                    "track {track} hangs on track {parent}, of {}; roots have -1",
+                    self.tracks
+                );
+                return Err(refuse(message));
+            }
+            self.parents.push(is_track.then_some(parent as usize));
+        }
+        match circle(&self.parents) {
+            Some(track) => Err(refuse(format!(
+                "track {track} hangs on itself; roots have -1"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn check_count(
+        &self,
+        archive: &Archive,
+        member: usize,
+        count: usize,
+    ) -> Result<(), Diagnostic> {
+        if count == self.tracks {
+            return Ok(());
+        }
+        let message = format!("the array has {count} entries for {} tracks", self.tracks);
+        Err(archive.refuse(member, Code::Shape, message))
+    }
+}
+
+/// The numbers of a member, in C order.
+pub(crate) fn read_numbers(archive: &Archive, member: usize) -> Result<Vec<f64>, Diagnostic> {
+    let array = archive.array(member)?;
+    array.numbers().ok_or_else(|| {
+        let message = format!(
+            "the array is of {}; numbers are needed",
+            array.header.element
+        );
+        archive.refuse(member, Code::ElementType, message)
+    })
+}
+
+/// A track that is its own ancestor.
+fn circle(parents: &[Option<usize>]) -> Option<usize> {
+    let mut is_done = vec![false; parents.len()];
+    for track in 0..parents.len() {
+        let mut line = Vec::new();
+        let mut next = Some(track);
+        while let Some(own) = next.filter(|&own| !is_done[own]) {
+            if line.len() == parents.len() {
+                return Some(own);
+            }
+            line.push(own);
+            next = parents[own];
+        }
+        line.into_iter().for_each(|own| is_done[own] = true);
+    }
+    None
+}

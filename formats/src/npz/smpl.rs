@@ -1,0 +1,216 @@
+//! Motion of SMPL bodies, as AMASS has it: rotation vectors of all joints in rows, one a frame.
+
+use tumble::Layout;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::npz::archive::Archive;
+use crate::npz::plan::{Part, Plan, Values};
+use crate::warnings::Warnings;
+
+/// Joints of all SMPL bodies, with their parents.
+#[rustfmt::skip]
+const BODY: [(&str, usize); 22] = [
+    ("pelvis", usize::MAX), ("left_hip", 0), ("right_hip", 0), ("spine1", 0), ("left_knee", 1),
+    ("right_knee", 2), ("spine2", 3), ("left_ankle", 4), ("right_ankle", 5), ("spine3", 6),
+    ("left_foot", 7), ("right_foot", 8), ("neck", 9), ("left_collar", 9), ("right_collar", 9),
+    ("head", 12), ("left_shoulder", 13), ("right_shoulder", 14), ("left_elbow", 16),
+    ("right_elbow", 17), ("left_wrist", 18), ("right_wrist", 19),
+];
+const HEAD: usize = 15;
+const WRISTS: [(&str, usize); 2] = [("left", 20), ("right", 21)];
+const FINGERS: [&str; 5] = ["index", "middle", "pinky", "ring", "thumb"];
+
+/// The arrays that hold the pose of a body in pieces, in the order in which `poses` has them:
+/// pelvis, body, jaw, eyes, hands.
+const PIECES: [(&str, usize); 5] = [
+    ("root_orient", 1),
+    ("pose_body", 21),
+    ("pose_jaw", 1),
+    ("pose_eye", 2),
+    ("pose_hand", 30),
+];
+
+/// Where such files say their rate.
+const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "fps"];
+
+/// Names and parents of joints.
+struct Skeleton {
+    names: Vec<String>,
+    parents: Vec<Option<usize>>,
+}
+
+impl Skeleton {
+    fn push(&mut self, name: String, parent: usize) {
+        self.names.push(name);
+        self.parents.push((parent != usize::MAX).then_some(parent));
+    }
+
+    fn body() -> Self {
+        let (names, parents) = (Vec::new(), Vec::new());
+        let mut body = Self { names, parents };
+        BODY.into_iter()
+            .for_each(|(name, parent)| body.push(name.to_owned(), parent));
+        body
+    }
+
+    /// Adds jaw and eyes.
+    fn face(&mut self, jaw: bool, eyes: bool) {
+        if jaw {
+            self.push("jaw".to_owned(), HEAD);
+        }
+        if eyes {
+            self.push("left_eye_smplhf".to_owned(), HEAD);
+            self.push("right_eye_smplhf".to_owned(), HEAD);
+        }
+    }
+
+    /// Adds the fingers of both hands, three joints each.
+    fn fingers(&mut self) {
+        for (side, wrist) in WRISTS {
+            for finger in FINGERS {
+                for joint in 1..=3 {
+                    let last = self.names.len() - 1;
+                    let parent = if joint == 1 { wrist } else { last };
+                    self.push(format!("{side}_{finger}{joint}"), parent);
+                }
+            }
+        }
+    }
+
+    /// Of as many joints: SMPL has 24, SMPL-H 52, SMPL-X 55; 22 are those that all of them share.
+    fn of(joints: usize) -> Option<Self> {
+        let mut skeleton = Self::body();
+        match joints {
+            22 => {}
+            24 => {
+                for (side, wrist) in WRISTS {
+                    skeleton.push(format!("{side}_hand"), wrist);
+                }
+            }
+            52 => skeleton.fingers(),
+            55 => {
+                skeleton.face(true, true);
+                skeleton.fingers();
+            }
+            _ => return None,
+        }
+        Some(skeleton)
+    }
+}
+
+/// The plan of a file of `poses`, or of `root_orient`, `pose_body` and perhaps more; `None` for
+/// another.
+pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<Plan>, Diagnostic> {
+    let vectors = |name: &str, first| {
+        Part::of(
+            archive,
+            name,
+            Values::RotationVector,
+            first,
+            Layout::FrameMajor,
+        )
+    };
+    let mut plan = Plan::default();
+    let skeleton = if let Some(poses) = vectors("poses", 0)? {
+        plan.add(archive, poses)?;
+        let skeleton = Skeleton::of(plan.tracks);
+        if skeleton.is_none() {
+            let tracks = plan.tracks;
+            warnings.warn(Code::UnknownBody, || {
+                let message = format!(
+                    "{tracks} joints are no known body (22, 24, 52 and 55 are); they have no names"
+                );
+                (None, message)
+            });
+        }
+        skeleton
+    } else if archive.find("root_orient").is_some() && archive.find("pose_body").is_some() {
+        let mut skeleton = Skeleton::body();
+        for (name, joints) in PIECES {
+            let Some(piece) = vectors(name, plan.tracks)? else {
+                continue;
+            };
+            let found = piece.0.tracks.len();
+            if found != joints {
+                let message = format!(
+                    "the array has {} numbers a frame where {} are rotation vectors; components of \
+                     a hand model cannot be read",
+                    3 * found,
+                    3 * joints
+                );
+                return Err(archive.refuse(piece.0.member, Code::Shape, message));
+            }
+            plan.add(archive, piece)?;
+        }
+        let has = |name| archive.find(name).is_some();
+        skeleton.face(has("pose_jaw"), has("pose_eye"));
+        if has("pose_hand") {
+            skeleton.fingers();
+        }
+        Some(skeleton)
+    } else {
+        return Ok(None);
+    };
+    if let Some(skeleton) = skeleton {
+        (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
+    }
+    let root = Part::of(archive, "trans", Values::Translation, 0, Layout::FrameMajor)?;
+    if let Some(root) = root {
+        plan.add(archive, root)?;
+    }
+    plan.read_rate(archive, &RATES)?;
+    Ok(Some(plan))
+}
+
+/// The pieces that repeat what `poses` has, each with the first of its joints there.
+pub(crate) fn repeated_pieces(joints: usize) -> impl Iterator<Item = (&'static str, usize)> {
+    let has_face = joints == 55;
+    let of_body = move |&(name, _): &(&str, usize)| match name {
+        "pose_jaw" | "pose_eye" => has_face,
+        "pose_hand" => joints >= 52,
+        _ => joints >= 22,
+    };
+    let mut first = 0;
+    PIECES
+        .into_iter()
+        .filter(of_body)
+        .map(move |(name, joints)| {
+            first += joints;
+            (name, first - joints)
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hands_and_faces_hang_where_the_models_have_them() {
+        for (joints, name, at, parent) in [
+            (24, "right_hand", 23, Some(21)),
+            (52, "left_index1", 22, Some(20)),
+            (52, "right_index1", 37, Some(21)),
+            (52, "right_thumb3", 51, Some(50)),
+            (55, "jaw", 22, Some(15)),
+            (55, "right_eye_smplhf", 24, Some(15)),
+            (55, "left_index1", 25, Some(20)),
+            (55, "right_pinky1", 46, Some(21)),
+            (22, "pelvis", 0, None),
+        ] {
+            let skeleton = Skeleton::of(joints).unwrap();
+            assert_eq!(
+                (skeleton.names.len(), skeleton.parents.len()),
+                (joints, joints)
+            );
+            assert_eq!(skeleton.names[at], name);
+            assert_eq!(skeleton.parents[at], parent, "{name}");
+        }
+        assert!(Skeleton::of(23).is_none());
+        let pieces: Vec<_> = repeated_pieces(55).collect();
+        assert_eq!(
+            pieces[1..4],
+            [("pose_body", 1), ("pose_jaw", 22), ("pose_eye", 23)]
+        );
+        assert_eq!(repeated_pieces(52).last(), Some(("pose_hand", 22)));
+    }
+}

@@ -1,0 +1,282 @@
+//! Samples as arrays in an archive: our own layout, for clips of any format.
+
+use std::io::{self, Cursor, Write};
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+use half::f16;
+use tumble::Layout;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{MotionOptions, WriteError};
+use crate::motion::{Joint, Sampled};
+use crate::npy::ComponentOrder;
+use crate::npz::header::{Element, Header};
+use crate::npz::plan::Values;
+use crate::npz::{own, rotation_vector};
+
+/// An archive that is being made. It grows in memory, because a member's length and checksum come
+/// before its bytes.
+pub(super) struct Members {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+}
+
+/// Bytes that go to the archive at once.
+const PIECE: usize = 1 << 16;
+
+impl Members {
+    pub(super) fn new() -> Self {
+        Self {
+            zip: ZipWriter::new(Cursor::new(Vec::new())),
+        }
+    }
+
+    /// Begins a member of so many bytes.
+    fn begin(&mut self, path: &str, length: usize, is_deflated: bool) -> io::Result<()> {
+        let method = match is_deflated {
+            true => CompressionMethod::Deflated,
+            false => CompressionMethod::Stored,
+        };
+        // Sizes in 64 bits from where those of 32 bits could end; deflating may add a little.
+        let options = SimpleFileOptions::default()
+            .compression_method(method)
+            .large_file(length >= 0xF000_0000);
+        self.zip.start_file(path, options).map_err(io::Error::other)
+    }
+
+    /// A member as it is.
+    pub(super) fn bytes(&mut self, path: &str, bytes: &[u8], is_deflated: bool) -> io::Result<()> {
+        self.begin(path, bytes.len(), is_deflated)?;
+        self.zip.write_all(bytes)
+    }
+
+    /// An array of numbers, which `fill` gives in C order.
+    pub(super) fn numbers(
+        &mut self,
+        path: &str,
+        (element, shape): (&Element, &[usize]),
+        is_deflated: bool,
+        fill: impl FnOnce(&mut dyn FnMut(f64) -> io::Result<()>) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let header = Header::write(element, shape);
+        let count: usize = shape.iter().product();
+        let length = header.len() + count.saturating_mul(element.size().unwrap_or(8));
+        self.begin(path, length, is_deflated)?;
+        let mut buffer = header;
+        fill(&mut |number| {
+            match element {
+                Element::F16 => buffer.extend(f16::from_f64(number).to_le_bytes()),
+                Element::F32 => buffer.extend((number as f32).to_le_bytes()),
+                Element::Signed(size) => buffer.extend(&(number as i64).to_le_bytes()[..*size]),
+                Element::Unsigned(size) => buffer.extend(&(number as u64).to_le_bytes()[..*size]),
+                _ => buffer.extend(number.to_le_bytes()),
+            }
+            if buffer.len() >= PIECE {
+                self.zip.write_all(&buffer)?;
+                buffer.clear();
+            }
+            Ok(())
+        })?;
+        self.zip.write_all(&buffer)
+    }
+
+    /// Texts as an array of UTF-32.
+    pub(super) fn texts(&mut self, path: &str, texts: &[&str], shape: &[usize]) -> io::Result<()> {
+        let longest = texts.iter().map(|text| text.chars().count()).max();
+        let length = longest.unwrap_or(0).max(1);
+        let mut bytes = Header::write(&Element::Unicode(length), shape);
+        for text in texts {
+            let padded = text.chars().chain(std::iter::repeat('\0')).take(length);
+            bytes.extend(padded.flat_map(|character| u32::from(character).to_le_bytes()));
+        }
+        self.bytes(path, &bytes, false)
+    }
+
+    /// Ends the archive and writes it.
+    pub(super) fn finish(self, out: &mut dyn Write) -> io::Result<()> {
+        let archive = self.zip.finish().map_err(io::Error::other)?;
+        out.write_all(archive.get_ref())
+    }
+}
+
+/// Gives the keys of some tracks at all samples, in C order.
+pub(super) fn keys(
+    values: Values,
+    tracks: Range<usize>,
+    layout: Layout,
+    sampled: &Sampled<'_>,
+    put: &mut dyn FnMut(f64) -> io::Result<()>,
+) -> io::Result<()> {
+    let all = sampled.clip.set.track_count();
+    let frames = sampled.times.len();
+    let mut before: Vec<Option<DVec3>> = vec![None; tracks.len()];
+    let first_track = tracks.start;
+    let mut key = |track: usize, frame: usize| -> io::Result<()> {
+        let at = frame * all + track;
+        let vector = |list: &[Vec3], rest| list.get(at).copied().unwrap_or(rest).as_dvec3();
+        let rotation = sampled.rotations[at];
+        let three = match values {
+            Values::Quaternion(order) => {
+                let [x, y, z, w] = rotation.to_array();
+                let numbers = match order {
+                    ComponentOrder::Xyzw => [x, y, z, w],
+                    ComponentOrder::Wxyz => [w, x, y, z],
+                };
+                return numbers
+                    .into_iter()
+                    .try_for_each(|number| put(number.into()));
+            }
+            Values::RotationVector => {
+                let before = &mut before[track - first_track];
+                *before.insert(rotation_vector::log(rotation, *before))
+            }
+            Values::Translation => vector(sampled.translations, Vec3::ZERO),
+            Values::Scale => vector(sampled.scales, Vec3::ONE),
+        };
+        three.to_array().into_iter().try_for_each(&mut *put)
+    };
+    match layout {
+        Layout::TrackMajor => tracks
+            .into_iter()
+            .try_for_each(|track| (0..frames).try_for_each(|f| key(track, f))),
+        Layout::FrameMajor => {
+            (0..frames).try_for_each(|frame| tracks.clone().try_for_each(|track| key(track, frame)))
+        }
+    }
+}
+
+/// Refuses samples that are not as many as times and tracks make.
+pub(super) fn check(sampled: &Sampled<'_>, name: &str) -> Result<(), WriteError> {
+    let (tracks, frames) = (sampled.clip.set.track_count(), sampled.times.len());
+    let count = sampled.rotations.len();
+    if tracks > 0 && frames > 0 && tracks.checked_mul(frames) == Some(count) {
+        return Ok(());
+    }
+    let message = format!("{count} rotations for {tracks} tracks at {frames} times");
+    Err(Diagnostic::new(name, Code::Layout, message).into())
+}
+
+/// The arrays of our layout that are keys, or say when they are.
+const KEYS: [&str; 5] = ["rotations", "translations", "scales", "times", "fps"];
+
+/// What a note is called among the arrays.
+pub(super) fn note_name(note: &str) -> String {
+    let is_taken = KEYS.contains(&note) || own::CONSTANTS.contains(&note);
+    match is_taken {
+        true => format!("note_{note}"),
+        false => note.to_owned(),
+    }
+}
+
+/// Writes what made the samples, a text each.
+pub(super) fn notes(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<()> {
+    for (note, text) in sampled.notes {
+        members.texts(&format!("{}.npy", note_name(note)), &[text], &[])?;
+    }
+    Ok(())
+}
+
+/// Writes one clip in our own layout: `rotations` (tracks, frames, x y z w) in f32, `times` in f64,
+/// `fps` where there is a rate, `names` and `parents`; `translations` and `scales` (tracks, frames,
+/// 3), where tracks have them; `rest` (tracks, 10), as `tx ty tz x y z w sx sy sz`, where the
+/// skeleton has a rest pose; and what made the samples.
+///
+/// # Errors
+/// When there is not one clip, or writing fails.
+pub fn write_npz(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let [sampled] = clips else {
+        let message = format!(
+            "{} clips; NPZ holds one: choose it with --animation",
+            clips.len()
+        );
+        return Err(Diagnostic::new(&options.name, Code::OneClip, message).into());
+    };
+    check(sampled, &options.name)?;
+    let clip = sampled.clip;
+    let (tracks, frames) = (clip.set.track_count(), sampled.times.len());
+    let mut members = Members::new();
+    let quaternions = Values::Quaternion(ComponentOrder::Xyzw);
+    for (path, values, is_there) in [
+        ("rotations.npy", quaternions, true),
+        (
+            "translations.npy",
+            Values::Translation,
+            !sampled.translations.is_empty(),
+        ),
+        ("scales.npy", Values::Scale, !sampled.scales.is_empty()),
+    ] {
+        if is_there {
+            let shape = [tracks, frames, values.width()];
+            members.numbers(path, (&Element::F32, &shape), false, |put| {
+                keys(values, 0..tracks, Layout::TrackMajor, sampled, put)
+            })?;
+        }
+    }
+    times(&mut members, sampled)?;
+    if let Some(rate) = sampled.rate {
+        let scalar = (&Element::F64, &[][..]);
+        members.numbers("fps.npy", scalar, false, |put| put(rate.per_second()))?;
+    }
+    let names: Vec<&str> = clip
+        .set
+        .tracks()
+        .map(|track| track.name.unwrap_or(""))
+        .collect();
+    if names.iter().any(|name| !name.is_empty()) {
+        members.texts("names.npy", &names, &[tracks])?;
+    }
+    skeleton(&mut members, &clip.skeleton)?;
+    if clip.is_world {
+        let truth = (&Element::Unsigned(1), &[][..]);
+        members.numbers("is_world.npy", truth, false, |put| put(1.0))?;
+    }
+    if let Some(name) = &clip.name {
+        members.texts("name.npy", &[name], &[])?;
+    }
+    notes(&mut members, sampled)?;
+    members.finish(out)?;
+    Ok(Vec::new())
+}
+
+/// Writes the times of all samples.
+pub(super) fn times(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<()> {
+    let shape = [sampled.times.len()];
+    members.numbers("times.npy", (&Element::F64, &shape), false, |put| {
+        sampled.times.iter().try_for_each(|&time| put(time))
+    })
+}
+
+/// Writes parents, and the rest pose if there is one.
+fn skeleton(members: &mut Members, joints: &[Joint]) -> io::Result<()> {
+    if joints.is_empty() {
+        return Ok(());
+    }
+    let shape = [joints.len()];
+    members.numbers("parents.npy", (&Element::Signed(4), &shape), false, |put| {
+        let parents = joints
+            .iter()
+            .map(|joint| joint.parent.map_or(-1.0, |parent| parent as f64));
+        parents.into_iter().try_for_each(put)
+    })?;
+    if joints.iter().all(|joint| joint.rest == Default::default()) {
+        return Ok(());
+    }
+    let shape = [joints.len(), 10];
+    members.numbers("rest.npy", (&Element::F32, &shape), false, |put| {
+        joints.iter().try_for_each(|Joint { rest, .. }| {
+            let [tx, ty, tz] = rest.translation.to_array();
+            let [x, y, z, w] = rest.rotation.to_array();
+            let [sx, sy, sz] = rest.scale.to_array();
+            let numbers = [tx, ty, tz, x, y, z, w, sx, sy, sz];
+            numbers
+                .into_iter()
+                .try_for_each(|number| put(number.into()))
+        })
+    })
+}
