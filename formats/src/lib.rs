@@ -1,9 +1,10 @@
-//! The files that Tumble reads and writes: keyframes in (`.dat`), clips in and out (BVH, TUM), results
-//! out (NPY, CSV),
-//! one file a format; what is wrong with an input ([`Diagnostic`]); and sets of any size to
-//! play with ([`generate`](mod@generate)).
+//! The files that Tumble reads and writes: keyframes in (`.dat`), clips in and out (BVH, Parquet,
+//! Arrow, CSV, TUM), results out (NPY, Parquet, Arrow, CSV), one file a format; what is wrong with an
+//! input ([`Diagnostic`]); and sets of any size to play with ([`generate`](mod@generate)).
 
 pub mod adjust;
+#[cfg(feature = "parquet")]
+pub mod arrow;
 pub mod bvh;
 pub mod csv;
 pub mod dat;
@@ -14,14 +15,18 @@ pub mod generate;
 mod grid;
 pub mod keyed;
 pub mod keys;
+pub mod map;
 pub mod motion;
 mod names;
 pub mod npy;
 pub mod output;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod poses;
 mod quaternion;
 pub mod sample;
 mod source;
+mod table;
 mod text;
 pub mod times;
 pub mod tum;

@@ -4,4 +4,9 @@ mod bvh;
 mod dat_fixtures;
 mod fixtures;
 mod support;
+mod table_options;
+#[cfg(feature = "parquet")]
+mod table_results;
+#[cfg(feature = "parquet")]
+mod tables;
 mod tum;

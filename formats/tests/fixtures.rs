@@ -92,6 +92,9 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::FileTooLong,
         Code::Unrecognised,
         Code::Time,
+        Code::ListLength,
+        Code::Map,
+        Code::SeveralClips,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

@@ -36,6 +36,10 @@ impl Job<'_> {
             LayoutArgument::Track => Layout::TrackMajor,
             LayoutArgument::Frame => Layout::FrameMajor,
         };
+        let mut notes = vec![("method", arguments.method.to_string())];
+        if let Samples::Rate { rate, .. } = self.samples {
+            notes.push(("rate", rate.to_string()));
+        }
         let result = ResultShape {
             name,
             set,
@@ -43,6 +47,7 @@ impl Job<'_> {
             layout: target.results()?.layout.unwrap_or(wished),
             order: arguments.order.into(),
             encoding,
+            notes: &notes,
         };
         if let Some(kind) = arguments.what.poses() {
             return self.poses(&result, clip, &frames, kind, target);

@@ -1,0 +1,13 @@
+//! Tables of keys: Parquet, Arrow IPC and CSV are three ways to write the same columns.
+//!
+//! A format reads the names of its columns; the [plan](plan) says which of them are what; the
+//! format then reads those into [columns], and [clips] makes clips of them.
+
+#[cfg(feature = "parquet")]
+pub(crate) mod arrays;
+pub(crate) mod clips;
+pub(crate) mod columns;
+#[cfg(feature = "parquet")]
+pub(crate) mod long;
+pub(crate) mod plan;
+pub(crate) mod times;
