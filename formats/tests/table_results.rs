@@ -2,16 +2,14 @@
 
 use std::io::{self, Write};
 
+use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float16Type, Float32Type, Float64Type, Int16Type, Int64Type};
-use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReader;
 use bytes::Bytes;
 use glam::{Quat, Vec3};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use tumble::{
-    Channel, Encoding, FrameRate, Frames, Layout, MatrixOrder, Timeline, TrackSet,
-};
+use tumble::{Channel, Encoding, FrameRate, Frames, Layout, MatrixOrder, Timeline, TrackSet};
 use tumble_formats::arrow::read_arrow;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::{MotionOptions, ResultShape, WriteError};
@@ -80,7 +78,11 @@ fn sampled_clips_come_back_bit_for_bit() {
         let loaded = read(format, &bytes).unwrap();
         assert!(loaded.warnings.is_empty() && loaded.clips.len() == 1);
         let found = &loaded.clips[0];
-        assert_eq!((found.name.as_deref(), found.rate), (None, sampled.rate), "{format}");
+        assert_eq!(
+            (found.name.as_deref(), found.rate),
+            (None, sampled.rate),
+            "{format}"
+        );
         let names: Vec<String> = (0..3).map(|track| found.set.track_name(track)).collect();
         assert_eq!(names, ["hip", "knee", "hip#2"]);
         for track in 0..3 {
@@ -113,31 +115,55 @@ fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
             _ => &NOTES[1..],
         },
     };
-    let clips = [sampled(&motions[0], 2, "slerp"), sampled(&motions[1], 1, "cubic")];
+    let clips = [
+        sampled(&motions[0], 2, "slerp"),
+        sampled(&motions[1], 1, "cubic"),
+    ];
     for format in ["parquet", "arrow"] {
         let bytes = written(format, &clips).unwrap();
         let loaded = read(format, &bytes).unwrap();
-        let shape = |clip: &Motion| (clip.name.clone().unwrap(), clip.set.track_count(), clip.place);
+        let shape = |clip: &Motion| {
+            (
+                clip.name.clone().unwrap(),
+                clip.set.track_count(),
+                clip.place,
+            )
+        };
         let shapes: Vec<_> = loaded.clips.iter().map(shape).collect();
-        assert_eq!(shapes, [("walk".to_owned(), 2, 0), ("clip1".to_owned(), 1, 1)]);
+        assert_eq!(
+            shapes,
+            [("walk".to_owned(), 2, 0), ("clip1".to_owned(), 1, 1)]
+        );
         assert_eq!(loaded.clips[1].set.track(0).keys, &quats[..3]);
         assert_eq!(loaded.clips[1].set.track_name(0), "knee");
     }
     let bytes = Bytes::from(written("parquet", &clips).unwrap());
     let reader = ParquetRecordBatchReaderBuilder::try_new(bytes).unwrap();
     assert_eq!(reader.metadata().num_row_groups(), 2);
-    let notes = reader.metadata().file_metadata().key_value_metadata().unwrap();
+    let notes = reader
+        .metadata()
+        .file_metadata()
+        .key_value_metadata()
+        .unwrap();
     let note = |key: &str| {
         let found = notes.iter().find(|note| note.key == key);
         found.and_then(|note| note.value.as_deref())
     };
-    assert_eq!((note("method"), note("method.1")), (Some("slerp"), Some("cubic")));
-    let Err(WriteError::Refused(error)) = written("csv", &clips) else { panic!() };
+    assert_eq!(
+        (note("method"), note("method.1")),
+        (Some("slerp"), Some("cubic"))
+    );
+    let Err(WriteError::Refused(error)) = written("csv", &clips) else {
+        panic!()
+    };
     assert_eq!(error.code, Code::SeveralClips);
 }
 
 static NOTES: std::sync::LazyLock<[(&str, String); 2]> = std::sync::LazyLock::new(|| {
-    [("method", "slerp".to_owned()), ("method", "cubic".to_owned())]
+    [
+        ("method", "slerp".to_owned()),
+        ("method", "cubic".to_owned()),
+    ]
 });
 
 /// Times that count from 1970 are written as they are, and a clip without samples is refused.
@@ -165,7 +191,10 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
             times: &[0.5],
             ..sampled.clone()
         };
-        assert!(matches!(written(format, &[short]), Err(WriteError::Io(_))), "{format}");
+        assert!(
+            matches!(written(format, &[short]), Err(WriteError::Io(_))),
+            "{format}"
+        );
     }
 }
 
@@ -192,7 +221,8 @@ impl Shape {
     fn new(tracks: usize, frames: usize) -> Self {
         let mut set = TrackSet::new();
         for track in 0..tracks {
-            set.push(format!("t{track}"), &[0.0], &[Quat::IDENTITY]).unwrap();
+            set.push(format!("t{track}"), &[0.0], &[Quat::IDENTITY])
+                .unwrap();
         }
         let times: Vec<f64> = (0..frames).map(|frame| frame as f64 / 60.0).collect();
         let timeline = Frames::at(times).resolve(tracks, None).unwrap();
@@ -266,8 +296,14 @@ fn every_representation_has_its_columns() {
             let names: Vec<&str> = schema.fields().iter().map(|f| f.name().as_str()).collect();
             assert_eq!(names[..3], ["frame", "time", "track"]);
             assert_eq!(names[3..], encoding.components());
-            assert_eq!(batch.column(0).as_primitive::<Int64Type>().values(), &[0, 0, 1, 1, 2, 2]);
-            assert_eq!(batch.column(1).as_primitive::<Float64Type>().value(5), 2.0 / 60.0);
+            assert_eq!(
+                batch.column(0).as_primitive::<Int64Type>().values(),
+                &[0, 0, 1, 1, 2, 2]
+            );
+            assert_eq!(
+                batch.column(1).as_primitive::<Float64Type>().value(5),
+                2.0 / 60.0
+            );
             let mut wanted = vec![0; encoding.bytes()];
             encoding.encode(&[all[4].to_array()], &mut wanted);
             let found: Vec<u8> = (3..names.len())
@@ -278,10 +314,16 @@ fn every_representation_has_its_columns() {
                             let half = column.as_primitive::<Float16Type>().value(4);
                             half.to_bits().to_ne_bytes().to_vec()
                         }
-                        Encoding::Snorm16 => {
-                            column.as_primitive::<Int16Type>().value(4).to_ne_bytes().to_vec()
-                        }
-                        _ => column.as_primitive::<Float32Type>().value(4).to_ne_bytes().to_vec(),
+                        Encoding::Snorm16 => column
+                            .as_primitive::<Int16Type>()
+                            .value(4)
+                            .to_ne_bytes()
+                            .to_vec(),
+                        _ => column
+                            .as_primitive::<Float32Type>()
+                            .value(4)
+                            .to_ne_bytes()
+                            .to_vec(),
                     }
                 })
                 .collect();
@@ -293,10 +335,18 @@ fn every_representation_has_its_columns() {
         };
         let batch = batches(format, &write(format, &first, &all, 6).unwrap()).remove(0);
         assert_eq!(batch.schema().field(3).name(), "w");
-        assert_eq!(batch.column(3).as_primitive::<Float32Type>().value(4), all[4].w);
-        let clip = &read(format, &write(format, &first, &all, 6).unwrap()).unwrap().clips[0];
+        assert_eq!(
+            batch.column(3).as_primitive::<Float32Type>().value(4),
+            all[4].w
+        );
+        let clip = &read(format, &write(format, &first, &all, 6).unwrap())
+            .unwrap()
+            .clips[0];
         assert_eq!(clip.set.track(0).keys[2], all[4]);
-        let matrices = shape.result(Layout::FrameMajor, Encoding::Matrix3x3(MatrixOrder::RowMajor));
+        let matrices = shape.result(
+            Layout::FrameMajor,
+            Encoding::Matrix3x3(MatrixOrder::RowMajor),
+        );
         let bytes = write(format, &matrices, &all, 6).unwrap();
         assert_eq!(read(format, &bytes).unwrap_err().code, Code::NoRotations);
     }
@@ -322,7 +372,10 @@ fn poses_are_written_as_transforms_that_are_read() {
         let clip = &read(format, &bytes).unwrap().clips[0];
         let moved = clip.set.vector_keys(Channel::Translation, 1).unwrap().keys;
         assert_eq!(moved[2], Vec3::new(5.0, 2.0, 3.0), "{format}");
-        assert_eq!(clip.set.vector_keys(Channel::Scale, 0).unwrap().keys[0].z, 4.0);
+        assert_eq!(
+            clip.set.vector_keys(Channel::Scale, 0).unwrap().keys[0].z,
+            4.0
+        );
         assert_eq!(clip.set.track(0).keys[1], rotations(6)[2]);
     }
 }
@@ -353,7 +406,11 @@ fn rows_are_handed_on_before_the_end() {
             writer.write(&window).unwrap();
             rows += window.len();
             let handed = rows.saturating_sub(waiting);
-            assert!(written.get() >= handed * 8, "{format}: {} of {rows} rows", written.get());
+            assert!(
+                written.get() >= handed * 8,
+                "{format}: {} of {rows} rows",
+                written.get()
+            );
         }
     }
 }

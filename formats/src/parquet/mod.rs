@@ -23,7 +23,7 @@ use crate::table::arrays::{Gather, chosen};
 use crate::table::clips::clips;
 use crate::table::columns::Table;
 use crate::table::long::{write_motion, write_poses, write_rotations};
-use crate::table::plan::Plan;
+use crate::table::plan::{Need, Plan};
 
 /// Parquet files.
 pub static FORMAT: Format = Format {
@@ -132,8 +132,13 @@ fn read_table(
     check_pages(name, &bytes, loaded.metadata(), &roots)?;
 
     // Words stay in the dictionaries that they are stored in: names repeat.
+    let names = plan
+        .wanted
+        .iter()
+        .filter(|wanted| wanted.need == Need::Name);
+    let names: Vec<usize> = names.map(|wanted| wanted.index).collect();
     let with_dictionary = |(index, field): (usize, &Arc<Field>)| match field.data_type() {
-        DataType::Utf8 if roots.binary_search(&index).is_ok() => {
+        DataType::Utf8 if names.contains(&index) => {
             let words = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
             Arc::new(field.as_ref().clone().with_data_type(words))
         }

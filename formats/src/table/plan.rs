@@ -47,7 +47,7 @@ pub(crate) enum Rows {
     /// A key of the track that a column names.
     Keys {
         track: Option<usize>,
-        parts: Parts,
+        parts: Box<Parts>,
         is_world: bool,
     },
     /// A key of every track, each with its name.
@@ -216,7 +216,7 @@ impl Plan {
             let (parts, is_world) = names.parts("")?;
             Rows::Keys {
                 track: names.take("track", Need::Name)?,
-                parts,
+                parts: Box::new(parts),
                 is_world,
             }
         } else {

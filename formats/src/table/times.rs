@@ -20,7 +20,7 @@ const MOST_SECONDS: u64 = 100_000_000_000;
 
 /// Stamps that begin this many seconds from 0 are counted from the whole second of the first:
 /// an f64 of Unix seconds is 0.2 µs wide, one that starts at 0 keeps nanoseconds for 104 days.
-const FAR: i64 = 1_000_000;
+const FAR: u64 = 1_000_000;
 
 /// The times of a table's rows.
 ///
@@ -88,11 +88,11 @@ fn stamps(times: &[i64], unit: TimeUnit) -> Times {
     let per_second = i128::from(unit.per_second());
     let first = times.iter().min().copied().map_or(0, i128::from);
     let whole = first.div_euclid(per_second) as i64;
-    let offset = if whole.abs() < FAR { 0 } else { whole };
-    let offset = i128::from(offset) * per_second;
+    let offset = if whole.unsigned_abs() < FAR { 0 } else { whole };
+    let start = i128::from(offset) * per_second;
     let seconds = times
         .iter()
-        .map(|&time| (i128::from(time) - offset) as f64 / per_second as f64)
+        .map(|&time| (i128::from(time) - start) as f64 / per_second as f64)
         .collect();
     Times {
         seconds,

@@ -9,6 +9,7 @@ use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
 
+use crate::arguments::time;
 use crate::arguments::what::PoseKind;
 use crate::batch::output::Target;
 use crate::batch::room;
@@ -37,7 +38,7 @@ impl Job<'_> {
             LayoutArgument::Frame => Layout::FrameMajor,
         };
         let mut notes = vec![("method", arguments.method.to_string())];
-        if let Samples::Rate { rate, .. } = self.samples {
+        if let time::Samples::Rate { rate, .. } = self.samples {
             notes.push(("rate", rate.to_string()));
         }
         let result = ResultShape {
