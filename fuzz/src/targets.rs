@@ -17,6 +17,9 @@ use tumble_formats::dat::{read_dat, write_dat};
 use tumble_formats::npy::{ComponentOrder, NpyWriter};
 use tumble_formats::times::read_times;
 
+#[path = "tables.rs"]
+pub(crate) mod tables;
+
 /// What a target is given, and what it gives back.
 pub(crate) type Target = fn(&[u8]) -> u64;
 

@@ -7,7 +7,7 @@ use arrow_array::RecordBatch;
 use arrow_ipc::writer::FileWriter;
 use arrow_schema::{ArrowError, Schema};
 
-use crate::table::long::{Head, Sink};
+use crate::table::rows::{Head, Sink};
 
 /// Writes an Arrow file as rows come.
 pub(crate) struct ArrowSink<'a>(FileWriter<&'a mut dyn Write>);

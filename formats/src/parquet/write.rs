@@ -10,7 +10,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 
-use crate::table::long::{Head, Sink};
+use crate::table::rows::{Head, Sink};
 
 /// Rows of a group, which is packed in memory before it is written: up to 30 MB of rotations.
 const GROUP: usize = 1 << 20;

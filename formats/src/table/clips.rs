@@ -1,7 +1,6 @@
 //! From columns to clips: rows are shared out to clips and tracks, keys become unit quaternions at
 //! increasing times.
 
-use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::{DQuat, Quat, Vec3};
@@ -12,7 +11,8 @@ use crate::format::{Loaded, ReadOptions};
 use crate::grid::restore;
 use crate::keys::{Origin, select};
 use crate::motion::Motion;
-use crate::table::columns::{Numbers, Table, Values};
+use crate::table::columns::{Reader, Table, Values};
+use crate::table::groups::{labels, scatter, share_out};
 use crate::table::plan::{Cell, Parts, Plan, Rows};
 use crate::table::times::{Times, times};
 use crate::warnings::Warnings;
@@ -69,75 +69,6 @@ pub(crate) fn clips(
     }
     loaded.warnings = warnings.into_list();
     Ok(loaded)
-}
-
-/// The distinct values of a column in the order in which they come up, and which each row has.
-fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
-    match &table.columns[column].values {
-        Values::Words { codes, words } => {
-            let mut place: Vec<Option<u32>> = vec![None; words.len()];
-            let mut names = Vec::new();
-            let codes = codes.iter().map(|&code| {
-                *place[code as usize].get_or_insert_with(|| {
-                    names.push(words[code as usize].clone());
-                    names.len() as u32 - 1
-                })
-            });
-            (codes.collect(), names)
-        }
-        Values::Numbers(Numbers::Whole(numbers)) => {
-            let mut place = HashMap::new();
-            let mut names = Vec::new();
-            let codes = numbers.iter().map(|&number| {
-                *place.entry(number).or_insert_with(|| {
-                    names.push(number.to_string());
-                    names.len() as u32 - 1
-                })
-            });
-            (codes.collect(), names)
-        }
-        // The plan asked for names.
-        _ => (
-            vec![0; table.rows],
-            vec![table.columns[column].name.clone()],
-        ),
-    }
-}
-
-/// Sorts by code, keeping the order of equal ones: where each entry goes, and the range of each
-/// code.
-fn share_out(codes: &[u32], count: usize) -> (Vec<u32>, Vec<Range<usize>>) {
-    let mut next = vec![0usize; count];
-    for &code in codes {
-        next[code as usize] += 1;
-    }
-    let mut start = 0;
-    let ranges: Vec<Range<usize>> = next
-        .iter_mut()
-        .map(|next| {
-            let range = start..start + *next;
-            (*next, start) = (range.start, range.end);
-            range
-        })
-        .collect();
-    let order = codes.iter().map(|&code| {
-        let place = next[code as usize];
-        next[code as usize] += 1;
-        place as u32
-    });
-    (order.collect(), ranges)
-}
-
-/// Puts each value where `order` says.
-fn scatter<T: Copy>(values: &[T], order: &[u32]) -> Vec<T> {
-    let Some(&first) = values.first() else {
-        return Vec::new();
-    };
-    let mut sorted = vec![first; values.len()];
-    for (&value, &place) in values.iter().zip(order) {
-        sorted[place as usize] = value;
-    }
-    sorted
 }
 
 /// The keys of one track, row by row.
@@ -438,28 +369,4 @@ impl Keys {
 /// A part of a list that may not be there.
 fn part(list: &[Vec3], range: &Range<usize>) -> Vec<Vec3> {
     list.get(range.clone()).unwrap_or_default().to_vec()
-}
-
-/// Reads one number of each row.
-#[derive(Clone, Copy)]
-struct Reader<'a> {
-    numbers: &'a Numbers,
-    ends: Option<&'a [usize]>,
-    place: usize,
-}
-
-impl Reader<'_> {
-    const NONE: Self = Self {
-        numbers: &Numbers::Whole(Vec::new()),
-        ends: None,
-        place: 0,
-    };
-
-    fn at(&self, row: usize) -> f64 {
-        match self.ends {
-            None => self.numbers.at(row),
-            Some(_) if row == 0 => self.numbers.at(self.place),
-            Some(ends) => self.numbers.at(ends[row - 1] + self.place),
-        }
-    }
 }

@@ -125,6 +125,33 @@ impl Column {
     }
 }
 
+/// Reads one number of each row.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader<'a> {
+    pub(crate) numbers: &'a Numbers,
+    /// Where the lists of the rows end, in a column of lists.
+    pub(crate) ends: Option<&'a [usize]>,
+    /// The place of the number in each list.
+    pub(crate) place: usize,
+}
+
+impl Reader<'_> {
+    /// Reads nothing.
+    pub(crate) const NONE: Self = Self {
+        numbers: &Numbers::Whole(Vec::new()),
+        ends: None,
+        place: 0,
+    };
+
+    pub(crate) fn at(&self, row: usize) -> f64 {
+        match self.ends {
+            None => self.numbers.at(row),
+            Some(_) if row == 0 => self.numbers.at(self.place),
+            Some(ends) => self.numbers.at(ends[row - 1] + self.place),
+        }
+    }
+}
+
 /// The refusal of a column whose type does not serve.
 pub(crate) fn wrong_type(file: &str, column: &str, found: &str, need: Need) -> Diagnostic {
     let wanted = match need {

@@ -1,186 +1,19 @@
 //! Results as a long table: a row for each rotation, `frame`, `time`, `track`, then its numbers.
-//!
-//! Rows are handed on in batches of [`BATCH`], so that a result of any length takes the memory of
-//! one batch; a file depends on no window in which the result came.
 
+use std::collections::HashMap;
 use std::io;
 use std::sync::Arc;
 
-use arrow_array::types::Int32Type;
-use arrow_array::{
-    ArrayRef, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array, Int32Array,
-    Int64Array, RecordBatch, StringArray,
-};
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_array::{ArrayRef, StringArray};
 use glam::Quat;
-use half::f16;
-use tumble::{Encoding, Layout, Timeline, TrackSet};
+use tumble::{Encoding, Layout, Timeline};
 
 use crate::format::{ResultShape, ResultWriter, WriteError};
 use crate::motion::Sampled;
 use crate::names::distinct_names;
 use crate::npy::ComponentOrder;
 use crate::poses::{Poses, TRANSFORM, WORLD};
-
-/// Rows of a batch: 2 MB of rotations.
-const BATCH: usize = 1 << 16;
-
-/// What a table is to be, for a format that begins to write it.
-pub(crate) struct Head {
-    pub(crate) schema: SchemaRef,
-    /// What made it: `("method", "slerp")`.
-    pub(crate) notes: Vec<(String, String)>,
-}
-
-/// A format that takes the rows of a table.
-pub(crate) trait Sink {
-    fn write(&mut self, batch: &RecordBatch) -> io::Result<()>;
-
-    /// Ends a part of the table that may be read by itself.
-    fn end_part(&mut self) -> io::Result<()>;
-
-    fn finish(self) -> io::Result<()>;
-}
-
-/// The columns of the batch that is being filled.
-struct Batch {
-    schema: SchemaRef,
-    frames: Vec<i64>,
-    times: Vec<f64>,
-    tracks: Vec<i32>,
-    numbers: Vec<Component>,
-    /// The names of the tracks and of the clip, the same for every batch.
-    track_names: ArrayRef,
-    clip: Option<(i32, ArrayRef)>,
-}
-
-/// The numbers of one component of all rows.
-enum Component {
-    F32(Vec<f32>),
-    F16(Vec<f16>),
-    I16(Vec<i16>),
-}
-
-impl Component {
-    fn of(encoding: Encoding) -> Self {
-        match encoding {
-            Encoding::F16 => Self::F16(Vec::new()),
-            Encoding::Snorm16 => Self::I16(Vec::new()),
-            _ => Self::F32(Vec::new()),
-        }
-    }
-
-    fn data_type(&self) -> DataType {
-        match self {
-            Self::F32(_) => DataType::Float32,
-            Self::F16(_) => DataType::Float16,
-            Self::I16(_) => DataType::Int16,
-        }
-    }
-
-    /// Takes a number of an encoding, in the machine's byte order.
-    fn push(&mut self, bytes: &[u8]) {
-        match self {
-            Self::F32(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
-            Self::F16(list) => list.push(f16::from_bits(bytemuck::pod_read_unaligned(bytes))),
-            Self::I16(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
-        }
-    }
-
-    fn take(&mut self) -> ArrayRef {
-        match self {
-            Self::F32(list) => Arc::new(Float32Array::from(std::mem::take(list))),
-            Self::F16(list) => Arc::new(Float16Array::from(std::mem::take(list))),
-            Self::I16(list) => Arc::new(Int16Array::from(std::mem::take(list))),
-        }
-    }
-}
-
-fn invalid(message: impl Into<String>) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidInput, message.into())
-}
-
-/// A dictionary column's type.
-fn names_type() -> DataType {
-    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
-}
-
-fn names(set: &TrackSet) -> ArrayRef {
-    Arc::new(StringArray::from_iter_values(distinct_names(set)))
-}
-
-fn dictionary(codes: Vec<i32>, names: &ArrayRef) -> io::Result<ArrayRef> {
-    let codes = Int32Array::from(codes);
-    let array = DictionaryArray::<Int32Type>::try_new(codes, Arc::clone(names));
-    Ok(Arc::new(array.map_err(io::Error::other)?))
-}
-
-impl Batch {
-    /// For a table whose numbers are called so.
-    fn new(
-        components: impl IntoIterator<Item = (String, Component)>,
-        track_names: ArrayRef,
-        clip: Option<(i32, ArrayRef)>,
-    ) -> io::Result<Self> {
-        if i32::try_from(track_names.len()).is_err() {
-            return Err(invalid(format!(
-                "{} tracks are more than 2^31",
-                track_names.len()
-            )));
-        }
-        let mut fields = vec![
-            Field::new("frame", DataType::Int64, false),
-            Field::new("time", DataType::Float64, false),
-            Field::new("track", names_type(), false),
-        ];
-        if clip.is_some() {
-            fields.push(Field::new("clip", names_type(), false));
-        }
-        let mut numbers = Vec::new();
-        for (name, component) in components {
-            fields.push(Field::new(name, component.data_type(), false));
-            numbers.push(component);
-        }
-        Ok(Self {
-            schema: Arc::new(Schema::new(fields)),
-            frames: Vec::new(),
-            times: Vec::new(),
-            tracks: Vec::new(),
-            numbers,
-            track_names,
-            clip,
-        })
-    }
-
-    fn row(&mut self, frame: usize, time: f64, track: usize) {
-        self.frames.push(frame as i64);
-        self.times.push(time);
-        self.tracks.push(track as i32);
-    }
-
-    fn is_full(&self) -> bool {
-        self.frames.len() >= BATCH
-    }
-
-    /// Hands on the rows that there are.
-    fn flush(&mut self, sink: &mut impl Sink) -> io::Result<()> {
-        if self.frames.is_empty() {
-            return Ok(());
-        }
-        let rows = self.frames.len();
-        let mut columns: Vec<ArrayRef> = vec![
-            Arc::new(Int64Array::from(std::mem::take(&mut self.frames))),
-            Arc::new(Float64Array::from(std::mem::take(&mut self.times))),
-            dictionary(std::mem::take(&mut self.tracks), &self.track_names)?,
-        ];
-        if let Some((clip, names)) = &self.clip {
-            columns.push(dictionary(vec![*clip; rows], names)?);
-        }
-        columns.extend(self.numbers.iter_mut().map(Component::take));
-        let batch = RecordBatch::try_new(Arc::clone(&self.schema), columns);
-        sink.write(&batch.map_err(io::Error::other)?)
-    }
-}
+use crate::table::rows::{Batch, Component, Head, Sink, invalid, names};
 
 /// Begins a table of a result's rotations.
 pub(crate) fn write_rotations<'a, S: Sink + 'a>(
@@ -373,7 +206,7 @@ pub(crate) fn write_motion<S: Sink>(
 
 /// The names of the tracks of all clips, each once, and which each track has.
 fn track_names(clips: &[Sampled<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
-    let mut place = std::collections::HashMap::new();
+    let mut place = HashMap::new();
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for sampled in clips {

@@ -6,8 +6,15 @@
 #[cfg(feature = "parquet")]
 pub(crate) mod arrays;
 pub(crate) mod clips;
+#[cfg_attr(
+    not(feature = "parquet"),
+    expect(dead_code, reason = "CSV alone has no lists, stamps or f32")
+)]
 pub(crate) mod columns;
+pub(crate) mod groups;
 #[cfg(feature = "parquet")]
 pub(crate) mod long;
 pub(crate) mod plan;
+#[cfg(feature = "parquet")]
+pub(crate) mod rows;
 pub(crate) mod times;
