@@ -293,3 +293,26 @@ fn kernel_of(expression: &str) -> Vec<u8> {
     let words = naga::back::spv::write_vec(&module, &info, &options, None).unwrap();
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
+
+#[test]
+fn parquet() {
+    // Ends of files, types and lengths of Thrift's compact protocol.
+    let words = ["PAR1", "\x15\0", "\x15\u{7f}", "\x18\x04", "\x19\x1c", "\x2c", "\0\0\0\0PAR1"];
+    fuzz("parquet", targets::tables::parquet, fixtures("parquet"), &words);
+}
+
+#[test]
+fn arrow() {
+    let words = ["ARROW1", "ARROW1\0\0", "\0\0\0\0", "\x01\0\0\0\0\0\0\0", "\x08\0", "\x7f"];
+    fuzz("arrow", targets::tables::arrow, fixtures("arrow"), &words);
+}
+
+#[test]
+fn csv() {
+    let words = [
+        "time,", "track,", "x,y,z,w", "hip.x", "hip.w", "tx,ty,tz", "episode_index", "frame", ",", "\"",
+        "\n", "\r\n", "\n0,", "0.5", "-0", "1e39", "1e-400", "nan", "1403636579763555584",
+        "9223372036854775808", " ", "\u{feff}", "\u{e4}", "\0",
+    ];
+    fuzz("csv", targets::tables::csv, fixtures("csv"), &words);
+}

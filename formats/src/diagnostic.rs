@@ -208,6 +208,19 @@ codes! {
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
     NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear` names arrays of numbers with an entry for each frame, which are not keys.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
+    TableDamaged = "E401", "a table that cannot be read", "The file is cut or damaged, or written in a way that is not read here; the reason is given. Rows count from 0.";
+    TableClaims = "E402", "more than the file can hold", "The file announces more rows or bytes than could be packed into its length; nothing was read.";
+    Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
+    NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
+    NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another.";
+    ColumnMissing = "E406", "a column is missing", "A name that --map gives, or the others of a group of columns such as `tx ty tz`.";
+    ColumnTwice = "E407", "two columns of one name", "It cannot be told which of them is meant; rename one.";
+    ColumnType = "E408", "a column of another type", "Rotations, translations and scales are numbers, names are text or whole numbers, times are numbers or timestamps.";
+    Null = "E409", "a null", "A key without a value is no key; fill it in or remove its row. Rows count from 0.";
+    WholeTimes = "E410", "times that are whole numbers", "They may be seconds or nanoseconds: --time-unit s, ms, us or ns says which.";
+    ListLength = "E411", "a list of another length", "A rotation takes four numbers of a list, a translation or a scale three; --map NAME=LIST[3:7] says which.";
+    NoRows = "E412", "a table without rows", "It has columns but no keys.";
+    SeveralClips = "E413", "several clips for one table", "A wide table holds one clip; write them to files of their own, or as Parquet.";
     // E5xx and W5xx: trajectories.
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";

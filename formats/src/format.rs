@@ -16,20 +16,28 @@ use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::source::Source;
 use crate::text::lines::Limits;
+#[cfg(feature = "parquet")]
+use crate::{arrow, parquet};
 use crate::{bvh, csv, dat, gltf, npy, npz, tum};
 
 /// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
 /// format that can be read is that of inputs which tell neither way, the first that can be written
 /// that of such outputs.
-pub static FORMATS: [&Format; 7] = [
+pub static FORMATS: [&Format; COUNT] = [
     &dat::FORMAT,
     &gltf::FORMAT,
     &bvh::FORMAT,
     &npz::FORMAT,
     &npy::FORMAT,
+    #[cfg(feature = "parquet")]
+    &parquet::FORMAT,
+    #[cfg(feature = "parquet")]
+    &arrow::FORMAT,
     &csv::FORMAT,
     &tum::FORMAT,
 ];
+
+const COUNT: usize = if cfg!(feature = "parquet") { 9 } else { 7 };
 
 /// A file format.
 pub struct Format {
@@ -229,6 +237,8 @@ pub struct ResultShape<'a> {
     pub order: ComponentOrder,
     /// What a rotation is written as.
     pub encoding: Encoding,
+    /// What made them, for formats that have room for it: `("method", "slerp")`.
+    pub notes: &'a [(&'a str, String)],
 }
 
 impl Format {

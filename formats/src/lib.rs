@@ -4,6 +4,8 @@
 //! with ([`generate`](mod@generate)).
 
 pub mod adjust;
+#[cfg(feature = "parquet")]
+pub mod arrow;
 pub mod bvh;
 pub mod csv;
 pub mod dat;
@@ -21,10 +23,13 @@ mod names;
 pub mod npy;
 pub mod npz;
 pub mod output;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod poses;
 mod quaternion;
 pub mod sample;
 mod source;
+mod table;
 mod text;
 pub mod times;
 pub mod tum;

@@ -3,7 +3,8 @@
 //!
 //! Entries are separated by commas. Each is `name=source`, then perhaps some of the source's last
 //! axis (`[3:7]` from 3 and before 7, `[0]` one alone), then perhaps `:xyzw` or `:wxyz`, the order of
-//! a quaternion, and `:track` or `:frame`, the axis that comes first.
+//! a quaternion, and `:track` or `:frame`, the axis that comes first. A bracket behind a blank belongs
+//! to the source's name: `time=#timestamp [ns]`.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -113,7 +114,9 @@ impl FromStr for Entry {
         let entry = || text.to_owned();
         let wrong = || MapError::Entry { entry: entry() };
         let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
-        let end = rest.find(['[', ':']).unwrap_or(rest.len());
+        let is_name = |at: usize| rest.as_bytes()[at] == b'[' && rest[..at].ends_with(' ');
+        let mut ends = rest.match_indices(['[', ':']).map(|(at, _)| at);
+        let end = ends.find(|&at| !is_name(at)).unwrap_or(rest.len());
         let (source, rest) = rest.split_at(end);
         let (name, source) = (name.trim(), source.trim());
         if name.is_empty() || source.is_empty() {
@@ -197,6 +200,13 @@ mod tests {
         );
         assert_eq!(hand.order, Some(ComponentOrder::Xyzw));
         assert_eq!(map.get("z").unwrap().columns, Some(0..1));
+    }
+
+    #[test]
+    fn brackets_behind_a_blank_belong_to_the_name() {
+        let map: Map = "time=#timestamp [ns],w=q_RS_w []".parse().unwrap();
+        assert_eq!(map.get("time").unwrap().source, "#timestamp [ns]");
+        assert_eq!(map.get("w").unwrap().source, "q_RS_w []");
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use tumble::TrackSet;
+
 /// The name of joint `index` (from 0) in a file whose names are words and differ: blanks and braces
 /// become `_`, a joint without a name is `joint7`, and a name that is taken gets the joint's number
 /// behind it, `hand#12`. `taken` collects what was given.
@@ -19,6 +21,23 @@ pub(crate) fn usable_name(name: &str, index: usize, taken: &mut HashSet<String>)
     }
     taken.insert(usable.clone());
     usable
+}
+
+/// The names of a set's tracks, told apart: a name that is taken gets the track's number behind it.
+pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let names = (0..set.track_count()).map(|track| {
+        let mut name = set.track_name(track);
+        if taken.contains(&name) {
+            name = format!("{name}#{track}");
+        }
+        while taken.contains(&name) {
+            name.push('_');
+        }
+        taken.insert(name.clone());
+        name
+    });
+    names.collect()
 }
 
 #[cfg(test)]

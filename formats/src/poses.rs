@@ -74,7 +74,7 @@ impl Poses<'_> {
         csv.flush()
     }
 
-    fn check(&self) -> io::Result<()> {
+    pub(crate) fn check(&self) -> io::Result<()> {
         let needed = self.timeline.len() * self.set.track_count() * self.components.len();
         if self.numbers.len() == needed {
             return Ok(());

@@ -9,5 +9,10 @@ mod gltf_bake;
 mod gltf_new;
 mod npz;
 mod support;
+mod table_options;
+#[cfg(feature = "parquet")]
+mod table_results;
+#[cfg(feature = "parquet")]
+mod tables;
 mod tum;
 mod validator;

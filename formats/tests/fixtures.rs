@@ -109,6 +109,8 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::Layout,
         Code::NotPerFrame,
         Code::LeftOut,
+        Code::ListLength,
+        Code::SeveralClips,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

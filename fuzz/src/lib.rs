@@ -13,6 +13,9 @@ pub fn target(name: &str, data: &[u8]) {
         "frames" => targets::frames,
         "tracks" => targets::tracks,
         "spirv" => targets::spirv,
+        "parquet" => targets::tables::parquet,
+        "arrow" => targets::tables::arrow,
+        "csv" => targets::tables::csv,
         _ => panic!("there is no target {name}"),
     };
     target(data);

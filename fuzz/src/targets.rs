@@ -21,6 +21,9 @@ use tumble_formats::{Diagnostic, Place};
 #[path = "motion.rs"]
 pub(crate) mod motion;
 
+#[path = "tables.rs"]
+pub(crate) mod tables;
+
 /// What a target is given, and what it gives back.
 pub(crate) type Target = fn(&[u8]) -> u64;
 

@@ -9,6 +9,7 @@ use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
 
+use crate::arguments::time;
 use crate::arguments::what::PoseKind;
 use crate::batch::output::Target;
 use crate::batch::room;
@@ -36,6 +37,10 @@ impl Job<'_> {
             LayoutArgument::Track => Layout::TrackMajor,
             LayoutArgument::Frame => Layout::FrameMajor,
         };
+        let mut notes = vec![("method", arguments.method.to_string())];
+        if let time::Samples::Rate { rate, .. } = self.samples {
+            notes.push(("rate", rate.to_string()));
+        }
         let result = ResultShape {
             name,
             set,
@@ -43,6 +48,7 @@ impl Job<'_> {
             layout: target.results()?.layout.unwrap_or(wished),
             order: arguments.order.into(),
             encoding,
+            notes: &notes,
         };
         if let Some(kind) = arguments.what.poses() {
             return self.poses(&result, clip, &frames, kind, target);

@@ -1,6 +1,9 @@
 //! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame; or the
 //! numbers of another encoding in the place of those of quaternions.
 
+mod motion;
+pub mod read;
+
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -13,10 +16,10 @@ use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
 /// Comma-separated values.
 pub static FORMAT: Format = Format {
     name: "csv",
-    summary: "text, a row for each frame",
+    summary: "text, a row for each frame or key",
     extensions: &[],
     probe: |_| false,
-    read: None,
+    read: Some(read::open_csv),
     write: Some(WriteResults {
         is_text: true,
         // A row holds one frame.
@@ -33,7 +36,7 @@ pub static FORMAT: Format = Format {
         },
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),
-    write_motion: None,
+    write_motion: Some(|clips, options, out| motion::write_motion(clips, options, out)),
     many_clips: false,
 };
 
@@ -156,7 +159,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
 }
 
 /// The conversion that the crate offers loses the kind, a broken pipe's too.
-fn io_error(error: ::csv::Error) -> io::Error {
+pub(crate) fn io_error(error: ::csv::Error) -> io::Error {
     match error.into_kind() {
         ::csv::ErrorKind::Io(error) => error,
         other => io::Error::other(format!("{other:?}")),

@@ -1,0 +1,131 @@
+//! Arrow IPC, as a file (Feather 2) and as a stream.
+
+mod messages;
+mod write;
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_buffer::Buffer;
+use arrow_ipc::convert::try_fb_to_schema;
+use arrow_ipc::reader::{read_dictionary, read_record_batch};
+
+use crate::arrow::messages::{Body, Messages};
+use crate::arrow::write::ArrowSink;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Format, Loaded, ReadOptions, WriteResults};
+use crate::source::Source;
+use crate::table::arrays::{Gather, chosen};
+use crate::table::clips::clips;
+use crate::table::columns::Table;
+use crate::table::long::{write_motion, write_poses, write_rotations};
+use crate::table::plan::Plan;
+
+/// Arrow IPC files, and streams.
+pub static FORMAT: Format = Format {
+    name: "arrow",
+    summary: "a table in columns as it lies in memory, a row for each key",
+    extensions: &["arrows", "feather", "ipc"],
+    probe: |start| start.starts_with(messages::MAGIC) || messages::is_stream(start),
+    read: Some(open_arrow),
+    write: Some(WriteResults {
+        is_text: false,
+        layout: None,
+        // The frame, the time and the track beside it.
+        rotation_bytes: |encoding| encoding.bytes() as f64 + 20.0,
+        rotations: |out, result| write_rotations(result, |table| ArrowSink::new(out, table)),
+        poses: |poses, out| write_poses(poses, |table| ArrowSink::new(out, table)),
+    }),
+    write_motion: Some(|clips, _, out| {
+        write_motion(clips, |table| ArrowSink::new(out, table)).map(|()| Vec::new())
+    }),
+    many_clips: true,
+};
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_arrow(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    read_arrow(&name, source.into_bytes(options.limits.file)?, options)
+}
+
+/// Reads the bytes of a file or a stream; `name` is what messages call it.
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_arrow(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let (table, plan) = read_table(name, bytes, options)?;
+    clips(&table, &plan, options)
+}
+
+fn read_table(
+    name: &str,
+    bytes: Vec<u8>,
+    options: &ReadOptions,
+) -> Result<(Table, Plan), Diagnostic> {
+    let damaged = |error: &dyn std::fmt::Display| {
+        let message = format!("{error}; the file is damaged, or written in a way that is not read");
+        Diagnostic::new(name, Code::TableDamaged, message)
+    };
+    let bytes = Buffer::from_vec(bytes);
+    let mut messages = Messages::of(name, &bytes)?;
+    let ipc_schema = messages.schema()?;
+    let schema = try_fb_to_schema(ipc_schema).map_err(|error| damaged(&error))?;
+    let names: Vec<String> = schema
+        .fields()
+        .iter()
+        .map(|field| field.name().clone())
+        .collect();
+    let plan = Plan::of(name, &names, options)?;
+    let types = plan
+        .wanted
+        .iter()
+        .map(|wanted| schema.field(wanted.index).data_type().clone());
+    let mut gather = Gather::new(name, &plan.wanted, &types.collect::<Vec<_>>())?;
+    // Only columns that are wanted are decoded, and only their dictionaries: their types are known
+    // to be simple.
+    let mut projection: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
+    projection.sort_unstable();
+    projection.dedup();
+    let dictionaries_wanted: Vec<i64> = ipc_schema
+        .fields()
+        .into_iter()
+        .flat_map(|fields| projection.iter().map(move |&index| fields.get(index)))
+        .filter_map(|field| Some(field.dictionary()?.id()))
+        .collect();
+    let places = plan.wanted.iter();
+    let places: Vec<usize> = places
+        .map(|wanted| projection.partition_point(|&index| index < wanted.index))
+        .collect();
+    let schema = Arc::new(schema);
+    let mut dictionaries = HashMap::new();
+    while let Some(message) = messages.next()? {
+        let version = message.version;
+        match message.body {
+            Body::Dictionary(batch) if dictionaries_wanted.contains(&batch.id()) => {
+                read_dictionary(&message.data, batch, &schema, &mut dictionaries, &version)
+                    .map_err(|error| damaged(&error))?;
+            }
+            Body::Dictionary(_) => {}
+            Body::Rows(batch) => {
+                let batch = read_record_batch(
+                    &message.data,
+                    batch,
+                    Arc::clone(&schema),
+                    &dictionaries,
+                    Some(&projection),
+                    &version,
+                )
+                .map_err(|error| damaged(&error))?;
+                let columns =
+                    chosen(&batch, &places).ok_or_else(|| damaged(&"a column is not there"))?;
+                gather.push(&columns, batch.num_rows())?;
+            }
+        }
+    }
+    Ok((gather.finish()?, plan))
+}

@@ -1,0 +1,74 @@
+//! A sampled clip as CSV: a row for each sample, w first, then what moves and scales.
+
+use std::io::{self, Write};
+
+use crate::csv::io_error;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{MotionOptions, WriteError};
+use crate::motion::Sampled;
+use crate::names::distinct_names;
+use crate::poses::{TRANSFORM, WORLD};
+
+/// Writes one clip; the names of its columns are those that are read.
+///
+/// # Errors
+/// When writing fails, or there are several clips.
+pub(crate) fn write_motion(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let [sampled] = clips else {
+        let message = format!(
+            "{} clips, and CSV holds one; name one, or write a directory or Parquet",
+            clips.len()
+        );
+        return Err(Diagnostic::new(&options.name, Code::SeveralClips, message).into());
+    };
+    let set = &sampled.clip.set;
+    let tracks = set.track_count();
+    let (moved, scaled) = (!sampled.translations.is_empty(), !sampled.scales.is_empty());
+    let moves = if sampled.clip.is_world {
+        &WORLD[..3]
+    } else {
+        &TRANSFORM[..3]
+    };
+    let mut components = vec!["w", "x", "y", "z"];
+    components.extend(moves.iter().filter(|_| moved));
+    components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
+    let all = sampled.times.len().saturating_mul(tracks);
+    let fits = |length: usize| length == all || length == 0;
+    if sampled.rotations.len() != all
+        || !fits(sampled.translations.len())
+        || !fits(sampled.scales.len())
+    {
+        let message = "a clip's samples are not as many as its times and tracks";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
+    }
+    let mut writer = ::csv::Writer::from_writer(out);
+    let mut row = vec!["frame".to_owned(), "time".to_owned()];
+    for name in distinct_names(set) {
+        row.extend(
+            components
+                .iter()
+                .map(|component| format!("{name}.{component}")),
+        );
+    }
+    writer.write_record(&row).map_err(io_error)?;
+    for (frame, time) in sampled.times.iter().enumerate() {
+        row.clear();
+        row.push(frame.to_string());
+        row.push((time + sampled.clip.time_offset as f64).to_string());
+        for place in frame * tracks..(frame + 1) * tracks {
+            let q = sampled.rotations[place];
+            row.extend([q.w, q.x, q.y, q.z].map(|number| number.to_string()));
+            let vectors = [(moved, sampled.translations), (scaled, sampled.scales)];
+            for (_, list) in vectors.into_iter().filter(|(there, _)| *there) {
+                row.extend(list[place].to_array().map(|number| number.to_string()));
+            }
+        }
+        writer.write_record(&row).map_err(io_error)?;
+    }
+    writer.flush()?;
+    Ok(Vec::new())
+}

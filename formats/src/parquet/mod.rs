@@ -1,0 +1,173 @@
+//! Parquet: tables in columns, compressed page by page.
+
+mod pages;
+mod write;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_schema::{DataType, Field, Schema};
+use bytes::Bytes;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
+};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Format, Loaded, ReadOptions, WriteResults};
+use crate::parquet::pages::check_pages;
+use crate::parquet::write::ParquetSink;
+use crate::source::Source;
+use crate::table::arrays::{Gather, chosen};
+use crate::table::clips::clips;
+use crate::table::columns::Table;
+use crate::table::long::{write_motion, write_poses, write_rotations};
+use crate::table::plan::{Need, Plan};
+
+/// Parquet files.
+pub static FORMAT: Format = Format {
+    name: "parquet",
+    summary: "a table in columns, a row for each key",
+    extensions: &["pq"],
+    probe: |start| start.starts_with(MAGIC),
+    read: Some(open_parquet),
+    write: Some(WriteResults {
+        is_text: false,
+        layout: None,
+        // Rotations that stand still are compressed to next to nothing.
+        rotation_bytes: |_| 0.0,
+        rotations: |out, result| write_rotations(result, |table| ParquetSink::new(out, table)),
+        poses: |poses, out| write_poses(poses, |table| ParquetSink::new(out, table)),
+    }),
+    write_motion: Some(|clips, _, out| {
+        write_motion(clips, |table| ParquetSink::new(out, table)).map(|()| Vec::new())
+    }),
+    many_clips: true,
+};
+
+const MAGIC: &[u8] = b"PAR1";
+
+/// The length of the metadata and the magic number, at the end.
+const TAIL: usize = 8;
+
+/// Rows that are decoded at once.
+const BATCH: usize = 1 << 16;
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_parquet(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    read_parquet(&name, source.into_bytes(options.limits.file)?, options)
+}
+
+/// Reads the bytes of a file; `name` is what messages call it.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn read_parquet(
+    name: &str,
+    bytes: Vec<u8>,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
+    check_tail(name, &bytes)?;
+    // The decoders of the crate assert what a damaged page does not keep. Nothing that they have
+    // touched is used after that.
+    let bytes = Bytes::from(bytes);
+    let decoded = catch_unwind(AssertUnwindSafe(|| read_table(name, bytes, options)));
+    let (table, plan) = decoded.unwrap_or_else(|_| {
+        let message = "a page cannot be decoded; the file is damaged, write it again";
+        Err(Diagnostic::new(name, Code::TableDamaged, message))
+    })?;
+    clips(&table, &plan, options)
+}
+
+/// Refuses what does not end as Parquet files do.
+fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
+    let refuse = |message: String| Err(Diagnostic::new(name, Code::TableDamaged, message));
+    if !bytes.starts_with(MAGIC) {
+        return refuse("the file does not begin with PAR1; it is not Parquet".to_owned());
+    }
+    let Some((_, tail)) = bytes[MAGIC.len()..].split_last_chunk::<TAIL>() else {
+        return refuse(format!("the file has {} bytes; it is cut", bytes.len()));
+    };
+    let [a, b, c, d, magic @ ..] = *tail;
+    if magic != *MAGIC {
+        return refuse("the file does not end with PAR1; it is cut, copy it again".to_owned());
+    }
+    let (length, most) = (
+        u32::from_le_bytes([a, b, c, d]),
+        bytes.len() - MAGIC.len() - TAIL,
+    );
+    if length as usize > most {
+        return refuse(format!(
+            "its metadata is said to have {length} bytes of {most}; the file is damaged"
+        ));
+    }
+    Ok(())
+}
+
+fn read_table(
+    name: &str,
+    bytes: Bytes,
+    options: &ReadOptions,
+) -> Result<(Table, Plan), Diagnostic> {
+    let damaged = |error: &dyn std::fmt::Display| {
+        let message = format!("{error}; the file is damaged, or written in a way that is not read");
+        Diagnostic::new(name, Code::TableDamaged, message)
+    };
+    // The types that Parquet itself has tell enough; a schema that a writer left beside them is one
+    // more thing that may be wrong.
+    let own = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let loaded = ArrowReaderMetadata::load(&bytes, own).map_err(|error| damaged(&error))?;
+    let fields = loaded.schema().fields();
+    let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
+    let plan = Plan::of(name, &names, options)?;
+    let mut roots: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
+    roots.sort_unstable();
+    roots.dedup();
+    check_pages(name, &bytes, loaded.metadata(), &roots)?;
+
+    // Words stay in the dictionaries that they are stored in: names repeat.
+    let names = plan
+        .wanted
+        .iter()
+        .filter(|wanted| wanted.need == Need::Name);
+    let names: Vec<usize> = names.map(|wanted| wanted.index).collect();
+    let with_dictionary = |(index, field): (usize, &Arc<Field>)| match field.data_type() {
+        DataType::Utf8 if names.contains(&index) => {
+            let words = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+            Arc::new(field.as_ref().clone().with_data_type(words))
+        }
+        _ => Arc::clone(field),
+    };
+    let fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
+    let wanted_types = plan
+        .wanted
+        .iter()
+        .map(|wanted| fields[wanted.index].data_type().clone());
+    let mut gather = Gather::new(name, &plan.wanted, &wanted_types.collect::<Vec<_>>())?;
+    let own = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    let metadata = ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), own)
+        .map_err(|error| damaged(&error))?;
+    let mask = ProjectionMask::roots(metadata.parquet_schema(), roots.iter().copied());
+    let batches = ParquetRecordBatchReaderBuilder::new_with_metadata(bytes, metadata)
+        .with_projection(mask)
+        .with_batch_size(BATCH)
+        .build()
+        .map_err(|error| damaged(&error))?;
+    let places = plan
+        .wanted
+        .iter()
+        .map(|wanted| roots.partition_point(|&root| root < wanted.index));
+    let places: Vec<usize> = places.collect();
+    for batch in batches {
+        let batch = batch.map_err(|error| damaged(&error))?;
+        let columns = chosen(&batch, &places).ok_or_else(|| damaged(&"a column is not there"))?;
+        gather.push(&columns, batch.num_rows())?;
+    }
+    Ok((gather.finish()?, plan))
+}

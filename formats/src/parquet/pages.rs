@@ -1,0 +1,285 @@
+//! What a Parquet file claims, held against its length before anything is decoded. The crate makes
+//! room for a page by the length in the page's header, up to 2 GiB for a header of 20 bytes.
+
+use std::ops::Range;
+
+use parquet::basic::Compression;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+
+use crate::diagnostic::{Code, Diagnostic};
+
+/// A file holds at most so many numbers a byte. Equal numbers are packed closest: a page of
+/// 2^20 of them may have 100 bytes, but the times beside them differ and take a byte each.
+const MOST_NUMBERS: u64 = 1024;
+
+/// A page may be this long whatever it is packed into; writers begin a new one after 1 MiB.
+const FREE_PAGE: u64 = 16 << 20;
+
+/// A longer page is at most this many times as long as what it is packed into.
+const MOST_PACKED: u64 = 64;
+
+/// Checks the pages of some columns.
+///
+/// # Errors
+/// When they lie outside the file, are compressed in a way that is not read, or claim more numbers
+/// or bytes than the file can hold.
+pub(crate) fn check_pages(
+    name: &str,
+    bytes: &[u8],
+    metadata: &ParquetMetaData,
+    roots: &[usize],
+) -> Result<(), Diagnostic> {
+    let refuse = |code, message: String| Diagnostic::new(name, code, message);
+    let claims = |numbers: u64, what: &str| {
+        let message = format!(
+            "the file has {} bytes and is said to hold {numbers} {what}; it is damaged",
+            bytes.len()
+        );
+        refuse(Code::TableClaims, message)
+    };
+    let most = bytes.len() as u64 * MOST_NUMBERS;
+    let schema = metadata.file_metadata().schema_descr();
+    let (mut rows, mut numbers) = (0u64, 0u64);
+    for group in metadata.row_groups() {
+        rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
+        if rows > most {
+            return Err(claims(rows, "rows"));
+        }
+        for (leaf, column) in group.columns().iter().enumerate() {
+            let root = (leaf < schema.num_columns()).then(|| schema.get_column_root_idx(leaf));
+            if root.is_none_or(|root| roots.binary_search(&root).is_err()) {
+                continue;
+            }
+            let path = column.column_path().string();
+            check_compression(name, &path, column.compression())?;
+            let outside = || {
+                let message =
+                    format!("the pages of column `{path}` lie outside the file; it is cut");
+                refuse(Code::TableDamaged, message)
+            };
+            let mut range = chunk(column, bytes.len()).ok_or_else(outside)?;
+            while !range.is_empty() {
+                let page = page(&bytes[range.clone()]).ok_or_else(outside)?;
+                let packed = page.compressed as u64;
+                if page.uncompressed > FREE_PAGE.max(packed.saturating_mul(MOST_PACKED)) {
+                    let message = format!(
+                        "a page of column `{path}` is said to have {} bytes, packed into {packed}; \
+                         the file is damaged",
+                        page.uncompressed
+                    );
+                    return Err(refuse(Code::TableClaims, message));
+                }
+                numbers = numbers.saturating_add(page.values);
+                if numbers > most {
+                    return Err(claims(numbers, "numbers"));
+                }
+                let next = range.start + page.header + page.compressed;
+                if next > range.end {
+                    return Err(outside());
+                }
+                range.start = next;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_compression(name: &str, path: &str, found: Compression) -> Result<(), Diagnostic> {
+    match found {
+        Compression::UNCOMPRESSED
+        | Compression::SNAPPY
+        | Compression::LZ4
+        | Compression::LZ4_RAW
+        | Compression::ZSTD(_) => Ok(()),
+        other => {
+            let found = other.to_string();
+            // Its level is written behind it.
+            let found = found.split('(').next().unwrap_or_default();
+            let message = format!(
+                "column `{path}` is compressed by {found}; write it with snappy, zstd or LZ4"
+            );
+            Err(Diagnostic::new(name, Code::Compression, message))
+        }
+    }
+}
+
+/// Where the pages of a column are.
+fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range<usize>> {
+    let start = column
+        .dictionary_page_offset()
+        .unwrap_or(column.data_page_offset());
+    let start = usize::try_from(start).ok()?;
+    let end = start.checked_add(usize::try_from(column.compressed_size()).ok()?)?;
+    (end <= length).then_some(start..end)
+}
+
+/// What the header of a page says.
+struct Page {
+    /// Bytes of the header, and of the page behind it.
+    header: usize,
+    compressed: usize,
+    uncompressed: u64,
+    values: u64,
+}
+
+/// Reads a page's header. Its fields (parquet.thrift, `PageHeader`): 2 is the uncompressed and 3 the
+/// compressed length; 5, 7 and 8 are the headers of data pages and dictionaries, whose field 1 is
+/// the number of values.
+fn page(bytes: &[u8]) -> Option<Page> {
+    let mut input = Compact { bytes, at: 0 };
+    let (mut uncompressed, mut compressed, mut values) = (None, None, 0);
+    let mut id = 0;
+    while let Some(kind) = input.field(&mut id)? {
+        match (id, kind) {
+            (2, INTEGER) => uncompressed = Some(input.integer()?),
+            (3, INTEGER) => compressed = Some(input.integer()?),
+            (5 | 7 | 8, STRUCT) => {
+                let mut id = 0;
+                while let Some(kind) = input.field(&mut id)? {
+                    match (id, kind) {
+                        (1, INTEGER) => values = input.integer()?,
+                        _ => input.skip(kind, 0)?,
+                    }
+                }
+            }
+            _ => input.skip(kind, 0)?,
+        }
+    }
+    Some(Page {
+        header: input.at,
+        compressed: usize::try_from(compressed?).ok()?,
+        uncompressed: u64::try_from(uncompressed?).ok()?,
+        values: u64::try_from(values).ok()?,
+    })
+}
+
+/// Thrift's compact protocol, as far as page headers use it.
+struct Compact<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BYTE: u8 = 3;
+const SHORT: u8 = 4;
+const INTEGER: u8 = 5;
+const LONG: u8 = 6;
+const DOUBLE: u8 = 7;
+const BINARY: u8 = 8;
+const LIST: u8 = 9;
+const SET: u8 = 10;
+const STRUCT: u8 = 12;
+
+impl Compact<'_> {
+    fn byte(&mut self) -> Option<u8> {
+        let byte = *self.bytes.get(self.at)?;
+        self.at += 1;
+        Some(byte)
+    }
+
+    fn varint(&mut self) -> Option<u64> {
+        let mut number = 0;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte()?;
+            number |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                return Some(number);
+            }
+        }
+        None
+    }
+
+    /// A signed number, zigzag.
+    fn integer(&mut self) -> Option<i64> {
+        let number = self.varint()?;
+        Some((number >> 1) as i64 ^ -((number & 1) as i64))
+    }
+
+    /// The type of the next field, whose id goes to `id`; `Some(None)` at the end of the struct.
+    fn field(&mut self, id: &mut i64) -> Option<Option<u8>> {
+        let byte = self.byte()?;
+        if byte == 0 {
+            return Some(None);
+        }
+        *id = match byte >> 4 {
+            0 => self.integer()?,
+            step => id.checked_add(i64::from(step))?,
+        };
+        Some(Some(byte & 0x0f))
+    }
+
+    fn skip(&mut self, kind: u8, depth: u32) -> Option<()> {
+        /// Page headers nest two deep.
+        const DEEPEST: u32 = 8;
+        if depth > DEEPEST {
+            return None;
+        }
+        match kind {
+            TRUE | FALSE => {}
+            BYTE => self.at += 1,
+            SHORT | INTEGER | LONG => drop(self.varint()?),
+            DOUBLE => self.at += 8,
+            BINARY => {
+                let length = usize::try_from(self.varint()?).ok()?;
+                self.at = self.at.checked_add(length)?;
+            }
+            LIST | SET => {
+                let head = self.byte()?;
+                let count = match head >> 4 {
+                    15 => self.varint()?,
+                    count => u64::from(count),
+                };
+                for _ in 0..count {
+                    match head & 0x0f {
+                        // In a list they take a byte.
+                        TRUE | FALSE => self.at += 1,
+                        kind => self.skip(kind, depth + 1)?,
+                    }
+                    // Every item has a byte at least, so that a count costs no more than its bytes.
+                    self.bytes.get(self.at - 1)?;
+                }
+            }
+            STRUCT => {
+                let mut id = 0;
+                while let Some(kind) = self.field(&mut id)? {
+                    self.skip(kind, depth + 1)?;
+                }
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Type 0, lengths 300 and 20, a data page of 70 values with statistics to skip.
+    const HEADER: [u8; 20] = [
+        0x15, 0x00, 0x15, 0xd8, 0x04, 0x15, 0x28, 0x2c, 0x15, 0x8c, 0x01, 0x1c, 0x18, 0x01, b'a',
+        0x00, 0x00, 0x00, 0xaa, 0xbb,
+    ];
+
+    #[test]
+    fn a_header_says_its_lengths_and_values() {
+        let page = page(&HEADER).unwrap();
+        assert_eq!((page.header, page.compressed), (18, 20));
+        assert_eq!((page.uncompressed, page.values), (300, 70));
+    }
+
+    #[test]
+    fn a_header_that_is_cut_or_wild_is_none() {
+        for end in 0..18 {
+            assert!(page(&HEADER[..end]).is_none(), "{end}");
+        }
+        // A list of 2^60 structs; structs in structs; a string beyond the end.
+        let list = [
+            0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x0f, 0x00,
+        ];
+        assert!(page(&list).is_none());
+        assert!(page(&[0x1c; 100]).is_none());
+        assert!(page(&[0x18, 0xff, 0xff, 0xff, 0x0f]).is_none());
+    }
+}

@@ -1,0 +1,78 @@
+//! Tables as Parquet: zstd, a group of rows for each part of a table.
+
+use std::io::{self, Write};
+
+use arrow_array::RecordBatch;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
+
+use crate::table::rows::{Head, Sink};
+
+/// Rows of a group, which is packed in memory before it is written: up to 30 MB of rotations.
+const GROUP: usize = 1 << 20;
+
+/// Writes Parquet as rows come.
+pub(crate) struct ParquetSink<'a> {
+    out: &'a mut dyn Write,
+    /// Writes to memory, which is emptied after each group: the crate wants a writer that may be
+    /// sent to another thread.
+    writer: ArrowWriter<Vec<u8>>,
+}
+
+impl<'a> ParquetSink<'a> {
+    pub(crate) fn new(out: &'a mut dyn Write, head: Head) -> io::Result<Self> {
+        let notes = head
+            .notes
+            .into_iter()
+            .map(|(key, value)| KeyValue::new(key, value));
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .set_max_row_group_row_count(Some(GROUP))
+            .set_key_value_metadata(Some(notes.collect()))
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            // Numbers of rotations hardly repeat; names do.
+            .set_dictionary_enabled(false)
+            .set_column_dictionary_enabled(ColumnPath::from("track"), true)
+            .set_column_dictionary_enabled(ColumnPath::from("clip"), true);
+        let writer = ArrowWriter::try_new(Vec::new(), head.schema, Some(properties.build()));
+        Ok(Self {
+            out,
+            writer: writer.map_err(io_error)?,
+        })
+    }
+
+    /// Hands on what is written so far.
+    fn drain(&mut self) -> io::Result<()> {
+        self.writer.sync()?;
+        let buffer = self.writer.inner_mut();
+        self.out.write_all(buffer)?;
+        buffer.clear();
+        Ok(())
+    }
+}
+
+impl Sink for ParquetSink<'_> {
+    fn write(&mut self, batch: &RecordBatch) -> io::Result<()> {
+        self.writer.write(batch).map_err(io_error)?;
+        self.drain()
+    }
+
+    fn end_part(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(io_error)?;
+        self.drain()
+    }
+
+    fn finish(mut self) -> io::Result<()> {
+        self.writer.finish().map_err(io_error)?;
+        self.drain()?;
+        self.out.flush()
+    }
+}
+
+fn io_error(error: ParquetError) -> io::Error {
+    io::Error::other(error)
+}

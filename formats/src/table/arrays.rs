@@ -1,0 +1,360 @@
+//! Arrow arrays, which Parquet is read as too, appended to columns.
+
+use std::collections::HashMap;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    ArrowPrimitiveType, DurationMicrosecondType, DurationMillisecondType, DurationNanosecondType,
+    DurationSecondType, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type,
+    Int64Type, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
+    TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::{DataType, TimeUnit as ArrowUnit};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::TimeUnit;
+use crate::table::columns::{Column, Numbers, Table, Values, wrong_type};
+use crate::table::plan::{Need, Wanted};
+
+/// Takes the rows of a table as they come.
+pub(crate) struct Gather {
+    table: Table,
+    /// The codes of the words of each column.
+    known: Vec<HashMap<String, u32>>,
+}
+
+impl Gather {
+    /// For columns of these types, one for each that is wanted.
+    ///
+    /// # Errors
+    /// When a type is not what its column needs.
+    pub(crate) fn new(
+        file: &str,
+        wanted: &[Wanted],
+        types: &[DataType],
+    ) -> Result<Self, Diagnostic> {
+        let column = |(wanted, data_type): (&Wanted, &DataType)| {
+            let Some(values) = values(data_type, wanted.need) else {
+                let found = data_type.to_string();
+                return Err(wrong_type(file, &wanted.name, &found, wanted.need));
+            };
+            Ok(Column {
+                name: wanted.name.clone(),
+                index: wanted.index,
+                values,
+                null: None,
+            })
+        };
+        let columns: Result<Vec<_>, _> = wanted.iter().zip(types).map(column).collect();
+        let columns = columns?;
+        Ok(Self {
+            known: vec![HashMap::new(); columns.len()],
+            table: Table {
+                file: file.to_owned(),
+                columns,
+                rows: 0,
+                text: None,
+            },
+        })
+    }
+
+    /// Appends the rows of a batch with the columns that are wanted, in their order.
+    ///
+    /// # Errors
+    /// When a column is of another type than was said, or a number does not fit.
+    pub(crate) fn push(&mut self, batch: &[&dyn Array], rows: usize) -> Result<(), Diagnostic> {
+        let columns = self
+            .table
+            .columns
+            .iter_mut()
+            .zip(&mut self.known)
+            .zip(batch);
+        for ((column, known), array) in columns {
+            if array.null_count() > 0 && column.null.is_none() {
+                let first = (0..array.len()).find(|&row| array.is_null(row));
+                column.null = first.map(|row| self.table.rows + row);
+            }
+            if append(&mut column.values, known, *array, &mut column.null).is_none() {
+                let message = format!(
+                    "column `{}` holds what its type {} does not say; the file is damaged",
+                    column.name,
+                    array.data_type()
+                );
+                return Err(Diagnostic::new(
+                    &self.table.file,
+                    Code::TableDamaged,
+                    message,
+                ));
+            }
+        }
+        self.table.rows += rows;
+        Ok(())
+    }
+
+    /// The table, once there are no more rows.
+    ///
+    /// # Errors
+    /// When a column is shorter than the others.
+    pub(crate) fn finish(self) -> Result<Table, Diagnostic> {
+        let mut columns = self.table.columns.iter();
+        if let Some(short) = columns.find(|column| column.len() != self.table.rows) {
+            let message = format!(
+                "column `{}` has {} rows where there are {}; the file is damaged",
+                short.name,
+                short.len(),
+                self.table.rows
+            );
+            return Err(self.table.refuse(Code::TableDamaged, message));
+        }
+        Ok(self.table)
+    }
+}
+
+/// The columns of a batch at these places.
+pub(crate) fn chosen<'a>(batch: &'a RecordBatch, places: &[usize]) -> Option<Vec<&'a dyn Array>> {
+    let columns = batch.columns();
+    places
+        .iter()
+        .map(|&place| Some(&**columns.get(place)?))
+        .collect()
+}
+
+/// An empty column for a type; nothing if the type does not serve.
+fn values(data_type: &DataType, need: Need) -> Option<Values> {
+    let numbers = numbers(data_type);
+    match (need, data_type) {
+        (Need::Number, _) => numbers.map(Values::Numbers),
+        (Need::Whole, _) => whole(numbers),
+        (Need::Name, data_type) if is_text(data_type) => Some(Values::Words {
+            codes: Vec::new(),
+            words: Vec::new(),
+        }),
+        (Need::Name, _) => whole(numbers),
+        (Need::Time, DataType::Timestamp(unit, _) | DataType::Duration(unit)) => {
+            let unit = match unit {
+                ArrowUnit::Second => TimeUnit::Seconds,
+                ArrowUnit::Millisecond => TimeUnit::Milliseconds,
+                ArrowUnit::Microsecond => TimeUnit::Microseconds,
+                ArrowUnit::Nanosecond => TimeUnit::Nanoseconds,
+            };
+            Some(Values::Stamps(Vec::new(), unit))
+        }
+        (Need::Time, _) => numbers.map(Values::Numbers),
+        (Need::List, DataType::List(item) | DataType::LargeList(item)) => Some(Values::Lists {
+            ends: Vec::new(),
+            numbers: self::numbers(item.data_type())?,
+        }),
+        (Need::List, DataType::FixedSizeList(item, length)) if *length >= 0 => {
+            Some(Values::Lists {
+                ends: Vec::new(),
+                numbers: self::numbers(item.data_type())?,
+            })
+        }
+        (Need::List, _) => None,
+    }
+}
+
+fn whole(numbers: Option<Numbers>) -> Option<Values> {
+    let numbers = numbers.filter(|numbers| matches!(numbers, Numbers::Whole(_)));
+    numbers.map(Values::Numbers)
+}
+
+fn numbers(data_type: &DataType) -> Option<Numbers> {
+    match data_type {
+        DataType::Float16 | DataType::Float32 => Some(Numbers::F32(Vec::new())),
+        DataType::Float64 => Some(Numbers::F64(Vec::new())),
+        other if other.is_integer() => Some(Numbers::Whole(Vec::new())),
+        _ => None,
+    }
+}
+
+fn is_text(data_type: &DataType) -> bool {
+    match data_type {
+        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => true,
+        DataType::Dictionary(_, words) => {
+            matches!(
+                **words,
+                DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View
+            )
+        }
+        _ => false,
+    }
+}
+
+/// Appends an array to what is of its type; nothing if it is of another.
+fn append(
+    values: &mut Values,
+    known: &mut HashMap<String, u32>,
+    array: &dyn Array,
+    null: &mut Option<usize>,
+) -> Option<()> {
+    match values {
+        Values::Numbers(numbers) => append_numbers(numbers, array),
+        Values::Stamps(stamps, _) => append_stamps(stamps, array),
+        Values::Words { codes, words } => append_words(codes, words, known, array, null),
+        Values::Lists { ends, numbers } => append_lists(ends, numbers, array, null),
+    }
+}
+
+fn append_numbers(numbers: &mut Numbers, array: &dyn Array) -> Option<()> {
+    match numbers {
+        Numbers::F32(list) => match array.as_primitive_opt::<Float16Type>() {
+            Some(halves) => list.extend(halves.values().iter().map(|half| half.to_f32())),
+            None => list.extend_from_slice(array.as_primitive_opt::<Float32Type>()?.values()),
+        },
+        Numbers::F64(list) => {
+            list.extend_from_slice(array.as_primitive_opt::<Float64Type>()?.values());
+        }
+        Numbers::Whole(list) => match array.data_type() {
+            DataType::Int8 => extend::<Int8Type>(list, array)?,
+            DataType::Int16 => extend::<Int16Type>(list, array)?,
+            DataType::Int32 => extend::<Int32Type>(list, array)?,
+            DataType::Int64 => extend::<Int64Type>(list, array)?,
+            DataType::UInt8 => extend::<UInt8Type>(list, array)?,
+            DataType::UInt16 => extend::<UInt16Type>(list, array)?,
+            DataType::UInt32 => extend::<UInt32Type>(list, array)?,
+            DataType::UInt64 => {
+                // What is beyond an i64 is no time and no count; it stays out of range.
+                let all = array.as_primitive_opt::<UInt64Type>()?.values();
+                list.extend(
+                    all.iter()
+                        .map(|&number| i64::try_from(number).unwrap_or(i64::MAX)),
+                );
+            }
+            _ => return None,
+        },
+    }
+    Some(())
+}
+
+fn extend<T: ArrowPrimitiveType>(list: &mut Vec<i64>, array: &dyn Array) -> Option<()>
+where
+    T::Native: Into<i64>,
+{
+    let all = array.as_primitive_opt::<T>()?.values();
+    list.extend(all.iter().map(|&number| number.into()));
+    Some(())
+}
+
+fn append_stamps(stamps: &mut Vec<i64>, array: &dyn Array) -> Option<()> {
+    use ArrowUnit::{Microsecond, Millisecond, Nanosecond, Second};
+    match array.data_type() {
+        DataType::Timestamp(Second, _) => extend::<TimestampSecondType>(stamps, array),
+        DataType::Timestamp(Millisecond, _) => extend::<TimestampMillisecondType>(stamps, array),
+        DataType::Timestamp(Microsecond, _) => extend::<TimestampMicrosecondType>(stamps, array),
+        DataType::Timestamp(Nanosecond, _) => extend::<TimestampNanosecondType>(stamps, array),
+        DataType::Duration(Second) => extend::<DurationSecondType>(stamps, array),
+        DataType::Duration(Millisecond) => extend::<DurationMillisecondType>(stamps, array),
+        DataType::Duration(Microsecond) => extend::<DurationMicrosecondType>(stamps, array),
+        DataType::Duration(Nanosecond) => extend::<DurationNanosecondType>(stamps, array),
+        _ => None,
+    }
+}
+
+/// The code of a word, a new one if need be.
+fn code(words: &mut Vec<String>, known: &mut HashMap<String, u32>, word: &str) -> u32 {
+    if let Some(&code) = known.get(word) {
+        return code;
+    }
+    let code = words.len() as u32;
+    words.push(word.to_owned());
+    known.insert(word.to_owned(), code);
+    code
+}
+
+/// Rows without a word are given the first; the column is refused for them.
+fn append_words(
+    codes: &mut Vec<u32>,
+    words: &mut Vec<String>,
+    known: &mut HashMap<String, u32>,
+    array: &dyn Array,
+    null: &mut Option<usize>,
+) -> Option<()> {
+    let start = codes.len();
+    let Some(dictionary) = array.as_any_dictionary_opt() else {
+        let mut last: Option<(&str, u32)> = None;
+        for row in 0..array.len() {
+            let word = if array.is_null(row) {
+                ""
+            } else {
+                text(array, row)?
+            };
+            let code = match last {
+                Some((before, code)) if before == word => code,
+                _ => code(words, known, word),
+            };
+            last = Some((word, code));
+            codes.push(code);
+        }
+        return Some(());
+    };
+    let own = dictionary.values();
+    if own.is_empty() {
+        // Every row is a null then.
+        let none = code(words, known, "");
+        codes.resize(start + array.len(), none);
+        return Some(());
+    }
+    let mut code_of = Vec::with_capacity(own.len());
+    for place in 0..own.len() {
+        let word = if own.is_null(place) {
+            ""
+        } else {
+            text(own, place)?
+        };
+        code_of.push(code(words, known, word));
+    }
+    let keys = dictionary.normalized_keys();
+    if own.null_count() > 0 && null.is_none() {
+        *null = keys
+            .iter()
+            .position(|&key| own.is_null(key))
+            .map(|row| start + row);
+    }
+    codes.extend(keys.iter().map(|&key| code_of[key]));
+    Some(())
+}
+
+fn text(array: &dyn Array, row: usize) -> Option<&str> {
+    match array.data_type() {
+        DataType::Utf8 => Some(array.as_string_opt::<i32>()?.value(row)),
+        DataType::LargeUtf8 => Some(array.as_string_opt::<i64>()?.value(row)),
+        DataType::Utf8View => Some(array.as_string_view_opt()?.value(row)),
+        _ => None,
+    }
+}
+
+fn append_lists(
+    ends: &mut Vec<usize>,
+    numbers: &mut Numbers,
+    array: &dyn Array,
+    null: &mut Option<usize>,
+) -> Option<()> {
+    let start = ends.len();
+    let (own_ends, items): (Vec<usize>, _) = if let Some(list) = array.as_list_opt::<i32>() {
+        let ends = list.value_offsets().iter().map(|&end| end as usize);
+        (ends.collect(), list.values())
+    } else if let Some(list) = array.as_list_opt::<i64>() {
+        let ends = list.value_offsets().iter().map(|&end| end as usize);
+        (ends.collect(), list.values())
+    } else {
+        let list = array.as_fixed_size_list_opt()?;
+        let length = list.value_length() as usize;
+        (
+            (0..=list.len()).map(|row| row * length).collect(),
+            list.values(),
+        )
+    };
+    // A slice of a longer array begins behind the first number.
+    let (first, last) = (*own_ends.first()?, *own_ends.last()?);
+    let items = items.slice(first, last.checked_sub(first)?);
+    if items.null_count() > 0 && null.is_none() {
+        let item = (0..items.len()).find(|&item| items.is_null(item));
+        *null = item.map(|item| start + own_ends.partition_point(|&end| end - first <= item) - 1);
+    }
+    let before = numbers.len();
+    append_numbers(numbers, &items)?;
+    ends.extend(own_ends[1..].iter().map(|&end| before + end - first));
+    Some(())
+}

@@ -1,0 +1,166 @@
+//! The columns of a table, whatever file they came from, and where a fault in them is.
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::format::TimeUnit;
+use crate::table::plan::Need;
+
+/// Columns of one length.
+pub(crate) struct Table {
+    /// What messages call the input.
+    pub(crate) file: String,
+    /// As many as the plan wants, in its order.
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: usize,
+    /// The text, where the table was one: for places by line and column.
+    pub(crate) text: Option<Text>,
+}
+
+/// One column.
+pub(crate) struct Column {
+    pub(crate) name: String,
+    /// Its place among all columns of the file.
+    pub(crate) index: usize,
+    pub(crate) values: Values,
+    /// The first row without a value.
+    pub(crate) null: Option<usize>,
+}
+
+/// What a column holds.
+pub(crate) enum Values {
+    Numbers(Numbers),
+    /// Points in time, counted from a day of their own.
+    Stamps(Vec<i64>, TimeUnit),
+    /// Each row is one of the words.
+    Words {
+        codes: Vec<u32>,
+        words: Vec<String>,
+    },
+    /// Row `i` ends before number `ends[i]`.
+    Lists {
+        ends: Vec<usize>,
+        numbers: Numbers,
+    },
+}
+
+/// Numbers of the type that the file has them in.
+pub(crate) enum Numbers {
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+    Whole(Vec<i64>),
+}
+
+impl Numbers {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::F32(numbers) => numbers.len(),
+            Self::F64(numbers) => numbers.len(),
+            Self::Whole(numbers) => numbers.len(),
+        }
+    }
+
+    /// The number at a place below [`Numbers::len`].
+    pub(crate) fn at(&self, place: usize) -> f64 {
+        match self {
+            Self::F32(numbers) => f64::from(numbers[place]),
+            Self::F64(numbers) => numbers[place],
+            Self::Whole(numbers) => numbers[place] as f64,
+        }
+    }
+}
+
+/// What finds the line and the column of a cell again.
+pub(crate) type Text = Box<dyn Fn(usize, usize) -> Place>;
+
+impl Table {
+    pub(crate) fn refuse(&self, code: Code, message: impl Into<String>) -> Diagnostic {
+        Diagnostic::new(&self.file, code, message)
+    }
+
+    /// Where a cell is.
+    pub(crate) fn place(&self, column: usize, row: usize) -> Place {
+        let column = &self.columns[column];
+        match &self.text {
+            Some(text) => text(column.index, row),
+            None => Place::Inside(format!("column {}, row {row}", column.name)),
+        }
+    }
+
+    /// Refuses a cell.
+    pub(crate) fn refuse_at(
+        &self,
+        column: usize,
+        row: usize,
+        code: Code,
+        message: impl Into<String>,
+    ) -> Diagnostic {
+        let mut refusal = self.refuse(code, message);
+        refusal.place = Some(self.place(column, row));
+        refusal
+    }
+
+    /// Refuses the first null of any column.
+    pub(crate) fn check_nulls(&self) -> Result<(), Diagnostic> {
+        for (place, column) in self.columns.iter().enumerate() {
+            if let Some(row) = column.null {
+                let message = format!(
+                    "column `{}` has no value in row {row}; fill it in or remove the row",
+                    column.name
+                );
+                return Err(self.refuse_at(place, row, Code::Null, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Column {
+    /// The number of rows.
+    pub(crate) fn len(&self) -> usize {
+        match &self.values {
+            Values::Numbers(numbers) => numbers.len(),
+            Values::Stamps(stamps, _) => stamps.len(),
+            Values::Words { codes, .. } => codes.len(),
+            Values::Lists { ends, .. } => ends.len(),
+        }
+    }
+}
+
+/// Reads one number of each row.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader<'a> {
+    pub(crate) numbers: &'a Numbers,
+    /// Where the lists of the rows end, in a column of lists.
+    pub(crate) ends: Option<&'a [usize]>,
+    /// The place of the number in each list.
+    pub(crate) place: usize,
+}
+
+impl Reader<'_> {
+    /// Reads nothing.
+    pub(crate) const NONE: Self = Self {
+        numbers: &Numbers::Whole(Vec::new()),
+        ends: None,
+        place: 0,
+    };
+
+    pub(crate) fn at(&self, row: usize) -> f64 {
+        match self.ends {
+            None => self.numbers.at(row),
+            Some(_) if row == 0 => self.numbers.at(self.place),
+            Some(ends) => self.numbers.at(ends[row - 1] + self.place),
+        }
+    }
+}
+
+/// The refusal of a column whose type does not serve.
+pub(crate) fn wrong_type(file: &str, column: &str, found: &str, need: Need) -> Diagnostic {
+    let wanted = match need {
+        Need::Number => "numbers",
+        Need::Whole => "whole numbers",
+        Need::Name => "text or whole numbers",
+        Need::Time => "numbers or timestamps",
+        Need::List => "lists of numbers",
+    };
+    let message = format!("column `{column}` is of type {found}; {wanted} are expected");
+    Diagnostic::new(file, Code::ColumnType, message).inside(format!("column {column}, row 0"))
+}

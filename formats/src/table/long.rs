@@ -1,0 +1,282 @@
+//! Results as a long table: a row for each rotation, `frame`, `time`, `track`, then its numbers.
+
+use std::collections::HashMap;
+use std::io;
+use std::sync::Arc;
+
+use arrow_array::{ArrayRef, StringArray};
+use glam::Quat;
+use tumble::{Encoding, Layout, Timeline};
+
+use crate::format::{ResultShape, ResultWriter, WriteError};
+use crate::motion::Sampled;
+use crate::names::distinct_names;
+use crate::npy::ComponentOrder;
+use crate::poses::{Poses, TRANSFORM, WORLD};
+use crate::table::rows::{Batch, Component, Head, Sink, invalid, names};
+
+/// Begins a table of a result's rotations.
+pub(crate) fn write_rotations<'a, S: Sink + 'a>(
+    result: &ResultShape<'a>,
+    begin: impl FnOnce(Head) -> io::Result<S>,
+) -> io::Result<Box<dyn ResultWriter + 'a>> {
+    let is_quaternion = matches!(
+        result.encoding,
+        Encoding::F32 | Encoding::F16 | Encoding::Snorm16
+    );
+    let mut components = result.encoding.components().to_vec();
+    let turned = is_quaternion && result.order == ComponentOrder::Wxyz;
+    if turned {
+        components.rotate_right(1);
+    }
+    let columns = components
+        .into_iter()
+        .map(|name| (name.to_owned(), Component::of(result.encoding)));
+    let batch = Batch::new(columns, names(result.set), None)?;
+    let notes = result
+        .notes
+        .iter()
+        .map(|(key, value)| ((*key).to_owned(), value.clone()));
+    let sink = begin(Head {
+        schema: Arc::clone(&batch.schema),
+        notes: notes.collect(),
+    })?;
+    Ok(Box::new(Rotations {
+        sink,
+        batch,
+        timeline: result.timeline,
+        layout: result.layout,
+        encoding: result.encoding,
+        turned,
+        tracks: result.set.track_count(),
+        written: 0,
+    }))
+}
+
+/// Writes rotations as they come.
+struct Rotations<'a, S> {
+    sink: S,
+    batch: Batch,
+    timeline: &'a Timeline,
+    layout: Layout,
+    encoding: Encoding,
+    /// Quaternions are to have w first.
+    turned: bool,
+    tracks: usize,
+    written: usize,
+}
+
+impl<S: Sink> Rotations<'_, S> {
+    fn all(&self) -> usize {
+        self.tracks.saturating_mul(self.timeline.len())
+    }
+}
+
+impl<S: Sink> ResultWriter for Rotations<'_, S> {
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        if rotations.len() > self.all() - self.written {
+            return Err(invalid("more rotations than the shape has"));
+        }
+        let bytes = self.encoding.bytes() / self.batch.numbers.len().max(1);
+        let mut encoded = vec![0; self.encoding.bytes()];
+        for q in rotations {
+            let (track, frame) = match self.layout {
+                Layout::TrackMajor => (
+                    self.written / self.timeline.len(),
+                    self.written % self.timeline.len(),
+                ),
+                Layout::FrameMajor => (self.written % self.tracks, self.written / self.tracks),
+            };
+            self.batch
+                .row(frame, self.timeline.time(track, frame), track);
+            let mut numbers = q.to_array();
+            if self.turned {
+                numbers.rotate_right(1);
+            }
+            self.encoding.encode(&[numbers], &mut encoded);
+            for (list, number) in self.batch.numbers.iter_mut().zip(encoded.chunks(bytes)) {
+                list.push(number);
+            }
+            self.written += 1;
+            if self.batch.is_full() {
+                self.batch.flush(&mut self.sink)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        let missing = self.all() - self.written;
+        if missing > 0 {
+            return Err(invalid(format!(
+                "{missing} rotations of the shape are missing"
+            )));
+        }
+        self.batch.flush(&mut self.sink)?;
+        self.sink.finish()
+    }
+}
+
+/// Writes poses, whose numbers are f32.
+pub(crate) fn write_poses<S: Sink>(
+    poses: &Poses<'_>,
+    begin: impl FnOnce(Head) -> io::Result<S>,
+) -> io::Result<()> {
+    poses.check()?;
+    let components = poses.components.iter();
+    let columns = components.map(|name| ((*name).to_owned(), Component::F32(Vec::new())));
+    let mut batch = Batch::new(columns, names(poses.set), None)?;
+    let mut sink = begin(Head {
+        schema: Arc::clone(&batch.schema),
+        notes: Vec::new(),
+    })?;
+    let tracks = poses.set.track_count().max(1);
+    for (place, pose) in poses
+        .numbers
+        .chunks(poses.components.len().max(1))
+        .enumerate()
+    {
+        let (frame, track) = (place / tracks, place % tracks);
+        batch.row(frame, poses.timeline.time(track, frame), track);
+        push_all(&mut batch.numbers, pose);
+        if batch.is_full() {
+            batch.flush(&mut sink)?;
+        }
+    }
+    batch.flush(&mut sink)?;
+    sink.finish()
+}
+
+fn push_all(components: &mut [Component], numbers: &[f32]) {
+    for (component, number) in components.iter_mut().zip(numbers) {
+        component.push(bytemuck::bytes_of(number));
+    }
+}
+
+/// Writes sampled clips, one after another. Several clips, and one that has a name, have it in the
+/// column `clip`.
+///
+/// # Errors
+/// When writing fails, or a clip's lists are not of one length.
+pub(crate) fn write_motion<S: Sink>(
+    clips: &[Sampled<'_>],
+    begin: impl FnOnce(Head) -> io::Result<S>,
+) -> Result<(), WriteError> {
+    let has = |part: fn(&Sampled<'_>) -> bool| clips.iter().any(part);
+    let (moved, scaled) = (
+        has(|clip| !clip.translations.is_empty()),
+        has(|clip| !clip.scales.is_empty()),
+    );
+    let is_world = has(|clip| clip.clip.is_world);
+    let translation = if is_world {
+        &WORLD[..3]
+    } else {
+        &TRANSFORM[..3]
+    };
+    let mut components: Vec<&str> = vec!["x", "y", "z", "w"];
+    components.extend(translation.iter().filter(|_| moved));
+    components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
+    let named = clips.len() > 1 || clips.iter().any(|clip| clip.clip.name.is_some());
+    let clip_names = clips
+        .iter()
+        .enumerate()
+        .map(|(i, clip)| match &clip.clip.name {
+            Some(name) => name.clone(),
+            None => format!("clip{i}"),
+        });
+    let clip_names: ArrayRef = Arc::new(StringArray::from_iter_values(clip_names));
+    let (track_names, codes) = track_names(clips);
+    let columns = components.iter();
+    let columns = columns.map(|name| ((*name).to_owned(), Component::F32(Vec::new())));
+    let mut batch = Batch::new(columns, track_names, named.then_some((0, clip_names)))?;
+    let mut sink = begin(Head {
+        schema: Arc::clone(&batch.schema),
+        notes: notes(clips),
+    })?;
+    for (place, (sampled, codes)) in clips.iter().zip(&codes).enumerate() {
+        if let Some((clip, _)) = &mut batch.clip {
+            *clip = place as i32;
+        }
+        write_clip(sampled, codes, (moved, scaled), &mut batch, &mut sink)?;
+        batch.flush(&mut sink)?;
+        sink.end_part()?;
+    }
+    Ok(sink.finish()?)
+}
+
+/// The names of the tracks of all clips, each once, and which each track has.
+fn track_names(clips: &[Sampled<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
+    let mut place = HashMap::new();
+    let mut all = Vec::new();
+    let mut codes = Vec::new();
+    for sampled in clips {
+        let own = distinct_names(&sampled.clip.set).into_iter().map(|name| {
+            *place.entry(name.clone()).or_insert_with(|| {
+                all.push(name);
+                all.len() - 1
+            })
+        });
+        codes.push(own.collect());
+    }
+    (Arc::new(StringArray::from_iter_values(all)), codes)
+}
+
+/// What is said of the clips; of each apart where there are several that differ.
+fn notes(clips: &[Sampled<'_>]) -> Vec<(String, String)> {
+    let mut notes: Vec<(String, String)> = Vec::new();
+    for (place, sampled) in clips.iter().enumerate() {
+        let rate = sampled.rate.map(|rate| ("rate", rate.to_string()));
+        let own = sampled
+            .notes
+            .iter()
+            .map(|(key, value)| (*key, value.clone()))
+            .chain(rate);
+        for (key, value) in own {
+            match notes.iter().find(|(known, _)| known == key) {
+                None => notes.push((key.to_owned(), value)),
+                Some((_, known)) if *known == value => {}
+                Some(_) => notes.push((format!("{key}.{place}"), value)),
+            }
+        }
+    }
+    notes
+}
+
+fn write_clip(
+    sampled: &Sampled<'_>,
+    codes: &[usize],
+    (moved, scaled): (bool, bool),
+    batch: &mut Batch,
+    sink: &mut impl Sink,
+) -> io::Result<()> {
+    let tracks = sampled.clip.set.track_count();
+    let all = sampled.times.len().saturating_mul(tracks);
+    let fits = |length: usize| length == all || length == 0;
+    if sampled.rotations.len() != all
+        || !fits(sampled.translations.len())
+        || !fits(sampled.scales.len())
+    {
+        return Err(invalid(
+            "a clip's samples are not as many as its times and tracks",
+        ));
+    }
+    for (place, q) in sampled.rotations.iter().enumerate() {
+        let (frame, track) = (place / tracks, place % tracks);
+        let time = sampled.times[frame] + sampled.clip.time_offset as f64;
+        batch.row(frame, time, codes[track]);
+        let mut numbers = q.to_array().to_vec();
+        if moved {
+            let translation = sampled.translations.get(place);
+            numbers.extend(translation.copied().unwrap_or_default().to_array());
+        }
+        if scaled {
+            let scale = sampled.scales.get(place);
+            numbers.extend(scale.copied().unwrap_or(glam::Vec3::ONE).to_array());
+        }
+        push_all(&mut batch.numbers, &numbers);
+        if batch.is_full() {
+            batch.flush(sink)?;
+        }
+    }
+    Ok(())
+}

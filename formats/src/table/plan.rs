@@ -1,0 +1,386 @@
+//! Which columns of a table are what, by their names and by what `--map` says of them.
+
+use std::collections::HashMap;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::ReadOptions;
+use crate::map::{Entry, Map};
+use crate::npy::ComponentOrder;
+
+/// What a column has to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Need {
+    Number,
+    Whole,
+    /// Text, or whole numbers that serve as names.
+    Name,
+    Time,
+    List,
+}
+
+/// A column that is to be read.
+#[derive(Debug)]
+pub(crate) struct Wanted {
+    /// What the file calls it.
+    pub(crate) name: String,
+    /// Its place among all columns of the file.
+    pub(crate) index: usize,
+    pub(crate) need: Need,
+}
+
+/// The columns that are read, and what becomes of them. Columns are given by their places in
+/// `wanted`.
+#[derive(Debug)]
+pub(crate) struct Plan {
+    pub(crate) wanted: Vec<Wanted>,
+    /// The times; of frames where `is_frames`.
+    pub(crate) time: usize,
+    pub(crate) is_frames: bool,
+    /// What tells clips apart, and what goes before its values in their names.
+    pub(crate) clip: Option<(usize, &'static str)>,
+    pub(crate) rows: Rows,
+}
+
+/// What a row is.
+#[derive(Debug)]
+pub(crate) enum Rows {
+    /// A key of the track that a column names.
+    Keys {
+        track: Option<usize>,
+        parts: Box<Parts>,
+        is_world: bool,
+    },
+    /// A key of every track, each with its name.
+    Times {
+        tracks: Vec<(String, Parts)>,
+        is_world: bool,
+    },
+}
+
+/// Where the numbers of a track's keys are.
+#[derive(Debug)]
+pub(crate) struct Parts {
+    pub(crate) rotation: [Cell; 4],
+    pub(crate) translation: Option<[Cell; 3]>,
+    pub(crate) scale: Option<[Cell; 3]>,
+}
+
+/// A number of a row: a column, or a place in the list of a column.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cell {
+    pub(crate) column: usize,
+    pub(crate) place: Option<usize>,
+}
+
+/// The names of a file's columns, after `--map` has given some of them other names.
+struct Names<'a> {
+    file: &'a str,
+    /// The columns of each name; a second one makes the name useless.
+    seen: HashMap<String, Vec<usize>>,
+    own: &'a [String],
+    wanted: Vec<Wanted>,
+    taken: HashMap<(usize, Need), usize>,
+}
+
+impl Names<'_> {
+    fn refuse(&self, code: Code, message: String) -> Diagnostic {
+        Diagnostic::new(self.file, code, message)
+    }
+
+    /// The names of the file's columns, for messages.
+    fn list(&self) -> String {
+        const MOST: usize = 12;
+        let shown: Vec<String> = self
+            .own
+            .iter()
+            .take(MOST)
+            .map(|n| format!("`{n}`"))
+            .collect();
+        let more = if self.own.len() > MOST { ", …" } else { "" };
+        format!("{}{more}", shown.join(", "))
+    }
+
+    /// The place of a column of the file.
+    fn find(&self, name: &str) -> Result<Option<usize>, Diagnostic> {
+        match self.seen.get(name).map_or(&[][..], Vec::as_slice) {
+            [] => Ok(None),
+            [index] => Ok(Some(*index)),
+            _ => {
+                let message = format!("two columns are called `{name}`; rename one of them");
+                Err(self.refuse(Code::ColumnTwice, message))
+            }
+        }
+    }
+
+    fn want(&mut self, index: usize, need: Need) -> usize {
+        *self.taken.entry((index, need)).or_insert_with(|| {
+            self.wanted.push(Wanted {
+                name: self.own[index].clone(),
+                index,
+                need,
+            });
+            self.wanted.len() - 1
+        })
+    }
+
+    fn take(&mut self, name: &str, need: Need) -> Result<Option<usize>, Diagnostic> {
+        Ok(self.find(name)?.map(|index| self.want(index, need)))
+    }
+
+    /// All columns of these names, or none of them.
+    fn group<const N: usize>(
+        &mut self,
+        prefix: &str,
+        parts: [&str; N],
+    ) -> Result<Option<[Cell; N]>, Diagnostic> {
+        let names = parts.map(|part| format!("{prefix}{part}"));
+        let mut found = [None; N];
+        for (found, name) in found.iter_mut().zip(&names) {
+            *found = self.find(name)?;
+        }
+        if found.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let mut cells = [Cell {
+            column: 0,
+            place: None,
+        }; N];
+        for ((cell, found), name) in cells.iter_mut().zip(found).zip(&names) {
+            let Some(index) = found else {
+                let message = format!(
+                    "there is no column `{name}` beside the others of {}; there are {}",
+                    names.join(", "),
+                    self.list()
+                );
+                return Err(self.refuse(Code::ColumnMissing, message));
+            };
+            cell.column = self.want(index, Need::Number);
+        }
+        Ok(Some(cells))
+    }
+
+    /// The columns of one track; whether its translations are in the world.
+    fn parts(&mut self, prefix: &str) -> Result<(Parts, bool), Diagnostic> {
+        let missing = "a rotation has the columns x, y, z and w".to_owned();
+        let rotation = self.group(prefix, ["x", "y", "z", "w"])?;
+        let rotation = rotation.ok_or_else(|| self.refuse(Code::NoRotations, missing))?;
+        let local = self.group(prefix, ["tx", "ty", "tz"])?;
+        let world = match local {
+            Some(_) => None,
+            None => self.group(prefix, ["px", "py", "pz"])?,
+        };
+        let parts = Parts {
+            rotation,
+            translation: local.or(world),
+            scale: self.group(prefix, ["sx", "sy", "sz"])?,
+        };
+        Ok((parts, world.is_some()))
+    }
+}
+
+impl Plan {
+    /// The plan for a file with columns of these names.
+    ///
+    /// # Errors
+    /// When times or rotations are not among them, or `--map` names others.
+    pub(crate) fn of(
+        file: &str,
+        own: &[String],
+        options: &ReadOptions,
+    ) -> Result<Self, Diagnostic> {
+        let mut seen: HashMap<String, Vec<usize>> = HashMap::new();
+        for (index, name) in own.iter().enumerate() {
+            seen.entry(name.clone()).or_default().push(index);
+        }
+        let mut names = Names {
+            file,
+            seen,
+            own,
+            wanted: Vec::new(),
+            taken: HashMap::new(),
+        };
+        let lists = match &options.map {
+            Some(map) => rename(&mut names, map)?,
+            None => Vec::new(),
+        };
+        let (time, is_frames) = time_column(&mut names, options)?;
+        let clip = match names.take("clip", Need::Name)? {
+            Some(clip) => Some((clip, "")),
+            None => names
+                .take("episode_index", Need::Whole)?
+                .map(|at| (at, "episode_")),
+        };
+        let rows = if !lists.is_empty() {
+            list_rows(&mut names, &lists)?
+        } else if names.find("w")?.is_some() {
+            let (parts, is_world) = names.parts("")?;
+            Rows::Keys {
+                track: names.take("track", Need::Name)?,
+                parts: Box::new(parts),
+                is_world,
+            }
+        } else {
+            wide_rows(&mut names)?
+        };
+        Ok(Self {
+            wanted: names.wanted,
+            time,
+            is_frames,
+            clip,
+            rows,
+        })
+    }
+}
+
+/// Gives columns the names that `--map` has for them; gives the entries that are lists' parts.
+fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
+    let parsed: Result<Map, _> = map.parse();
+    let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
+    let mut lists = Vec::new();
+    for entry in map.entries {
+        let own = names.own.iter().position(|name| *name == entry.source);
+        let Some(index) = own else {
+            let message = format!(
+                "there is no column `{}`; there are {}",
+                entry.source,
+                names.list()
+            );
+            return Err(names.refuse(Code::ColumnMissing, message));
+        };
+        if entry.columns.is_some() || entry.order.is_some() || !is_column(&entry.name) {
+            lists.push(entry);
+            continue;
+        }
+        if let Some(own) = names.seen.get_mut(&entry.source) {
+            own.retain(|&at| at != index);
+        }
+        names.seen.insert(entry.name, vec![index]);
+    }
+    Ok(lists)
+}
+
+/// Whether a column may have this name; other targets are tracks.
+fn is_column(target: &str) -> bool {
+    const WHOLE: [&str; 6] = ["time", "timestamp", "t", "track", "clip", "frame_index"];
+    const NUMBERS: [&str; 13] = [
+        "x", "y", "z", "w", "tx", "ty", "tz", "px", "py", "pz", "sx", "sy", "sz",
+    ];
+    let last = target.rsplit('.').next().unwrap_or(target);
+    WHOLE.contains(&target) || target == "episode_index" || NUMBERS.contains(&last)
+}
+
+fn time_column(names: &mut Names<'_>, options: &ReadOptions) -> Result<(usize, bool), Diagnostic> {
+    for name in ["time", "timestamp", "t"] {
+        if let Some(time) = names.take(name, Need::Time)? {
+            return Ok((time, false));
+        }
+    }
+    let frames = match names.find("frame_index")? {
+        Some(frames) => Some(frames),
+        None => names.find("frame")?,
+    };
+    let message = match (frames, options.source_rate) {
+        (Some(frames), Some(_)) => return Ok((names.want(frames, Need::Whole), true)),
+        (Some(frames), None) => format!(
+            "times are frames, in the column `{}`; --source-fps says how many a second has",
+            names.own[frames]
+        ),
+        (None, _) => format!(
+            "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; --map time=NAME",
+            names.list()
+        ),
+    };
+    Err(names.refuse(Code::NoTimes, message))
+}
+
+/// Tracks in columns: `knee.x`, `knee.y`, `knee.z`, `knee.w`.
+fn wide_rows(names: &mut Names<'_>) -> Result<Rows, Diagnostic> {
+    let mut prefixes: Vec<(String, usize)> = names
+        .seen
+        .iter()
+        .filter_map(|(name, at)| Some((name.strip_suffix(".w")?.to_owned(), *at.first()?)))
+        .collect();
+    prefixes.sort_by_key(|&(_, index)| index);
+    if prefixes.is_empty() {
+        let message = format!(
+            "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
+             --map hand=LIST[3:7] takes a part of a list",
+            names.list()
+        );
+        return Err(names.refuse(Code::NoRotations, message));
+    }
+    let mut tracks = Vec::with_capacity(prefixes.len());
+    let mut is_world = false;
+    for (track, _) in prefixes {
+        let (parts, world) = names.parts(&format!("{track}."))?;
+        is_world |= world;
+        tracks.push((track, parts));
+    }
+    Ok(Rows::Times { tracks, is_world })
+}
+
+/// Tracks in parts of lists; `hand.translation` and `hand.scale` belong to the track `hand`.
+fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic> {
+    const VECTORS: [&str; 2] = [".translation", ".scale"];
+    let own = |target: &str| {
+        let ending = VECTORS.iter().position(|ending| target.ends_with(ending));
+        ending.map(|at| (target[..target.len() - VECTORS[at].len()].to_owned(), at))
+    };
+    let mut tracks: Vec<(String, Parts)> = Vec::new();
+    for entry in lists.iter().filter(|entry| own(&entry.name).is_none()) {
+        let [a, b, c, d] = cells::<4>(names, entry)?;
+        let rotation = match entry.order.unwrap_or_default() {
+            ComponentOrder::Xyzw => [a, b, c, d],
+            ComponentOrder::Wxyz => [b, c, d, a],
+        };
+        let parts = Parts {
+            rotation,
+            translation: None,
+            scale: None,
+        };
+        tracks.push((entry.name.clone(), parts));
+    }
+    for entry in lists {
+        let Some((track, vector)) = own(&entry.name) else {
+            continue;
+        };
+        let cells = cells::<3>(names, entry)?;
+        let Some((_, parts)) = tracks.iter_mut().find(|(name, _)| *name == track) else {
+            let message = format!(
+                "`{}` has no rotations; --map {track}=LIST[3:7] gives the track `{track}` some",
+                entry.name
+            );
+            return Err(names.refuse(Code::NoRotations, message));
+        };
+        match vector {
+            0 => parts.translation = Some(cells),
+            _ => parts.scale = Some(cells),
+        }
+    }
+    Ok(Rows::Times {
+        tracks,
+        is_world: false,
+    })
+}
+
+/// The places of the numbers that an entry takes from a list: the first of it, or its part.
+fn cells<const N: usize>(names: &mut Names<'_>, entry: &Entry) -> Result<[Cell; N], Diagnostic> {
+    let range = entry.columns.clone().unwrap_or(0..N);
+    if range.len() != N {
+        let message = format!(
+            "`{}` takes {} numbers of `{}`; it needs {N}, such as [{}:{}]",
+            entry.name,
+            range.len(),
+            entry.source,
+            range.start,
+            range.start.saturating_add(N)
+        );
+        return Err(names.refuse(Code::ListLength, message));
+    }
+    let index = names.own.iter().position(|name| *name == entry.source);
+    let column = names.want(index.unwrap_or_default(), Need::List);
+    Ok(std::array::from_fn(|i| Cell {
+        column,
+        place: Some(range.start + i),
+    }))
+}

@@ -1,0 +1,179 @@
+//! Rows of a long table, gathered into batches for formats that take them so.
+//!
+//! A result of any length takes the memory of one batch, and a file does not depend on the windows
+//! in which the result came.
+
+use std::io;
+use std::sync::Arc;
+
+use arrow_array::types::Int32Type;
+use arrow_array::{
+    ArrayRef, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array, Int32Array,
+    Int64Array, RecordBatch, StringArray,
+};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use half::f16;
+use tumble::{Encoding, TrackSet};
+
+use crate::names::distinct_names;
+
+/// Rows of a batch: 2 MB of rotations.
+const BATCH: usize = 1 << 16;
+
+/// What a table is to be, for a format that begins to write it.
+pub(crate) struct Head {
+    pub(crate) schema: SchemaRef,
+    /// What made it: `("method", "slerp")`.
+    pub(crate) notes: Vec<(String, String)>,
+}
+
+/// A format that takes the rows of a table.
+pub(crate) trait Sink {
+    fn write(&mut self, batch: &RecordBatch) -> io::Result<()>;
+
+    /// Ends a part of the table that may be read by itself.
+    fn end_part(&mut self) -> io::Result<()>;
+
+    fn finish(self) -> io::Result<()>;
+}
+
+/// The columns of the batch that is being filled.
+pub(crate) struct Batch {
+    pub(crate) schema: SchemaRef,
+    frames: Vec<i64>,
+    times: Vec<f64>,
+    tracks: Vec<i32>,
+    pub(crate) numbers: Vec<Component>,
+    /// The names of all tracks, the same for every batch.
+    track_names: ArrayRef,
+    /// The clip of the rows that come, and the names of all clips.
+    pub(crate) clip: Option<(i32, ArrayRef)>,
+}
+
+/// The numbers of one component of all rows.
+pub(crate) enum Component {
+    F32(Vec<f32>),
+    F16(Vec<f16>),
+    I16(Vec<i16>),
+}
+
+impl Component {
+    pub(crate) fn of(encoding: Encoding) -> Self {
+        match encoding {
+            Encoding::F16 => Self::F16(Vec::new()),
+            Encoding::Snorm16 => Self::I16(Vec::new()),
+            _ => Self::F32(Vec::new()),
+        }
+    }
+
+    pub(crate) fn data_type(&self) -> DataType {
+        match self {
+            Self::F32(_) => DataType::Float32,
+            Self::F16(_) => DataType::Float16,
+            Self::I16(_) => DataType::Int16,
+        }
+    }
+
+    /// Takes a number of an encoding, in the machine's byte order.
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
+        match self {
+            Self::F32(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
+            Self::F16(list) => list.push(f16::from_bits(bytemuck::pod_read_unaligned(bytes))),
+            Self::I16(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
+        }
+    }
+
+    fn take(&mut self) -> ArrayRef {
+        match self {
+            Self::F32(list) => Arc::new(Float32Array::from(std::mem::take(list))),
+            Self::F16(list) => Arc::new(Float16Array::from(std::mem::take(list))),
+            Self::I16(list) => Arc::new(Int16Array::from(std::mem::take(list))),
+        }
+    }
+}
+
+pub(crate) fn invalid(message: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, message.into())
+}
+
+/// A dictionary column's type.
+fn names_type() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}
+
+pub(crate) fn names(set: &TrackSet) -> ArrayRef {
+    Arc::new(StringArray::from_iter_values(distinct_names(set)))
+}
+
+fn dictionary(codes: Vec<i32>, names: &ArrayRef) -> io::Result<ArrayRef> {
+    let codes = Int32Array::from(codes);
+    let array = DictionaryArray::<Int32Type>::try_new(codes, Arc::clone(names));
+    Ok(Arc::new(array.map_err(io::Error::other)?))
+}
+
+impl Batch {
+    /// For a table whose numbers are called so.
+    pub(crate) fn new(
+        components: impl IntoIterator<Item = (String, Component)>,
+        track_names: ArrayRef,
+        clip: Option<(i32, ArrayRef)>,
+    ) -> io::Result<Self> {
+        if i32::try_from(track_names.len()).is_err() {
+            return Err(invalid(format!(
+                "{} tracks are more than 2^31",
+                track_names.len()
+            )));
+        }
+        let mut fields = vec![
+            Field::new("frame", DataType::Int64, false),
+            Field::new("time", DataType::Float64, false),
+            Field::new("track", names_type(), false),
+        ];
+        if clip.is_some() {
+            fields.push(Field::new("clip", names_type(), false));
+        }
+        let mut numbers = Vec::new();
+        for (name, component) in components {
+            fields.push(Field::new(name, component.data_type(), false));
+            numbers.push(component);
+        }
+        Ok(Self {
+            schema: Arc::new(Schema::new(fields)),
+            frames: Vec::new(),
+            times: Vec::new(),
+            tracks: Vec::new(),
+            numbers,
+            track_names,
+            clip,
+        })
+    }
+
+    pub(crate) fn row(&mut self, frame: usize, time: f64, track: usize) {
+        self.frames.push(frame as i64);
+        self.times.push(time);
+        self.tracks.push(track as i32);
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.frames.len() >= BATCH
+    }
+
+    /// Hands on the rows that there are.
+    pub(crate) fn flush(&mut self, sink: &mut impl Sink) -> io::Result<()> {
+        if self.frames.is_empty() {
+            return Ok(());
+        }
+        let rows = self.frames.len();
+        let mut columns: Vec<ArrayRef> = vec![
+            Arc::new(Int64Array::from(std::mem::take(&mut self.frames))),
+            Arc::new(Float64Array::from(std::mem::take(&mut self.times))),
+            dictionary(std::mem::take(&mut self.tracks), &self.track_names)?,
+        ];
+        if let Some((clip, names)) = &self.clip {
+            columns.push(dictionary(vec![*clip; rows], names)?);
+        }
+        columns.extend(self.numbers.iter_mut().map(Component::take));
+        let batch = RecordBatch::try_new(Arc::clone(&self.schema), columns);
+        sink.write(&batch.map_err(io::Error::other)?)
+    }
+}

@@ -1,0 +1,102 @@
+//! A column of times as seconds.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{ReadOptions, TimeUnit};
+use crate::grid::Precision;
+use crate::table::columns::{Numbers, Table, Values};
+use crate::table::plan::Plan;
+
+/// Times of all rows.
+pub(crate) struct Times {
+    pub(crate) seconds: Vec<f64>,
+    /// The type that the file has them in; `None` if they are exact as they are.
+    pub(crate) precision: Option<Precision>,
+    /// The whole second that they are counted from.
+    pub(crate) offset: i64,
+}
+
+/// Whole numbers this far from 0 are no seconds: the year 5138 as a Unix time.
+const MOST_SECONDS: u64 = 100_000_000_000;
+
+/// Stamps that begin this many seconds from 0 are counted from the whole second of the first:
+/// an f64 of Unix seconds is 0.2 µs wide, one that starts at 0 keeps nanoseconds for 104 days.
+const FAR: u64 = 1_000_000;
+
+/// The times of a table's rows.
+///
+/// # Errors
+/// When they are whole numbers of a unit that nobody says, or frames before the first.
+pub(crate) fn times(
+    table: &Table,
+    plan: &Plan,
+    options: &ReadOptions,
+) -> Result<Times, Diagnostic> {
+    let column = &table.columns[plan.time];
+    let exact = |seconds, precision| {
+        Ok(Times {
+            seconds,
+            precision,
+            offset: 0,
+        })
+    };
+    // A unit that is given holds for numbers of every kind; stamps have their own.
+    let per_second = options
+        .time_unit
+        .map_or(1.0, |unit| unit.per_second() as f64);
+    match (&column.values, options.source_rate) {
+        (Values::Numbers(Numbers::Whole(frames)), Some(rate)) if plan.is_frames => {
+            if let Some(row) = frames.iter().position(|&frame| frame < 0) {
+                let message = format!("frame {} comes before the first, 0", frames[row]);
+                return Err(table.refuse_at(plan.time, row, Code::Time, message));
+            }
+            let seconds = frames
+                .iter()
+                .map(|&frame| rate.time_of(frame.unsigned_abs()));
+            exact(seconds.collect(), None)
+        }
+        (Values::Numbers(Numbers::F32(times)), _) => {
+            let seconds = times.iter().map(|&time| f64::from(time) / per_second);
+            exact(seconds.collect(), Some(Precision::F32))
+        }
+        (Values::Numbers(Numbers::F64(times)), _) => {
+            let seconds = times.iter().map(|&time| time / per_second);
+            exact(seconds.collect(), Some(Precision::F64))
+        }
+        (Values::Numbers(Numbers::Whole(times)), _) => {
+            // Text does not tell 2 from 2.0: small whole numbers are seconds there.
+            let small = times.iter().all(|time| time.unsigned_abs() < MOST_SECONDS);
+            let guessed = (small && table.text.is_some()).then_some(TimeUnit::Seconds);
+            let Some(unit) = options.time_unit.or(guessed) else {
+                let first = times.first().copied().unwrap_or_default();
+                let message = format!(
+                    "`{}` has whole numbers, {first} first; --time-unit s, ms, us or ns says of what",
+                    column.name
+                );
+                return Err(table.refuse_at(plan.time, 0, Code::WholeTimes, message));
+            };
+            Ok(stamps(times, unit))
+        }
+        (Values::Stamps(times, unit), _) => Ok(stamps(times, *unit)),
+        (Values::Words { .. } | Values::Lists { .. }, _) => {
+            let message = format!("`{}` holds no times", column.name);
+            Err(table.refuse_at(plan.time, 0, Code::ColumnType, message))
+        }
+    }
+}
+
+fn stamps(times: &[i64], unit: TimeUnit) -> Times {
+    let per_second = i128::from(unit.per_second());
+    let first = times.iter().min().copied().map_or(0, i128::from);
+    let whole = first.div_euclid(per_second) as i64;
+    let offset = if whole.unsigned_abs() < FAR { 0 } else { whole };
+    let start = i128::from(offset) * per_second;
+    let seconds = times
+        .iter()
+        .map(|&time| (i128::from(time) - start) as f64 / per_second as f64)
+        .collect();
+    Times {
+        seconds,
+        precision: Some(Precision::F64),
+        offset,
+    }
+}
