@@ -127,7 +127,7 @@ fn what_bvh_cannot_hold_is_refused() {
         }
         other => panic!("{other:?}"),
     };
-    assert!(write(&[good.clone()], &options).is_ok());
+    assert!(write(std::slice::from_ref(&good), &options).is_ok());
     let two = refusal(&[good.clone(), good.clone()], &options);
     assert!(two.contains("2 clips"), "{two}");
     let mut bad = good.clone();
@@ -143,7 +143,7 @@ fn what_bvh_cannot_hold_is_refused() {
         sequence: "ZXZ".parse().ok(),
         ..MotionOptions::default()
     };
-    assert!(refusal(&[good.clone()], &twice).contains("an axis twice"));
+    assert!(refusal(std::slice::from_ref(&good), &twice).contains("an axis twice"));
     let mut circle = clip.clone();
     circle.skeleton[0].parent = Some(0);
     assert!(refusal(&[sampled(&circle, &times, &rotations)], &options).contains("circle"));
