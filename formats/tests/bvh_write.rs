@@ -127,7 +127,7 @@ fn what_bvh_cannot_hold_is_refused() {
         }
         other => panic!("{other:?}"),
     };
-    assert!(write(&[good.clone()], &options).is_ok());
+    assert!(write(std::slice::from_ref(&good), &options).is_ok());
     let two = refusal(&[good.clone(), good.clone()], &options);
     assert!(two.contains("2 clips"), "{two}");
     let mut bad = good.clone();
@@ -143,7 +143,7 @@ fn what_bvh_cannot_hold_is_refused() {
         sequence: "ZXZ".parse().ok(),
         ..MotionOptions::default()
     };
-    assert!(refusal(&[good.clone()], &twice).contains("an axis twice"));
+    assert!(refusal(std::slice::from_ref(&good), &twice).contains("an axis twice"));
     let mut circle = clip.clone();
     circle.skeleton[0].parent = Some(0);
     assert!(refusal(&[sampled(&circle, &times, &rotations)], &options).contains("circle"));
@@ -233,11 +233,13 @@ proptest! {
     #[test]
     fn what_is_written_reads_back_within_a_microradian(
         rotations in prop::collection::vec(rotation(), 1..40),
-        sequence in 0usize..24,
+        sequence in 0usize..12,
         translations in prop::array::uniform3(-1e3f32..1e3),
     ) {
-        let sequence = EulerSequence::all()[sequence];
-        prop_assume!(sequence.axes()[0] != sequence.axes()[2]);
+        let mut sequences = EulerSequence::all();
+        sequences.retain(|sequence| sequence.axes()[0] != sequence.axes()[2]);
+        prop_assert_eq!(sequences.len(), 12);
+        let sequence = sequences[sequence];
         let clip = clip(&[None], &["a"], rotations.len(), &rotations);
         let times: Vec<f64> = (0..rotations.len()).map(|k| k as f64 / 30.0).collect();
         let mut sampled = sampled(&clip, &times, &rotations);

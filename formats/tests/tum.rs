@@ -141,7 +141,7 @@ fn what_a_trajectory_cannot_hold_is_refused() {
     let samples = keyed(&clip).unwrap();
     let notes = [("method", "slerp\nor so".to_owned())];
     let good = samples.of(&clip, None, &notes);
-    let (text, warnings) = write(&[good.clone()]).unwrap();
+    let (text, warnings) = write(std::slice::from_ref(&good)).unwrap();
     let expected = "# timestamp tx ty tz qx qy qz qw\n# method: slerp or so\n1 0 0 0 0 0 0 1\n2 1 0 \
                     0 0 0 0 1\n";
     assert_eq!((text.as_str(), warnings), (expected, Vec::new()));
