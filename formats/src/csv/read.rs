@@ -58,7 +58,11 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
             },
             Need::List => {
                 let message = format!("`{}` is one number; CSV has no lists", wanted.name);
-                return Err(sheet.refuse(sheet.place(wanted.index, 0), Code::ColumnType, message));
+                return Err(sheet.refuse(
+                    sheet.cell(&header, wanted.index),
+                    Code::ColumnType,
+                    message,
+                ));
             }
         };
         columns.push(Column {
@@ -70,7 +74,8 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     }
     let mut known: Vec<HashMap<String, u32>> = vec![HashMap::new(); columns.len()];
     let mut record = ByteRecord::new();
-    let mut rows = 0;
+    // Where each row begins, and how many lines are before it.
+    let mut starts = Vec::new();
     while sheet.next(&mut reader, &mut record)? {
         sheet.check_width(&record, names.len())?;
         let own = columns.iter_mut().zip(&mut known).zip(&plan.wanted);
@@ -79,26 +84,21 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
                 sheet: &sheet,
                 text: record.get(wanted.index).unwrap_or_default().trim_ascii(),
                 column: wanted.index,
-                row: rows,
+                record: &record,
             };
             if cell.text.is_empty() {
-                column.null.get_or_insert(rows);
+                column.null.get_or_insert(starts.len());
             }
             cell.read(&mut column.values, wanted.need, known, &mut warnings)?;
         }
-        rows += 1;
+        starts.push(start_of(&record));
     }
-    let owned = name.to_owned();
     let table = Table {
         file: name.to_owned(),
         columns,
-        rows,
+        rows: starts.len(),
         text: Some(Box::new(move |column, row| {
-            let sheet = Sheet {
-                name: &owned,
-                bytes: &bytes[start..],
-            };
-            sheet.place(column, row)
+            place(&bytes[start..], starts[row], column)
         })),
     };
     let mut loaded = clips(&table, &plan, options)?;
@@ -172,52 +172,46 @@ impl Sheet<'_> {
         Err(self.refuse(place, Code::Columns, message))
     }
 
-    /// Where a cell of a row is; rows count from 0 behind the header. The text is read again: a
-    /// place is asked for at most once for each kind of message.
-    fn place(&self, column: usize, row: usize) -> Place {
-        let mut reader = self.reader();
-        let mut record = ByteRecord::new();
-        for _ in 0..=row + 1 {
-            let read = reader.read_byte_record(&mut record);
-            if !read.unwrap_or(false) {
-                break;
-            }
-        }
-        self.cell(&record, column)
-    }
-
-    /// Where a cell of a record begins; behind its end, where it has no such cell.
+    /// Where a cell of a record begins.
     fn cell(&self, record: &ByteRecord, column: usize) -> Place {
-        let start = record
-            .position()
-            .map_or(0, |position| position.byte() as usize);
-        // The record begins where the one before ended, perhaps with blank lines.
-        let ends = |byte: &u8| matches!(byte, b'\r' | b'\n');
-        let rest = self.bytes.get(start..).unwrap_or_default();
-        let mut at = start + rest.iter().take_while(|byte| ends(byte)).count();
-        let (mut commas, mut quoted) = (0, false);
-        while let Some(&byte) = self.bytes.get(at) {
-            let is_blank = matches!(byte, b' ' | b'\t');
-            if commas == column && !quoted && !is_blank || !quoted && ends(&byte) {
-                break;
-            }
-            match byte {
-                b'"' => quoted = !quoted,
-                b',' if !quoted => commas += 1,
-                _ => {}
-            }
-            at += 1;
+        place(self.bytes, start_of(record), column)
+    }
+}
+
+/// Where a record begins, and how many lines are before it.
+fn start_of(record: &ByteRecord) -> (usize, u64) {
+    let position = record.position();
+    position.map_or((0, 0), |at| (at.byte() as usize, at.line().saturating_sub(1)))
+}
+
+/// Where a cell of the record begins that starts there; behind the record's end, where it has no
+/// such cell.
+fn place(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Place {
+    let ends = |byte: &u8| matches!(byte, b'\r' | b'\n');
+    let rest = bytes.get(start..).unwrap_or_default();
+    // The record before ends there; blank lines may follow it.
+    let mut at = start + rest.iter().take_while(|byte| ends(byte)).count();
+    let (mut commas, mut quoted) = (0, false);
+    while let Some(&byte) = bytes.get(at) {
+        let is_blank = matches!(byte, b' ' | b'\t');
+        if commas == column && !quoted && !is_blank || !quoted && ends(&byte) {
+            break;
         }
-        let before = &self.bytes[..at];
-        let line_start = before
-            .iter()
-            .rposition(|&byte| byte == b'\n')
-            .map_or(0, |end| end + 1);
-        let is_character = |byte: &&u8| **byte & 0xc0 != 0x80;
-        Place::Text {
-            line: before.iter().filter(|&&byte| byte == b'\n').count() as u64 + 1,
-            column: before[line_start..].iter().filter(is_character).count() as u64 + 1,
+        match byte {
+            b'"' => quoted = !quoted,
+            b',' if !quoted => commas += 1,
+            _ => {}
         }
+        at += 1;
+    }
+    let before = bytes.get(start..at).unwrap_or_default();
+    let line_ends = before.iter().filter(|&&byte| byte == b'\n').count() as u64;
+    let line_start = bytes[..at].iter().rposition(|&byte| byte == b'\n');
+    let line = &bytes[line_start.map_or(0, |end| end + 1)..at];
+    let is_character = |byte: &&u8| **byte & 0xc0 != 0x80;
+    Place::Text {
+        line: lines + line_ends + 1,
+        column: line.iter().filter(is_character).count() as u64 + 1,
     }
 }
 
@@ -227,12 +221,12 @@ struct Cell<'a> {
     /// Without the blanks around it.
     text: &'a [u8],
     column: usize,
-    row: usize,
+    record: &'a ByteRecord,
 }
 
 impl Cell<'_> {
     fn refuse(&self, code: Code, message: String) -> Diagnostic {
-        let place = self.sheet.place(self.column, self.row);
+        let place = self.sheet.cell(self.record, self.column);
         self.sheet.refuse(place, code, message)
     }
 
@@ -292,7 +286,7 @@ impl Cell<'_> {
         let number = number::parse(&text).map_err(|(code, message)| self.refuse(code, message))?;
         if number.vanished {
             warnings.warn(Code::Tiny, || {
-                let place = self.sheet.place(self.column, self.row);
+                let place = self.sheet.cell(self.record, self.column);
                 (
                     Some(place),
                     format!("`{text}` is too small for f32; it becomes 0"),

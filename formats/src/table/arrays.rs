@@ -1,6 +1,7 @@
 //! Arrow arrays, which Parquet is read as too, appended to columns.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
@@ -9,7 +10,7 @@ use arrow_array::types::{
     Int64Type, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
     TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, RecordBatch};
+use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, TimeUnit as ArrowUnit};
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -20,8 +21,15 @@ use crate::table::plan::{Need, Wanted};
 /// Takes the rows of a table as they come.
 pub(crate) struct Gather {
     table: Table,
-    /// The codes of the words of each column.
-    known: Vec<HashMap<String, u32>>,
+    known: Vec<Known>,
+}
+
+/// The words of a column that were met before.
+#[derive(Default)]
+struct Known {
+    codes: HashMap<String, u32>,
+    /// The last dictionary and the codes of its words: batches mostly share one.
+    last: Option<(ArrayRef, Vec<u32>)>,
 }
 
 impl Gather {
@@ -49,7 +57,7 @@ impl Gather {
         let columns: Result<Vec<_>, _> = wanted.iter().zip(types).map(column).collect();
         let columns = columns?;
         Ok(Self {
-            known: vec![HashMap::new(); columns.len()],
+            known: columns.iter().map(|_| Known::default()).collect(),
             table: Table {
                 file: file.to_owned(),
                 columns,
@@ -185,7 +193,7 @@ fn is_text(data_type: &DataType) -> bool {
 /// Appends an array to what is of its type; nothing if it is of another.
 fn append(
     values: &mut Values,
-    known: &mut HashMap<String, u32>,
+    known: &mut Known,
     array: &dyn Array,
     null: &mut Option<usize>,
 ) -> Option<()> {
@@ -253,13 +261,13 @@ fn append_stamps(stamps: &mut Vec<i64>, array: &dyn Array) -> Option<()> {
 }
 
 /// The code of a word, a new one if need be.
-fn code(words: &mut Vec<String>, known: &mut HashMap<String, u32>, word: &str) -> u32 {
-    if let Some(&code) = known.get(word) {
+fn code(words: &mut Vec<String>, known: &mut Known, word: &str) -> u32 {
+    if let Some(&code) = known.codes.get(word) {
         return code;
     }
     let code = words.len() as u32;
     words.push(word.to_owned());
-    known.insert(word.to_owned(), code);
+    known.codes.insert(word.to_owned(), code);
     code
 }
 
@@ -267,7 +275,7 @@ fn code(words: &mut Vec<String>, known: &mut HashMap<String, u32>, word: &str) -
 fn append_words(
     codes: &mut Vec<u32>,
     words: &mut Vec<String>,
-    known: &mut HashMap<String, u32>,
+    known: &mut Known,
     array: &dyn Array,
     null: &mut Option<usize>,
 ) -> Option<()> {
@@ -296,15 +304,19 @@ fn append_words(
         codes.resize(start + array.len(), none);
         return Some(());
     }
-    let mut code_of = Vec::with_capacity(own.len());
-    for place in 0..own.len() {
-        let word = if own.is_null(place) {
-            ""
-        } else {
-            text(own, place)?
-        };
-        code_of.push(code(words, known, word));
-    }
+    let code_of = match known.last.take() {
+        Some((last, code_of)) if last.to_data().ptr_eq(&own.to_data()) => code_of,
+        _ => (0..own.len())
+            .map(|place| {
+                let word = if own.is_null(place) {
+                    ""
+                } else {
+                    text(own, place)?
+                };
+                Some(code(words, known, word))
+            })
+            .collect::<Option<Vec<u32>>>()?,
+    };
     let keys = dictionary.normalized_keys();
     if own.null_count() > 0 && null.is_none() {
         *null = keys
@@ -313,6 +325,7 @@ fn append_words(
             .map(|row| start + row);
     }
     codes.extend(keys.iter().map(|&key| code_of[key]));
+    known.last = Some((Arc::clone(own), code_of));
     Some(())
 }
 

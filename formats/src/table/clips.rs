@@ -12,7 +12,7 @@ use crate::grid::restore;
 use crate::keys::{Origin, select};
 use crate::motion::Motion;
 use crate::table::columns::{Reader, Table, Values};
-use crate::table::groups::{labels, scatter, share_out};
+use crate::table::groups::{labels, numbered, scatter, share_out};
 use crate::table::plan::{Cell, Parts, Plan, Rows};
 use crate::table::times::{Times, times};
 use crate::warnings::Warnings;
@@ -53,12 +53,19 @@ pub(crate) fn clips(
         }
         None => vec![(None, None)],
     };
+    let tracks = match plan.rows {
+        Rows::Keys {
+            track: Some(track), ..
+        } => Some(labels(table, track)),
+        _ => None,
+    };
     let alone = groups.len() == 1;
     for (place, (name, rows)) in groups.into_iter().enumerate() {
         let clip = Clip {
             table,
             times: &times,
             rows: rows.as_deref(),
+            tracks: tracks.as_ref(),
             options,
         };
         match clip.read(plan, name, &mut warnings) {
@@ -88,6 +95,8 @@ struct Clip<'a> {
     table: &'a Table,
     times: &'a Times,
     rows: Option<&'a [u32]>,
+    /// The track of each row of the table, and the names of the tracks; none in a table of one.
+    tracks: Option<&'a (Vec<u32>, Vec<String>)>,
     options: &'a ReadOptions,
 }
 
@@ -115,12 +124,10 @@ impl Clip<'_> {
         };
         let (mut tracks, mut lists, is_world) = match &plan.rows {
             Rows::Keys {
-                track,
-                parts,
-                is_world,
+                parts, is_world, ..
             } => {
                 let all = self.keys(String::new(), parts, warnings)?;
-                let (tracks, lists) = self.share_out(*track, all, times);
+                let (tracks, lists) = self.share_out(all, times);
                 (tracks, lists, *is_world)
             }
             Rows::Times { tracks, is_world } => {
@@ -194,19 +201,20 @@ impl Clip<'_> {
     }
 
     /// Shares keys out to the tracks that a column names, each with a list of times.
-    fn share_out(
-        &self,
-        track: Option<usize>,
-        all: Keys,
-        times: Vec<f64>,
-    ) -> (Vec<Keys>, Vec<Vec<f64>>) {
-        let (codes, names) = match track {
-            Some(track) => labels(self.table, track),
-            None => (vec![0; self.table.rows], vec![String::new()]),
-        };
-        let codes = match self.rows {
-            Some(rows) => rows.iter().map(|&row| codes[row as usize]).collect(),
-            None => codes,
+    fn share_out(&self, all: Keys, times: Vec<f64>) -> (Vec<Keys>, Vec<Vec<f64>>) {
+        let (codes, names) = match (self.tracks, self.rows) {
+            (None, _) => (vec![0; self.len()], vec![String::new()]),
+            (Some(labels), None) => labels.clone(),
+            (Some((codes, names)), Some(rows)) => {
+                let own = rows.iter().map(|&row| codes[row as usize]);
+                let (codes, own) = numbered(own);
+                (
+                    codes,
+                    own.iter()
+                        .map(|&code| names[code as usize].clone())
+                        .collect(),
+                )
+            }
         };
         let (order, ranges) = share_out(&codes, names.len());
         let rows: Vec<u32> = (0..self.len())
@@ -220,9 +228,6 @@ impl Clip<'_> {
         let mut tracks = Vec::new();
         let mut lists: Vec<Vec<f64>> = Vec::new();
         for (name, range) in names.into_iter().zip(ranges) {
-            if range.is_empty() {
-                continue;
-            }
             let mut times = times[range.clone()].to_vec();
             let mut keys = Keys {
                 name,

@@ -1,6 +1,7 @@
 //! Rows shared out to what a column names.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::ops::Range;
 
 use crate::table::columns::{Numbers, Table, Values};
@@ -9,26 +10,13 @@ use crate::table::columns::{Numbers, Table, Values};
 pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
     match &table.columns[column].values {
         Values::Words { codes, words } => {
-            let mut place: Vec<Option<u32>> = vec![None; words.len()];
-            let mut names = Vec::new();
-            let codes = codes.iter().map(|&code| {
-                *place[code as usize].get_or_insert_with(|| {
-                    names.push(words[code as usize].clone());
-                    names.len() as u32 - 1
-                })
-            });
-            (codes.collect(), names)
+            let (codes, own) = numbered(codes.iter().copied());
+            let names = own.iter().map(|&code| words[code as usize].clone());
+            (codes, names.collect())
         }
         Values::Numbers(Numbers::Whole(numbers)) => {
-            let mut place = HashMap::new();
-            let mut names = Vec::new();
-            let codes = numbers.iter().map(|&number| {
-                *place.entry(number).or_insert_with(|| {
-                    names.push(number.to_string());
-                    names.len() as u32 - 1
-                })
-            });
-            (codes.collect(), names)
+            let (codes, own) = numbered(numbers.iter().copied());
+            (codes, own.iter().map(i64::to_string).collect())
         }
         // The plan asked for names.
         _ => (
@@ -36,6 +24,19 @@ pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
             vec![table.columns[column].name.clone()],
         ),
     }
+}
+
+/// Numbers the distinct values in the order in which they come up.
+pub(crate) fn numbered<T: Copy + Eq + Hash>(values: impl Iterator<Item = T>) -> (Vec<u32>, Vec<T>) {
+    let mut known: HashMap<T, u32> = HashMap::new();
+    let mut own = Vec::new();
+    let codes = values.map(|value| {
+        *known.entry(value).or_insert_with(|| {
+            own.push(value);
+            own.len() as u32 - 1
+        })
+    });
+    (codes.collect(), own)
 }
 
 /// Sorts by code, keeping the order of equal ones: where each entry goes, and the range of each
