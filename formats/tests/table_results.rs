@@ -295,7 +295,7 @@ fn every_representation_has_its_columns() {
             let schema = batch.schema();
             let names: Vec<&str> = schema.fields().iter().map(|f| f.name().as_str()).collect();
             assert_eq!(names[..3], ["frame", "time", "track"]);
-            assert_eq!(names[3..], encoding.components());
+            assert_eq!(names[3..], *encoding.components());
             assert_eq!(
                 batch.column(0).as_primitive::<Int64Type>().values(),
                 &[0, 0, 1, 1, 2, 2]

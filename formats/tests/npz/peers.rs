@@ -35,7 +35,7 @@ fn numpy_and_scipy_agree() {
         let document = loaded.document.as_ref().unwrap();
         let options = MotionOptions::default();
         document
-            .write(&[(0, sampled)], &options, "npz", &mut kept)
+            .write(&[(0, sampled)], &options, Path::new("kept.npz"), &mut kept)
             .unwrap();
         std::fs::write(folder.path().join(format!("own_{name}")), own).unwrap();
         std::fs::write(folder.path().join(format!("kept_{name}")), kept).unwrap();

@@ -1,5 +1,6 @@
 //! Writing: our own layout, and files again in the layout that they were read in.
 
+use std::path::Path;
 use glam::{Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 use tumble_formats::diagnostic::Code;
@@ -141,7 +142,7 @@ fn halved(loaded: &Loaded, linear: &[&str]) -> (Vec<u8>, Loaded, Vec<String>) {
     };
     let mut bytes = Vec::new();
     let warnings = document
-        .write(&[(0, sampled)], &options, "npz", &mut bytes)
+        .write(&[(0, sampled)], &options, Path::new("out.npz"), &mut bytes)
         .unwrap();
     let warnings = warnings.iter().map(ToString::to_string).collect();
     let again = read(bytes.clone()).unwrap();
@@ -258,25 +259,24 @@ fn what_does_not_fit_the_layout_is_refused() {
         rate: clip.rate,
         ..picked.sampled(clip)
     };
-    let write = |clips: &[(usize, Sampled<'_>)], linear: &str, format| {
+    let write = |clips: &[(usize, Sampled<'_>)], linear: &str| {
         let linear = linear.split_whitespace().map(str::to_owned).collect();
         let options = MotionOptions {
             linear,
             ..MotionOptions::default()
         };
         document
-            .write(clips, &options, format, &mut Vec::new())
+            .write(clips, &options, Path::new("out.npz"), &mut Vec::new())
             .unwrap_err()
     };
-    assert_refused(write(&[], "", "npz"), Code::OneClip);
-    assert_refused(write(&[(1, rated.clone())], "", "npz"), Code::OneClip);
-    assert_refused(write(&[(0, rated.clone())], "", "bvh"), Code::Layout);
-    assert_refused(write(&[(0, picked.sampled(clip))], "", "npz"), Code::Layout);
+    assert_refused(write(&[], ""), Code::OneClip);
+    assert_refused(write(&[(1, rated.clone())], ""), Code::OneClip);
+    assert_refused(write(&[(0, picked.sampled(clip))], ""), Code::Layout);
     assert_refused(
-        write(&[(0, rated.clone())], "dmpls", "npz"),
+        write(&[(0, rated.clone())], "dmpls"),
         Code::NotPerFrame,
     );
-    assert_refused(write(&[(0, rated)], "trans", "npz"), Code::NotPerFrame);
+    assert_refused(write(&[(0, rated)], "trans"), Code::NotPerFrame);
     let mut other = Motion::default();
     other.set = TrackSet::with_shared_times(&[0.0], &[Quat::IDENTITY]).unwrap();
     let single = Picked::of(&other, 1);
@@ -284,7 +284,7 @@ fn what_does_not_fit_the_layout_is_refused() {
         rate: clip.rate,
         ..single.sampled(&other)
     };
-    assert_refused(write(&[(0, sampled)], "", "npz"), Code::Layout);
+    assert_refused(write(&[(0, sampled)], ""), Code::Layout);
     let rate = FrameRate::new(1 << 50, 1).unwrap();
     assert_eq!(document.times(0, rate).unwrap_err().code, Code::Layout);
 }
