@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tumble::FrameRate;
-use tumble_formats::format::{Document, WriteError};
+use tumble_formats::format::{Document, MotionOptions, WriteError};
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
 use tumble_formats::sample::Samples;
@@ -27,7 +27,7 @@ fn baked(loaded: &Loaded, fps: u64, to: &Path) -> Result<(Vec<u8>, Vec<Diagnosti
         .map(|(clip, samples)| (clip.place, samples.of(clip, Some(rate), &[])))
         .collect();
     let mut bytes = Vec::new();
-    let warnings = document.write(&clips, to, &mut bytes)?;
+    let warnings = document.write(&clips, &MotionOptions::default(), to, &mut bytes)?;
     Ok((bytes, warnings))
 }
 
@@ -226,7 +226,9 @@ fn nothing_to_bake_is_the_same_file() {
         let mut bytes = Vec::new();
         let document = loaded.document.as_ref().unwrap();
         let to = PathBuf::from("/out").with_extension(Path::new(name).extension().unwrap());
-        let warnings = document.write(&[], &to, &mut bytes).unwrap();
+        let warnings = document
+            .write(&[], &MotionOptions::default(), &to, &mut bytes)
+            .unwrap();
         assert_eq!(warnings, []);
         assert!(bytes == fs::read(fixture(name)).unwrap(), "{name}");
     }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
+use tumble_formats::format::MotionOptions;
 use tumble_formats::{Code, Diagnostic, Loaded, ReadOptions};
 
 use crate::gltf::{fixture, json_of, open};
@@ -14,7 +15,9 @@ const PNG: &[u8] = b"\x89PNG\r\n\x1a\nnot much of a picture";
 
 fn written(loaded: &Loaded, to: &Path) -> (Vec<u8>, Vec<Diagnostic>) {
     let mut bytes = Vec::new();
-    let warnings = document(loaded).write(&[], to, &mut bytes).unwrap();
+    let warnings = document(loaded)
+        .write(&[], &MotionOptions::default(), to, &mut bytes)
+        .unwrap();
     (bytes, warnings)
 }
 
@@ -142,7 +145,12 @@ fn text_is_written_beside_its_files_alone() {
     assert!(text == fs::read(&beside).unwrap());
     let other = tempfile::tempdir().unwrap();
     let mut out = Vec::new();
-    let elsewhere = document(&loaded).write(&[], &other.path().join("walk.gltf"), &mut out);
+    let elsewhere = document(&loaded).write(
+        &[],
+        &MotionOptions::default(),
+        &other.path().join("walk.gltf"),
+        &mut out,
+    );
     let why = refused(elsewhere.unwrap_err());
     assert_eq!((why.code, out.len()), (Code::GltfFolder, 0));
     assert!(
@@ -156,7 +164,12 @@ fn text_is_written_beside_its_files_alone() {
         &other.path().join("cubic.gltf"),
     );
     let glb = open(&fixture("whole.glb"));
-    let as_text = document(&glb).write(&[], &folder.path().join("whole.gltf"), &mut out);
+    let as_text = document(&glb).write(
+        &[],
+        &MotionOptions::default(),
+        &folder.path().join("whole.gltf"),
+        &mut out,
+    );
     assert_eq!(refused(as_text.unwrap_err()).code, Code::GltfFolder);
 }
 

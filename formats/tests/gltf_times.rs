@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tumble::FrameRate;
 use tumble_formats::Code;
+use tumble_formats::format::MotionOptions;
 use tumble_formats::motion::Sampled;
 
 use crate::gltf::open;
@@ -79,7 +80,12 @@ fn more_than_a_glb_holds_is_refused_before_any_work() {
     };
     let clips: Vec<_> = loaded.clips.iter().map(sampled).enumerate().collect();
     let mut out = Vec::new();
-    let written = document(&loaded).write(&clips, Path::new("/a.glb"), &mut out);
+    let written = document(&loaded).write(
+        &clips,
+        &MotionOptions::default(),
+        Path::new("/a.glb"),
+        &mut out,
+    );
     assert_eq!(refused(written.unwrap_err()).code, Code::GlbTooLong);
     assert!(out.is_empty());
 }

@@ -5,13 +5,8 @@ use std::path::{Path as FilePath, PathBuf};
 
 use tumble::FrameRate;
 
-<<<<<<< HEAD
-use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::format::{Document, Format, MotionOptions, WriteError};
-=======
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Document, Format, WriteError};
->>>>>>> c7eece9 (glTF files are written again with samples instead of keys, everything else byte for byte)
+use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::Read;
 use crate::gltf::baking::Baking;
