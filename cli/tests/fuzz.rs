@@ -95,14 +95,15 @@ fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &
     input.truncate(LONGEST);
 }
 
-/// Every good and bad file of a format's fixtures.
+/// Every good and bad file of a format's fixtures, by the format's name and extensions.
 fn fixtures(format: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures");
     let folder = folder.join(format);
     let paths = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path());
-    let files = paths.filter(|path| path.extension().unwrap() == format);
+    let of = tumble_formats::Format::of;
+    let files = paths.filter(|path| of(path).is_some_and(|of| of.name == format));
     files.map(|path| fs::read(path).unwrap()).collect()
 }
 
@@ -138,6 +139,38 @@ fn dat() {
         "0.5 1 0 0 0 0 1 0 0\n",
     ];
     fuzz("dat", targets::dat, fixtures("dat"), &words);
+}
+
+#[test]
+fn gltf() {
+    let words = [
+        "glTF\u{2}\0\0\0",
+        "JSON{",
+        "BIN\0",
+        "\0\0\0\0",
+        "\"nodes\":[{}]",
+        "\"children\":[0]",
+        "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]",
+        "\"rotation\"",
+        "\"translation\"",
+        "\"weights\"",
+        "\"CUBICSPLINE\"",
+        "\"STEP\"",
+        "\"sparse\"",
+        "\"normalized\":true",
+        "\"byteStride\":4",
+        "\"EXT_meshopt_compression\"",
+        "5121",
+        "5126",
+        "18446744073709551615",
+        "-1",
+        "1e39",
+        "null",
+        "[",
+        "}",
+        ",",
+    ];
+    fuzz("gltf", targets::gltf::gltf, fixtures("glb"), &words);
 }
 
 #[test]

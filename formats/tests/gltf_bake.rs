@@ -1,1 +1,332 @@
+//! glTF files written again with samples instead of keys: everything else comes back byte for byte.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tumble::FrameRate;
+use tumble_formats::format::{Document, MotionOptions, WriteError};
+use tumble_formats::gltf::read_gltf;
+use tumble_formats::motion::{Motion, Sampled, Sampler};
+use tumble_formats::sample::Samples;
+use tumble_formats::{Diagnostic, Loaded, ReadOptions};
+
+use crate::glb::{Glb, Text, entries, members, raw, text_of};
+use crate::gltf::{fixture, keys_of, open, sample};
+use crate::support::shared_data;
+use crate::validator::{Report, validate};
+
+/// A file with all its animations sampled at `fps`, as the file of that name.
+fn baked(loaded: &Loaded, fps: u64, to: &Path) -> Result<(Vec<u8>, Vec<Diagnostic>), WriteError> {
+    let document = loaded.document.as_ref().unwrap();
+    let rate = FrameRate::new(fps, 1).unwrap();
+    let samples: Vec<Samples> = (loaded.clips.iter())
+        .map(|clip| sample(clip, document.times(clip.place, rate).unwrap()))
+        .collect();
+    let clips: Vec<(usize, Sampled<'_>)> = (loaded.clips.iter().zip(&samples))
+        .map(|(clip, samples)| (clip.place, samples.of(clip, Some(rate), &[])))
+        .collect();
+    let mut bytes = Vec::new();
+    let warnings = document.write(&clips, &MotionOptions::default(), to, &mut bytes)?;
+    Ok((bytes, warnings))
+}
+
+/// A GLB baked from a file, for a folder elsewhere.
+fn glb_of(path: &Path, fps: u64) -> (Loaded, Glb) {
+    let loaded = open(path);
+    let (bytes, _) = baked(&loaded, fps, Path::new("/out.glb")).unwrap();
+    (loaded, Glb::parse(&bytes))
+}
+
+/// Files with animations whose reading is tested elsewhere.
+fn files() -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    let folders = shared_data()
+        .into_iter()
+        .flat_map(|data| [data.join("gltf"), data.join("gltf/made")]);
+    for folder in folders.chain([fixture("")]) {
+        let paths = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path());
+        files.extend(paths.filter(|path| {
+            let is_gltf = path
+                .extension()
+                .is_some_and(|own| own == "gltf" || own == "glb");
+            let read = || tumble_formats::gltf::open_gltf(path, &ReadOptions::default());
+            is_gltf && read().is_ok_and(|loaded| !loaded.clips.is_empty())
+        }));
+    }
+    files.sort();
+    files
+}
+
+/// Of every file: what is not animation stays, old entries stay before new ones, and what was
+/// sampled is read again.
+#[test]
+fn everything_but_the_samples_comes_back() {
+    let files = files();
+    assert!(files.len() >= 35, "{}", files.len());
+    for path in &files {
+        let what = path.display();
+        let is_glb = path.extension().unwrap() == "glb";
+        let (loaded, glb) = glb_of(path, 60);
+        let (old_text, new_text) = (text_of(path), glb.text.clone());
+        let (old, new) = (
+            members(old_text.trim_start_matches('\u{feff}')),
+            members(&new_text),
+        );
+        for (name, value) in &old {
+            let changed = ["animations", "accessors", "bufferViews", "buffers"].contains(&&**name);
+            assert!(changed || new[name].get() == value.get(), "{what}: {name}");
+        }
+        assert!(new.keys().eq(old.keys()), "{what}");
+        for list in ["accessors", "bufferViews"] {
+            let (old, new) = (entries(&old, list), entries(&new, list));
+            // A .gltf of several buffers has them in one.
+            if is_glb || list == "accessors" {
+                assert_eq!(raw(&old), raw(&new)[..old.len()], "{what}: {list}");
+            }
+        }
+        if is_glb {
+            let before = Glb::parse(&fs::read(path).unwrap());
+            assert!(glb.bin.starts_with(&before.bin), "{what}");
+            assert_eq!(glb.others, before.others, "{what}");
+        }
+        check_new_entries(&glb, &old, &what.to_string());
+        let again = read_gltf("t", glb.bytes, None, &ReadOptions::default()).unwrap();
+        assert_eq!(again.refused.len(), loaded.refused.len(), "{what}");
+        check_clips(&loaded, &again.clips, &what.to_string());
+    }
+}
+
+/// What was appended is packed floats, aligned, with `min` and `max` for times.
+fn check_new_entries(glb: &Glb, old: &Text, what: &str) {
+    let json = glb.json();
+    let before = |list| entries(old, list).len();
+    for view in &json["bufferViews"].as_array().unwrap()[before("bufferViews")..] {
+        let names: Vec<_> = view.as_object().unwrap().keys().collect();
+        assert_eq!(names, ["buffer", "byteLength", "byteOffset"], "{what}");
+        assert_eq!(view["byteOffset"].as_u64().unwrap() % 4, 0, "{what}");
+    }
+    for accessor in &json["accessors"].as_array().unwrap()[before("accessors")..] {
+        assert_eq!(accessor["componentType"], 5126, "{what}");
+        assert_eq!(accessor["byteOffset"].as_u64().unwrap() % 4, 0, "{what}");
+        assert_eq!(
+            accessor["type"] == "SCALAR",
+            accessor["min"].is_array(),
+            "{what}"
+        );
+    }
+    let names = |json: &Value| -> Vec<Value> {
+        let all = json["animations"].as_array().unwrap().iter();
+        all.map(|animation| animation["name"].clone()).collect()
+    };
+    let animations: Value = serde_json::from_str(old["animations"].get()).unwrap();
+    assert_eq!(
+        names(&serde_json::json!({ "animations": animations })),
+        names(&json),
+        "{what}"
+    );
+}
+
+/// Channels that were sampled have the samples as keys, all others the keys that they had.
+fn check_clips(loaded: &Loaded, again: &[Motion], what: &str) {
+    assert_eq!(loaded.clips.len(), again.len(), "{what}");
+    let document = loaded.document.as_ref().unwrap();
+    for (clip, new) in loaded.clips.iter().zip(again) {
+        let rate = FrameRate::new(60, 1).unwrap();
+        let times = document.times(clip.place, rate).unwrap();
+        let samples = sample(clip, times.clone());
+        // To the last bit where times are read as they are: see the next test.
+        let ends = |clip: &Motion| clip.set.time_span().unwrap();
+        let (old, own) = (ends(clip), ends(new));
+        let is_near = (old.0 - own.0).abs() <= 2e-7 && (old.1 - own.1).abs() <= 2e-7;
+        assert!(is_near, "{what}: {old:?} {own:?}");
+        let tracks = clip.set.track_count();
+        for track in 0..tracks {
+            let old = clip.channel(track);
+            for (path, sampler) in [
+                ("rotation", old.rotation),
+                ("translation", old.translation),
+                ("scale", old.scale),
+            ] {
+                let (before, after) = (keys_of(clip, track, path), keys_of(new, track, path));
+                let is_sampled =
+                    before.len() > 1 && sampler.is_some_and(|own| own != Sampler::Step);
+                if !is_sampled {
+                    assert_eq!(before, after, "{what}: {path} of track {track}");
+                    continue;
+                }
+                let near = times
+                    .iter()
+                    .zip(after)
+                    .all(|(a, b)| (a - b).abs() <= 1e-7 * a.abs().max(1.0));
+                assert!(
+                    near && times.len() == after.len(),
+                    "{what}: {times:?} {after:?}"
+                );
+                let own = new.channel(track);
+                let now = match path {
+                    "rotation" => own.rotation,
+                    "translation" => own.translation,
+                    _ => own.scale,
+                };
+                assert_eq!(now, Some(Sampler::Linear), "{what}");
+            }
+            if old.rotation.is_some_and(|own| own != Sampler::Step)
+                && clip.set.track(track).keys.len() > 1
+            {
+                for (at, key) in new.set.track(track).keys.iter().enumerate() {
+                    let expected = samples.rotations[at * tracks + track];
+                    // A sample whose norm is off by more than 4e-7 is normalised as a key.
+                    let is_near = expected.abs_diff_eq(*key, 6e-7);
+                    assert!(
+                        is_near,
+                        "{what}: track {track}, sample {at}: {expected} {key}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The largest time of any sampler of an animation, as stored, moved channels or not.
+#[test]
+fn an_animation_is_as_long_as_before_to_the_last_bit() {
+    let Some(data) = shared_data() else { return };
+    for (file, fps) in [
+        ("Fox.glb", 30),
+        ("Fox.glb", 120),
+        ("fox_meshopt_khr.glb", 50),
+        ("box_animated.gltf", 60),
+        ("made/summed_times.gltf", 60),
+        ("made/start_late.gltf", 7),
+        ("made/after_a_day.gltf", 100),
+    ] {
+        let path = data.join("gltf").join(file);
+        let raw_times = crate::gltf::raw();
+        let before = tumble_formats::gltf::open_gltf(&path, &raw_times).unwrap();
+        let (_, glb) = glb_of(&path, fps);
+        let after = read_gltf("t", glb.bytes, None, &raw_times).unwrap();
+        for (a, b) in before.clips.iter().zip(&after.clips) {
+            assert_eq!(a.set.time_span(), b.set.time_span(), "{file}, {:?}", a.name);
+        }
+    }
+}
+
+#[test]
+fn nothing_to_bake_is_the_same_file() {
+    for name in [
+        "whole.glb",
+        "unknown_chunk.glb",
+        "step_scale.gltf",
+        "uri_percent.gltf",
+    ] {
+        let loaded = open(&fixture(name));
+        let mut bytes = Vec::new();
+        let document = loaded.document.as_ref().unwrap();
+        let to = PathBuf::from("/out").with_extension(Path::new(name).extension().unwrap());
+        let warnings = document
+            .write(&[], &MotionOptions::default(), &to, &mut bytes)
+            .unwrap();
+        assert_eq!(warnings, []);
+        assert!(bytes == fs::read(fixture(name)).unwrap(), "{name}");
+    }
+    // Steps alone are nothing to bake either.
+    let (bytes, _) = baked(&open(&fixture("step_scale.gltf")), 60, Path::new("/a.gltf")).unwrap();
+    assert!(bytes == fs::read(fixture("step_scale.gltf")).unwrap());
+}
+
+#[test]
+fn text_is_changed_where_it_has_to_be_and_nowhere_else() {
+    let name = "names_twice_elsewhere.gltf";
+    let (bytes, _) = baked(&open(&fixture(name)), 2, Path::new("/out.gltf")).unwrap();
+    let (old, new) = (
+        fs::read_to_string(fixture(name)).unwrap(),
+        String::from_utf8(bytes).unwrap(),
+    );
+    let extras = old.find("\"extras\"").unwrap()..old.find("\"nodes\"").unwrap();
+    assert_eq!(old[..extras.end], new[..extras.end]);
+    assert!(old[extras].contains(r#""a": 1, "a": 1e400, "b": 123456789012345678901234567890"#));
+    let old_buffer = old
+        .split("\"uri\"")
+        .nth(1)
+        .unwrap()
+        .split('}')
+        .next()
+        .unwrap();
+    assert!(new.contains(old_buffer), "the old data stays");
+    let json: Value =
+        serde_json::from_str(&new.replace("1e400", "1").replace("\\ud83d", "")).unwrap();
+    assert_eq!(json["buffers"][1]["byteLength"], 3 * 4 + 3 * 16);
+    assert_eq!(json["bufferViews"][2]["buffer"], 1);
+    assert_eq!(
+        json["animations"][0]["samplers"][0],
+        serde_json::json!({"input": 2, "output": 3})
+    );
+}
+
+/// A sampler of a channel that stays is left alone, and one that several nodes share stays shared.
+#[test]
+fn shared_samplers_are_replaced_only_where_others_need_them() {
+    let (_, glb) = glb_of(&fixture("sampler_of_a_node_and_a_material.gltf"), 4);
+    let json = glb.json();
+    let animation = &json["animations"][0];
+    assert_eq!(
+        animation["samplers"][0],
+        serde_json::json!({"input": 0, "output": 1})
+    );
+    let new = serde_json::json!({"input": 2, "output": 3, "interpolation": "LINEAR"});
+    assert_eq!(animation["samplers"][1], new);
+    let of = |channel: usize| animation["channels"][channel]["sampler"].as_u64();
+    assert_eq!((of(0), of(1)), (Some(1), Some(0)));
+    let (_, glb) = glb_of(&fixture("sampler_of_two_nodes.gltf"), 4);
+    let json = glb.json();
+    assert_eq!(
+        json["animations"][0]["samplers"].as_array().unwrap().len(),
+        1
+    );
+    assert_eq!(json["accessors"].as_array().unwrap().len(), 4);
+}
+
+/// Khronos' validator finds no error in what is written that it did not find before.
+#[test]
+fn no_error_is_new_to_khronos_validator() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut pairs = Vec::new();
+    // Of times below 0 the validator says as well that those from 0 on do not increase.
+    let is_valid = |path: &PathBuf| !path.ends_with("negative_time.gltf");
+    for (number, path) in files().into_iter().filter(is_valid).enumerate() {
+        let to = folder.path().join(format!("{number}.glb"));
+        fs::write(&to, glb_of(&path, 30).1.bytes).unwrap();
+        pairs.extend([path, to]);
+    }
+    let Some(reports) = validate(&pairs) else {
+        return;
+    };
+    for (paths, both) in pairs.chunks(2).zip(reports.chunks(2)) {
+        // Of each error its code and its pointer: what is wrong with a number names the number.
+        let errors = |report: &Report| -> Vec<String> {
+            let cut = |error: &String| error.split(": ").next().unwrap().to_owned();
+            report.errors.iter().map(cut).collect()
+        };
+        let (old, new) = (errors(&both[0]), errors(&both[1]));
+        let new: Vec<_> = new.iter().filter(|error| !old.contains(error)).collect();
+        assert!(
+            new.is_empty(),
+            "{}: {new:#?} beside {old:#?}",
+            paths[0].display()
+        );
+    }
+}
+
+pub(crate) fn refused(error: WriteError) -> Diagnostic {
+    match error {
+        WriteError::Refused(diagnostic) => diagnostic,
+        WriteError::Io(error) => panic!("{error}"),
+    }
+}
+
+pub(crate) fn document(loaded: &Loaded) -> &dyn Document {
+    loaded.document.as_deref().unwrap()
+}

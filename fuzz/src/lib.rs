@@ -6,6 +6,7 @@ mod targets;
 pub fn target(name: &str, data: &[u8]) {
     let target: targets::Target = match name {
         "dat" => targets::dat,
+        "gltf" => targets::gltf::gltf,
         "bvh" => targets::motion::bvh,
         "tum" => targets::motion::tum,
         "outputs" => targets::outputs,

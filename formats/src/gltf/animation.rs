@@ -69,7 +69,7 @@ pub(super) fn read(
     let start = all_times().fold(f64::INFINITY, f64::min);
     let start = if start.is_finite() { start } else { 0.0 };
     for &node in &tracks.nodes {
-        let rest = tracks.rest(node, reader, nodes, &mut motion)?;
+        let rest = rest(node, reader, nodes, &mut motion)?;
         let own = |path| {
             let channel = moved
                 .iter()
@@ -251,25 +251,24 @@ impl Tracks {
     fn of_node(&self, node: usize) -> usize {
         self.nodes.partition_point(|&own| own < node)
     }
+}
 
-    /// Where a node rests; notes where that is more than a transform can say.
-    fn rest(
-        &self,
-        node: usize,
-        reader: &Reader<'_>,
-        nodes: &Nodes,
-        motion: &mut Motion,
-    ) -> Result<motion::Transform, Diagnostic> {
-        let rest = nodes.rest(node, reader)?;
-        if rest.is_sheared {
-            let pointer = format!("/nodes/{node}/matrix");
-            let message = format!(
-                "the matrix of `{}` shears or projects; poses in the world cannot be told",
-                nodes.name(node)
-            );
-            reader.warn(Code::Shear, &pointer, || message.clone());
-            motion.no_world.get_or_insert(message);
-        }
-        Ok(rest.transform)
+/// Where a node rests; notes where that is more than a transform can say.
+fn rest(
+    node: usize,
+    reader: &Reader<'_>,
+    nodes: &Nodes,
+    motion: &mut Motion,
+) -> Result<motion::Transform, Diagnostic> {
+    let rest = nodes.rest(node, reader)?;
+    if rest.is_sheared {
+        let pointer = format!("/nodes/{node}/matrix");
+        let message = format!(
+            "the matrix of `{}` shears or projects; poses in the world cannot be told",
+            nodes.name(node)
+        );
+        reader.warn(Code::Shear, &pointer, || message.clone());
+        motion.no_world.get_or_insert(message);
     }
+    Ok(rest.transform)
 }

@@ -80,21 +80,6 @@ impl Container {
         Some(&glb.bytes[place.clone()])
     }
 
-    /// The chunks that are neither the JSON nor the BIN chunk, those before the BIN chunk first.
-    fn others(&self) -> (Vec<(u32, &[u8])>, Vec<(u32, &[u8])>) {
-        let Some(glb) = &self.glb else {
-            return Default::default();
-        };
-        let data = |&(kind, ref place): &(u32, Range<usize>)| (kind, &glb.bytes[place.clone()]);
-        let bin = glb.list.iter().position(|(kind, _)| *kind == BIN);
-        let (before, after) = glb.list.split_at(bin.unwrap_or(0));
-        let after = &after[usize::from(bin.is_some())..];
-        (
-            before.iter().map(data).collect(),
-            after.iter().map(data).collect(),
-        )
-    }
-
     /// Writes a GLB with this JSON and these parts of a BIN chunk, and the other chunks of the file.
     ///
     /// # Errors
@@ -105,13 +90,23 @@ impl Container {
         bin: Option<&[&[u8]]>,
         out: &mut dyn Write,
     ) -> io::Result<()> {
-        let (before, after) = self.others();
         let text = text.trim_end();
-        let mut chunks: Vec<(u32, Vec<&[u8]>)> =
-            vec![(JSON, vec![text.as_bytes(), padding(text.len(), b"   ")])];
-        chunks.extend(before.into_iter().map(|(kind, data)| (kind, vec![data])));
-        chunks.extend(bin.map(|parts| (BIN, parts.to_vec())));
-        chunks.extend(after.into_iter().map(|(kind, data)| (kind, vec![data])));
+        let json = vec![text.as_bytes(), padding(text.len(), b"   ")];
+        let mut chunks: Vec<(u32, Vec<&[u8]>)> = vec![(JSON, json)];
+        let mut bin = bin.map(<[_]>::to_vec);
+        if let Some(glb) = &self.glb {
+            if self.bin().is_none() {
+                chunks.extend(bin.take().map(|parts| (BIN, parts)));
+            }
+            for (kind, place) in &glb.list {
+                let own = bin.take_if(|_| *kind == BIN);
+                chunks.push((
+                    *kind,
+                    own.unwrap_or_else(|| vec![&glb.bytes[place.clone()]]),
+                ));
+            }
+        }
+        chunks.extend(bin.map(|parts| (BIN, parts)));
         let length = |parts: &[&[u8]]| parts.iter().map(|part| part.len() as u64).sum::<u64>();
         let total = 12
             + chunks

@@ -7,6 +7,7 @@
 mod accessor;
 mod animation;
 mod bake;
+mod baking;
 mod channel;
 mod compressed;
 mod container;

@@ -1,0 +1,91 @@
+//! When a glTF file is sampled, and what of it is refused before it is.
+
+use std::path::Path;
+
+use tumble::FrameRate;
+use tumble_formats::Code;
+use tumble_formats::format::MotionOptions;
+use tumble_formats::motion::Sampled;
+
+use crate::gltf::open;
+use crate::gltf_bake::{document, refused};
+use crate::support::shared_data;
+
+#[test]
+fn frames_that_f32_cannot_tell_apart_are_refused_with_the_rate_that_fits() {
+    let Some(data) = shared_data() else { return };
+    let loaded = open(&data.join("gltf/made/after_a_day.gltf"));
+    let times = |fps| document(&loaded).times(0, FrameRate::new(fps, 1).unwrap());
+    let refused = times(240).unwrap_err();
+    assert_eq!(refused.code, Code::TimesInF32);
+    let said = refused.to_string();
+    assert!(said.contains("/animations/0: error[E182]"), "{said}");
+    assert!(
+        said.contains("0.0078125 s apart") && said.contains("128 fps fits"),
+        "{said}"
+    );
+    let found = times(128).unwrap();
+    assert_eq!(
+        (found.len(), found[0], found[128]),
+        (129, 86_399.0, 86_400.0)
+    );
+}
+
+#[test]
+fn times_are_whole_frames_and_both_ends() {
+    let Some(data) = shared_data() else { return };
+    let times = |file: &str, fps| {
+        let loaded = open(&data.join("gltf").join(file));
+        document(&loaded)
+            .times(0, FrameRate::new(fps, 1).unwrap())
+            .unwrap()
+    };
+    assert_eq!(
+        times("made/start_late.gltf", 2),
+        [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+    );
+    assert_eq!(times("made/single_key.gltf", 60).len(), 43);
+    // 17 frames of 24 fps end on a frame of 120, and not on one of 50.
+    let fox = open(&data.join("gltf/Fox.glb"));
+    let walk = fox
+        .clips
+        .iter()
+        .find(|clip| clip.name.as_deref() == Some("Walk"))
+        .unwrap();
+    let of = |fps| {
+        document(&fox)
+            .times(walk.place, FrameRate::new(fps, 1).unwrap())
+            .unwrap()
+    };
+    assert_eq!((of(120).len(), of(120)[85]), (86, 17.0 / 24.0));
+    assert_eq!(
+        (of(50).len(), of(50)[35], of(50)[36]),
+        (37, 0.7, 17.0 / 24.0)
+    );
+}
+
+#[test]
+fn more_than_a_glb_holds_is_refused_before_any_work() {
+    let Some(data) = shared_data() else { return };
+    let loaded = open(&data.join("gltf/Fox.glb"));
+    let times: Vec<f64> = (0..6_000_000).map(f64::from).collect();
+    let sampled = |clip| Sampled {
+        clip,
+        times: &times,
+        rate: None,
+        rotations: &[],
+        translations: &[],
+        scales: &[],
+        notes: &[],
+    };
+    let clips: Vec<_> = loaded.clips.iter().map(sampled).enumerate().collect();
+    let mut out = Vec::new();
+    let written = document(&loaded).write(
+        &clips,
+        &MotionOptions::default(),
+        Path::new("/a.glb"),
+        &mut out,
+    );
+    assert_eq!(refused(written.unwrap_err()).code, Code::GlbTooLong);
+    assert!(out.is_empty());
+}
