@@ -122,7 +122,7 @@ fn one_of_two_keys_at_one_time_stays() {
 #[test]
 fn names_that_do_not_fit_are_refused() {
     for (map, code, hint) in [
-        ("time", Code::Map, "no `=`"),
+        ("time", Code::Map, "is not `name=source`"),
         ("time=seconds", Code::ColumnMissing, "`seconds`"),
         ("hand=x[0:4]", Code::ColumnType, "no lists"),
         ("hand=x[0:3]", Code::ListLength, "needs 4"),
