@@ -104,11 +104,13 @@ RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-it
 # to count, and no test; so the tests are counted too.
 as_release=(--config profile.dev.package.glam.opt-level=3)
 for package in tumble tumble-formats tumble-cli; do
-    for setting in opt-level=3 codegen-units=16 overflow-checks=false debug-assertions=false; do
+    for setting in codegen-units=16 overflow-checks=false debug-assertions=false; do
         as_release+=(--config "profile.dev.package.$package.$setting")
     done
 done
+as_release+=(--config profile.dev.package.tumble.opt-level=3)
+as_release+=(--config profile.dev.package.tumble-formats.opt-level=3)
 CARGO_INCREMENTAL=0 cargo test -p tumble-cli --test cost "${as_release[@]}" |
     tee /dev/stderr | grep -q "^test result: ok. 2 passed"
-# Twenty seconds for each fuzz target; ten minutes each are FUZZ_SECONDS=600.
+# Twenty seconds for each fuzz target, five for motion files; ten minutes each are FUZZ_SECONDS=600.
 FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test --workspace

@@ -1,6 +1,7 @@
 //! The functions of the shaders that compute, each beside its twin.
 
 use crate::fit::constant_velocity::arc_component;
+use crate::math::quaternion::{cross3, dot, dot3, product};
 use crate::shader::{ArcSegment, PolynomialSegment, TangentWeights};
 use crate::simd::lanes::canonical;
 use crate::twin::arc_between::arc_between;
@@ -10,15 +11,15 @@ use crate::twin::arc_tangent::{
 use crate::twin::axis_angle::axis_angle;
 use crate::twin::euler::{euler, wrapped};
 use crate::twin::evaluate::Evaluate as _;
-use crate::twin::evaluate_arc::square;
+use crate::twin::evaluate_arc::norm_squared;
 use crate::twin::evaluate_polynomial::polynomial;
 use crate::twin::f16::to_half;
 use crate::twin::matrix::matrix_rows;
-use crate::twin::quaternion::{dot4, normalised, product, rotated, slerp};
+use crate::twin::quaternion::{normalised, rotated, slerp};
 use crate::twin::sine_cosine::{sine_cosine, sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{
-    FromIdentity, canonical_product, composed, cross3, dot3, inverse_rotated, small_angle_cubic,
-    small_exp, small_log, step_vector,
+    FromIdentity, canonical_product, composed, inverse_rotated, small_angle_cubic, small_exp,
+    small_log, step_vector,
 };
 use crate::twin::snorm16::to_snorm;
 
@@ -92,7 +93,7 @@ pub(super) fn math() -> Vec<Twin> {
             |(x, z)| sine_cosm1_quarter(x, z),
         ),
         twin(POSES, "product", two, |(a, b)| product(a, b)),
-        twin(POSES, "dot4", two, |(a, b)| dot4(a, b)),
+        twin(POSES, "dot4", two, |(a, b)| dot(a, b)),
         twin(
             POSES,
             "rotated",
@@ -140,7 +141,7 @@ pub(super) fn forms() -> Vec<Twin> {
             "arc_frames_f32",
             "norm_squared",
             Random::vector::<4>,
-            square,
+            norm_squared,
         ),
         twin(
             "arc_frames_f32",
@@ -166,8 +167,9 @@ pub(super) fn from_keys() -> Vec<Twin> {
             "constant_velocity",
             |random| (random.vector::<4>(), random.vector::<4>()),
             |(middle, tangent)| {
-                let each: [[f32; 11]; 4] =
-                    std::array::from_fn(|c| arc_component(middle[c], tangent[c], square(tangent)));
+                let each: [[f32; 11]; 4] = std::array::from_fn(|c| {
+                    arc_component(middle[c], tangent[c], norm_squared(tangent))
+                });
                 std::array::from_fn::<_, 11, _>(|power| each.map(|own| own[power]))
             },
         ),

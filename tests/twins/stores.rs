@@ -12,7 +12,7 @@ use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
 pub(super) fn euler_detail(random: &mut Random) -> u32 {
     let all = EulerSequence::all();
     let sequence = all[random.below(all.len() as u32) as usize];
-    Encoding::Euler(sequence).detail()
+    Encoding::Euler(sequence).row().detail
 }
 
 fn encoding(kind: &str, random: &mut Random) -> Encoding {
@@ -42,7 +42,7 @@ fn store(kernel: &'static str, kind: &'static str) -> Twin {
         let rotation = random.rotation();
         let place = random.below(3);
         trial.argument((place, rotation));
-        trial.global("dispatch", [0, 0, 0, encoding.detail(), 0u32]);
+        trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
         trial.output("rotations");
         let mut bytes = vec![0; encoding.bytes()];
         encoding.encode(&[rotation], &mut bytes);

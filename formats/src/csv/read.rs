@@ -181,7 +181,9 @@ impl Sheet<'_> {
 /// Where a record begins, and how many lines are before it.
 fn start_of(record: &ByteRecord) -> (usize, u64) {
     let position = record.position();
-    position.map_or((0, 0), |at| (at.byte() as usize, at.line().saturating_sub(1)))
+    position.map_or((0, 0), |at| {
+        (at.byte() as usize, at.line().saturating_sub(1))
+    })
 }
 
 /// Where a cell of the record begins that starts there; behind the record's end, where it has no

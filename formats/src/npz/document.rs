@@ -269,7 +269,7 @@ impl Document for NpzDocument {
     }
 
     fn writes(&self, format: &Format) -> bool {
-        std::ptr::eq(format, &FORMAT)
+        format.name == FORMAT.name
     }
 
     fn write(

@@ -51,12 +51,17 @@ impl Job<'_> {
         };
         let write = target.format().write_motion;
         let options = self.options(target);
-        self.written(name, clips, &times, rate, target, |sampled, out| {
-            match write {
+        self.written(
+            name,
+            clips,
+            &times,
+            rate,
+            target,
+            |sampled, out| match write {
                 Some(write) => write(sampled, &options, out),
                 None => Ok(Vec::new()),
-            }
-        })
+            },
+        )
     }
 
     /// The input's own file, everything kept but the keys of some of its animations.
