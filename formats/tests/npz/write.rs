@@ -1,7 +1,7 @@
 //! Writing: our own layout, and files again in the layout that they were read in.
 
-use std::path::Path;
 use glam::{Quat, Vec3};
+use std::path::Path;
 use tumble::{FrameRate, TrackSet};
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{MotionOptions, WriteError};
@@ -272,10 +272,7 @@ fn what_does_not_fit_the_layout_is_refused() {
     assert_refused(write(&[], ""), Code::OneClip);
     assert_refused(write(&[(1, rated.clone())], ""), Code::OneClip);
     assert_refused(write(&[(0, picked.sampled(clip))], ""), Code::Layout);
-    assert_refused(
-        write(&[(0, rated.clone())], "dmpls"),
-        Code::NotPerFrame,
-    );
+    assert_refused(write(&[(0, rated.clone())], "dmpls"), Code::NotPerFrame);
     assert_refused(write(&[(0, rated)], "trans"), Code::NotPerFrame);
     let mut other = Motion::default();
     other.set = TrackSet::with_shared_times(&[0.0], &[Quat::IDENTITY]).unwrap();
