@@ -1,6 +1,9 @@
 //! One animation as a clip.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::btree_map::{BTreeMap, Entry};
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+use tumble::FrameRate;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
@@ -68,13 +71,15 @@ pub(super) fn read(
     let all_times = || keys.iter().flat_map(|keys| keys.times.iter().copied());
     let start = all_times().fold(f64::INFINITY, f64::min);
     let start = if start.is_finite() { start } else { 0.0 };
+    let targets = moved.iter().zip(&keys);
+    let targets: HashMap<_, _> = targets
+        .map(|(own, keys)| ((own.node, own.path), (own, keys)))
+        .collect();
     for &node in &tracks.nodes {
         let rest = rest(node, reader, nodes, &mut motion)?;
         let own = |path| {
-            let channel = moved
-                .iter()
-                .position(|own| (own.node, own.path) == (node, path))?;
-            Some((&moved[channel], &keys[channel])).filter(|(_, keys)| !keys.times.is_empty())
+            let found = targets.get(&(node, path)).copied();
+            found.filter(|(_, keys)| !keys.times.is_empty())
         };
         let sampler = |path| own(path).map(|(moved, _)| moved.interpolation);
         motion.channels.push(Channels {
@@ -206,11 +211,10 @@ fn times(
     reader: &Reader<'_>,
     moved: &[Moved],
     options: &ReadOptions,
-) -> Result<(TimesOf, [f32; 2], Option<tumble::FrameRate>), Diagnostic> {
+) -> Result<(TimesOf, [f32; 2], Option<FrameRate>), Diagnostic> {
     let mut stored = BTreeMap::new();
     for moved in moved {
-        if let std::collections::btree_map::Entry::Vacant(entry) = stored.entry(moved.sampler.input)
-        {
+        if let Entry::Vacant(entry) = stored.entry(moved.sampler.input) {
             entry.insert(moved.stored_times(reader)?);
         }
     }

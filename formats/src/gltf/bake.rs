@@ -134,7 +134,10 @@ impl Document for Gltf {
             self.container.write_glb(&text, bin.as_deref(), out)?;
         }
         drop(data);
-        Ok(reader.warnings.into_inner().into_list())
+        // Whatever else is remarkable was said when the file was read.
+        let mut warnings = reader.warnings.into_inner().into_list();
+        warnings.retain(|warning| warning.code == Code::StaysOutside);
+        Ok(warnings)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The samples of one animation on their way into its file.
 
+use std::collections::{HashMap, HashSet};
 use std::io;
 use std::ops::Range;
 
@@ -20,9 +21,10 @@ pub(super) struct Baking<'a> {
     pointer: String,
     read: &'a Read,
     sampled: &'a Sampled<'a>,
-    channels: Vec<Channel>,
-    /// The values of `sampler` of these channels.
+    /// The values of `sampler` of the channels.
     named: Vec<&'a RawValue>,
+    /// The samplers of channels that are not sampled.
+    kept: HashSet<usize>,
     samplers: Vec<&'a RawValue>,
     samplers_array: &'a RawValue,
     /// The buffer view that the bytes will be.
@@ -32,9 +34,7 @@ pub(super) struct Baking<'a> {
 
 /// A sampler that was changed or appended.
 struct Made {
-    /// Whose keys the samples stand for.
-    old: usize,
-    new: usize,
+    place: usize,
     values: Range<usize>,
 }
 
@@ -51,10 +51,13 @@ impl<'a> Baking<'a> {
         let pointer = format!("/animations/{place}");
         let animation: Animation<'a> = json.entry("animations", place, &pointer)?;
         let members: Members<'a> = json.entry("animations", place, &pointer)?;
-        let mut channels = Vec::new();
+        let sampled_channels: HashSet<usize> = read.sampled.iter().map(|own| own.channel).collect();
+        let mut kept = HashSet::new();
         let mut named = Vec::new();
-        for raw in &animation.channels {
-            channels.push(json.typed(raw, &pointer)?);
+        for (place, raw) in animation.channels.iter().enumerate() {
+            if !sampled_channels.contains(&place) {
+                kept.insert(json.typed::<Channel>(raw, &pointer)?.sampler);
+            }
             let members: Members<'a> = json.typed(raw, &pointer)?;
             named.extend(members.get("sampler"));
         }
@@ -80,8 +83,8 @@ impl<'a> Baking<'a> {
             pointer,
             read,
             sampled,
-            channels,
             named,
+            kept,
             samplers: animation.samplers,
             samplers_array,
             view: edits.count("bufferViews"),
@@ -100,14 +103,16 @@ impl<'a> Baking<'a> {
         self.bytes
             .extend(times.iter().flat_map(|time| time.to_le_bytes()));
         let input = edits.append_to("accessors", self.accessor(0, times.len(), "SCALAR", &range));
-        let mut made: Vec<Made> = Vec::new();
+        // By the samplers whose keys the samples stand for.
+        let mut made: HashMap<usize, Vec<Made>> = HashMap::new();
         for channel in &self.read.sampled {
             let values = self.values(channel);
-            let same = made.iter().find(|made| {
-                made.old == channel.sampler && self.bytes[made.values.clone()] == values
-            });
+            let made = made.entry(channel.sampler).or_default();
+            let same = made
+                .iter()
+                .find(|made| self.bytes[made.values.clone()] == values);
             let sampler = match same {
-                Some(made) => made.new,
+                Some(made) => made.place,
                 None => {
                     let start = self.bytes.len();
                     self.bytes.extend_from_slice(&values);
@@ -118,9 +123,8 @@ impl<'a> Baking<'a> {
                     };
                     let accessor = self.accessor(start, times.len(), kind, "");
                     let output = edits.append_to("accessors", accessor);
-                    let is_free = made.iter().all(|made| made.old != channel.sampler)
-                        && !self.is_kept(channel.sampler);
-                    let new = match is_free {
+                    let is_free = made.is_empty() && !self.kept.contains(&channel.sampler);
+                    let place = match is_free {
                         true => self.change_sampler(channel.sampler, (input, output), edits)?,
                         false => {
                             let sampler = format!(
@@ -130,11 +134,10 @@ impl<'a> Baking<'a> {
                         }
                     };
                     made.push(Made {
-                        old: channel.sampler,
-                        new,
+                        place,
                         values: start..self.bytes.len(),
                     });
-                    new
+                    place
                 }
             };
             if sampler != channel.sampler {
@@ -191,13 +194,6 @@ impl<'a> Baking<'a> {
              \"count\":{count},\"type\":\"{kind}\"{more}}}",
             self.view
         )
-    }
-
-    /// Whether a channel that is not sampled has this sampler.
-    fn is_kept(&self, sampler: usize) -> bool {
-        let is_sampled = |place| self.read.sampled.iter().any(|own| own.channel == place);
-        let mut channels = self.channels.iter().enumerate();
-        channels.any(|(place, channel)| channel.sampler == sampler && !is_sampled(place))
     }
 
     /// Gives a sampler other keys; its place.

@@ -113,7 +113,7 @@ impl<'a> Reader<'a> {
                 None => {
                     let message = "the buffer has no URI and is not the BIN chunk; export the file \
                                    again";
-                    return Err(self.json.refuse(&pointer, Code::Uri, message));
+                    return Err(self.json.refuse(&pointer, Code::TooShort, message));
                 }
             },
         };
