@@ -35,7 +35,7 @@ impl Source {
             let hint = if kind == "a named pipe" {
                 "; give `-` and send it to standard input"
             } else {
-                "; give a .dat file"
+                "; give a file"
             };
             return Err(refuse(Code::NotAFile, format!("is {kind}{hint}")));
         }

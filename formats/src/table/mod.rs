@@ -1,6 +1,6 @@
 //! Tables of keys: Parquet, Arrow IPC and CSV are three ways to write the same columns.
 //!
-//! A format reads the names of its columns; the [plan](plan) says which of them are what; the
+//! A format reads the names of its columns; the [`plan`] says which of them are what; the
 //! format then reads those into [columns], and [clips] makes clips of them.
 
 #[cfg(feature = "parquet")]
