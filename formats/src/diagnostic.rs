@@ -218,7 +218,7 @@ codes! {
     ColumnType = "E408", "a column of another type", "Rotations, translations and scales are numbers, names are text or whole numbers, times are numbers or timestamps.";
     Null = "E409", "a null", "A key without a value is no key; fill it in or remove its row. Rows count from 0.";
     WholeTimes = "E410", "times that are whole numbers", "They may be seconds or nanoseconds: --time-unit s, ms, us or ns says which.";
-    ListLength = "E411", "a list of another length", "A rotation takes four numbers of a list, a translation or a scale three; --map NAME=LIST[3:7] says which.";
+    ListLength = "E411", "a list of another length", "A rotation takes four numbers of a list, a translation or a scale three; `--map NAME=LIST[3:7]` says which.";
     NoRows = "E412", "a table without rows", "It has columns but no keys.";
     SeveralClips = "E413", "several clips for one table", "A wide table holds one clip; write them to files of their own, or as Parquet.";
     // E5xx and W5xx: trajectories.
