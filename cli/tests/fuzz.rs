@@ -95,13 +95,14 @@ fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &
     input.truncate(LONGEST);
 }
 
-/// Every good and bad file of the fixtures.
-fn fixtures() -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures/dat");
+/// Every good and bad file of a format's fixtures.
+fn fixtures(format: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures");
+    let folder = folder.join(format);
     let paths = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path());
-    let files = paths.filter(|path| path.extension().unwrap() == "dat");
+    let files = paths.filter(|path| path.extension().unwrap() == format);
     files.map(|path| fs::read(path).unwrap()).collect()
 }
 
@@ -136,7 +137,31 @@ fn dat() {
         " 1 0 0 0",
         "0.5 1 0 0 0 0 1 0 0\n",
     ];
-    fuzz("dat", targets::dat, fixtures(), &words);
+    fuzz("dat", targets::dat, fixtures("dat"), &words);
+}
+
+#[test]
+fn npz_and_npy() {
+    let words = [
+        "PK\x01\x02",
+        "PK\x05\x06",
+        "poses.npy",
+        "rotations.npy",
+        "body_rotations.npy",
+        "times.npy",
+        "fps.npy",
+        "'descr': '<f8'",
+        "'>f4'",
+        "'|O'",
+        "'<U3'",
+        "'fortran_order': True",
+        "'shape': (2, 3, 4)",
+        "(4, 6)",
+        "(0, 4)",
+        "(99999999999, 4)",
+    ];
+    fuzz("npz", targets::arrays::npz, fixtures("npz"), &words);
+    fuzz("npy", targets::arrays::npy, fixtures("npy"), &words);
 }
 
 #[test]

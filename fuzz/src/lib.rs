@@ -6,6 +6,8 @@ mod targets;
 pub fn target(name: &str, data: &[u8]) {
     let target: targets::Target = match name {
         "dat" => targets::dat,
+        "npz" => targets::arrays::npz,
+        "npy" => targets::arrays::npy,
         "outputs" => targets::outputs,
         "arguments" => targets::arguments,
         "frames" => targets::frames,

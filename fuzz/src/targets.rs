@@ -16,6 +16,13 @@ use tumble_formats::csv::CsvWriter;
 use tumble_formats::dat::{read_dat, write_dat};
 use tumble_formats::npy::{ComponentOrder, NpyWriter};
 use tumble_formats::times::read_times;
+use tumble_formats::{Diagnostic, Place};
+
+#[path = "arrays.rs"]
+pub(crate) mod arrays;
+
+#[path = "tables.rs"]
+pub(crate) mod tables;
 
 /// What a target is given, and what it gives back.
 pub(crate) type Target = fn(&[u8]) -> u64;
@@ -76,6 +83,15 @@ impl Numbers<'_> {
     }
 }
 
+/// What is said of text is said of a place in it.
+fn place_is_inside(bytes: &[u8], said: &Diagnostic) {
+    let lines = bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
+    if let Some(Place::Text { line, column }) = said.place {
+        assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
+        assert!(1 <= column && column <= bytes.len() as u64 + 1);
+    }
+}
+
 /// The `.dat` parser: what it takes is a valid set that reads back bit for bit, what it
 /// refuses has a place within the input.
 pub(crate) fn dat(bytes: &[u8]) -> u64 {
@@ -84,20 +100,13 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
             line: 4096,
             file: 65_536,
         },
-        pipes: false,
-    };
-    let place_is_inside = |place: Option<(u64, u64)>| {
-        let lines = bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-        if let Some((line, column)) = place {
-            assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
-            assert!(1 <= column && column <= bytes.len() as u64 + 1);
-        }
+        ..ReadOptions::default()
     };
     let _ = read_times("fuzz", bytes);
     match read_dat("fuzz", bytes, &options) {
         Ok(loaded) => {
             for warning in &loaded.warnings {
-                place_is_inside(warning.place);
+                place_is_inside(bytes, warning);
             }
             for track in loaded.clips[0].set.tracks() {
                 assert!(!track.keys.is_empty());
@@ -119,7 +128,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
             signature((codes, loaded.clips[0].set.track_count().min(3)))
         }
         Err(error) => {
-            place_is_inside(error.place);
+            place_is_inside(bytes, &error);
             assert!(!error.message.is_empty());
             let hint: String = error.message.chars().rev().take(12).collect();
             signature((error.code, hint))
