@@ -230,6 +230,30 @@ fn tum() {
 }
 
 #[test]
+fn npz_and_npy() {
+    let words = [
+        "PK\x01\x02",
+        "PK\x05\x06",
+        "poses.npy",
+        "rotations.npy",
+        "body_rotations.npy",
+        "times.npy",
+        "fps.npy",
+        "'descr': '<f8'",
+        "'>f4'",
+        "'|O'",
+        "'<U3'",
+        "'fortran_order': True",
+        "'shape': (2, 3, 4)",
+        "(4, 6)",
+        "(0, 4)",
+        "(99999999999, 4)",
+    ];
+    fuzz_motion("npz", targets::arrays::npz, fixtures("npz"), &words);
+    fuzz_motion("npy", targets::arrays::npy, fixtures("npy"), &words);
+}
+
+#[test]
 fn outputs() {
     let seeds = (0..32u8).map(|i| (0..200).map(|j| i.wrapping_mul(31) ^ j).collect());
     fuzz("outputs", targets::outputs, seeds.collect(), &[]);

@@ -12,6 +12,7 @@ mod gltf_new;
 mod gltf_times;
 mod gltf_values;
 mod npz;
+mod readme;
 mod support;
 mod table_options;
 #[cfg(feature = "parquet")]

@@ -9,6 +9,8 @@ pub fn target(name: &str, data: &[u8]) {
         "gltf" => targets::gltf::gltf,
         "bvh" => targets::motion::bvh,
         "tum" => targets::motion::tum,
+        "npz" => targets::arrays::npz,
+        "npy" => targets::arrays::npy,
         "outputs" => targets::outputs,
         "arguments" => targets::arguments,
         "frames" => targets::frames,

@@ -18,6 +18,8 @@ use tumble_formats::npy::{ComponentOrder, NpyWriter};
 use tumble_formats::times::read_times;
 use tumble_formats::{Diagnostic, Place};
 
+#[path = "arrays.rs"]
+pub(crate) mod arrays;
 #[path = "gltf.rs"]
 pub(crate) mod gltf;
 #[path = "motion.rs"]

@@ -167,7 +167,8 @@ impl Archive {
         }
     }
 
-    /// The header of a member that is an array whose bytes may be looked into.
+    /// The header of a member that is an array whose bytes may be looked into, and are as many as
+    /// its shape says.
     pub(crate) fn header(&self, member: usize) -> Result<&Header, Diagnostic> {
         let header = self.members[member].header.as_ref().map_err(|why| {
             let message = format!("the array's header cannot be read: {why}");
@@ -178,28 +179,27 @@ impl Archive {
                            they are read; save numbers (dtype=float)";
             return Err(self.refuse(member, Code::Pickled, message.to_owned()));
         }
-        Ok(header)
+        let held = self.members[member].size.checked_sub(header.start as u64);
+        let said = header.byte_count();
+        if header.element.size().is_none() || said.is_some() && said.map(|n| n as u64) == held {
+            return Ok(header);
+        }
+        // The archive's directory may be wrong itself.
+        let held = self.unpack(member)?.len().saturating_sub(header.start);
+        let said = match said {
+            Some(said) => format!("{said} bytes"),
+            None => "more than any file has".to_owned(),
+        };
+        let message =
+            format!("an array {header} takes {said}; there are {held} bytes behind the header");
+        Err(self.refuse(member, Code::ArraySize, message))
     }
 
     /// The array of a member, unpacked.
     pub(crate) fn array(&self, member: usize) -> Result<Array<'_>, Diagnostic> {
         let header = self.header(member)?;
         let bytes = self.unpack(member)?;
-        let held = bytes.len() - header.start;
-        match header.byte_count() {
-            Some(count) if count == held => Ok(Array { header, bytes }),
-            None if header.element.size().is_none() => Ok(Array { header, bytes }),
-            said => {
-                let said = match said {
-                    Some(said) => format!("{said} bytes"),
-                    None => "more than any file has".to_owned(),
-                };
-                let message = format!(
-                    "an array {header} takes {said}; there are {held} bytes behind the header"
-                );
-                Err(self.refuse(member, Code::ArraySize, message))
-            }
-        }
+        Ok(Array { header, bytes })
     }
 
     /// The array of that name, if there is one.

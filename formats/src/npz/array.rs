@@ -43,62 +43,88 @@ impl Header {
     }
 }
 
+/// Makes a key of its numbers. A trait instead of a closure, because it is called for every key from
+/// loops for each type of number, and only methods can be told to be inlined: a call passes the
+/// numbers through memory, and takes longer than what it computes.
+pub(crate) trait Make<const N: usize> {
+    type Key;
+
+    fn make(numbers: [f64; N]) -> Self::Key;
+}
+
+/// The numbers themselves.
+pub(crate) struct AsStored;
+
+impl<const N: usize> Make<N> for AsStored {
+    type Key = [f64; N];
+
+    #[inline(always)]
+    fn make(numbers: [f64; N]) -> [f64; N] {
+        numbers
+    }
+}
+
 /// Tracks that are read side by side: of rows of many tracks each cache line is then used whole.
-const TOGETHER: usize = 8;
+pub(crate) const TOGETHER: usize = 8;
+
+/// Frames whose rows, some cache lines each, stay in the second cache from the first of those tracks
+/// to the last.
+const IN_CACHE: usize = 512;
 
 impl Array<'_> {
     fn values(&self) -> &[u8] {
         &self.bytes[self.header.start..]
     }
 
-    /// For each track, `finish` of the list of `make` of the numbers of every frame, on all threads.
-    /// Numbers must lie within the array, which must be of floats.
-    pub(crate) fn tracks<const N: usize, T, U: Send>(
+    /// For each track, `finish` of the list of what `M` makes of the numbers of every frame, on all
+    /// threads. Numbers must lie within the array, which must be of floats.
+    pub(crate) fn tracks<M: Make<N>, const N: usize, U: Send>(
         &self,
         at: Strides,
         tracks: Range<usize>,
         frames: usize,
-        make: impl Fn([f64; N]) -> T + Sync,
-        finish: impl Fn(Vec<T>) -> U + Sync,
+        finish: impl Fn(Vec<M::Key>) -> U + Sync,
     ) -> Vec<U> {
         let asked = (at, tracks, frames);
-        let big = self.header.is_big_endian;
-        match (&self.header.element, big) {
+        match (&self.header.element, self.header.is_big_endian) {
             (Element::F16, false) => {
-                self.gather(asked, |b| f16::from_le_bytes(b).to_f64(), make, finish)
+                self.gather::<M, 2, N, U>(asked, |b| f16::from_le_bytes(b).to_f64(), finish)
             }
             (Element::F16, true) => {
-                self.gather(asked, |b| f16::from_be_bytes(b).to_f64(), make, finish)
+                self.gather::<M, 2, N, U>(asked, |b| f16::from_be_bytes(b).to_f64(), finish)
             }
             (Element::F32, false) => {
-                self.gather(asked, |b| f32::from_le_bytes(b).into(), make, finish)
+                self.gather::<M, 4, N, U>(asked, |b| f32::from_le_bytes(b).into(), finish)
             }
             (Element::F32, true) => {
-                self.gather(asked, |b| f32::from_be_bytes(b).into(), make, finish)
+                self.gather::<M, 4, N, U>(asked, |b| f32::from_be_bytes(b).into(), finish)
             }
-            (Element::F64, false) => self.gather(asked, f64::from_le_bytes, make, finish),
-            (Element::F64, true) => self.gather(asked, f64::from_be_bytes, make, finish),
+            (Element::F64, false) => self.gather::<M, 8, N, U>(asked, f64::from_le_bytes, finish),
+            (Element::F64, true) => self.gather::<M, 8, N, U>(asked, f64::from_be_bytes, finish),
             _ => Vec::new(),
         }
     }
 
-    fn gather<const SIZE: usize, const N: usize, T, U: Send>(
+    fn gather<M: Make<N>, const SIZE: usize, const N: usize, U: Send>(
         &self,
         (at, tracks, frames): (Strides, Range<usize>, usize),
         number: impl Fn([u8; SIZE]) -> f64 + Sync,
-        make: impl Fn([f64; N]) -> T + Sync,
-        finish: impl Fn(Vec<T>) -> U + Sync,
+        finish: impl Fn(Vec<M::Key>) -> U + Sync,
     ) -> Vec<U> {
         let (numbers, _) = self.values().as_chunks::<SIZE>();
         let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
         let block = |&start: &usize| {
             let own = start..(start + TOGETHER).min(tracks.end);
-            let mut lists: Vec<Vec<T>> = own.clone().map(|_| Vec::with_capacity(frames)).collect();
-            for frame in 0..frames {
+            let mut lists: Vec<Vec<M::Key>> =
+                own.clone().map(|_| Vec::with_capacity(frames)).collect();
+            for from in (0..frames).step_by(IN_CACHE) {
                 for (track, list) in own.clone().zip(&mut lists) {
-                    let first = at.first + track * at.track + frame * at.frame;
-                    let component = |i: usize| number(numbers[first + i * at.component]);
-                    list.push(make(std::array::from_fn(component)));
+                    let key = |frame: usize| {
+                        let first = at.first + track * at.track + frame * at.frame;
+                        let component = |i: usize| number(numbers[first + i * at.component]);
+                        M::make(std::array::from_fn(component))
+                    };
+                    list.extend((from..(from + IN_CACHE).min(frames)).map(key));
                 }
             }
             lists.into_iter().map(&finish).collect::<Vec<U>>()

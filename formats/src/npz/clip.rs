@@ -9,16 +9,13 @@ use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
 use crate::keys::{Duplicates, Origin, QUIET_NORM, select};
 use crate::motion::{Joint, Motion};
-use crate::npy::ComponentOrder;
+use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
-use crate::npz::array::Array;
+use crate::npz::array::{Array, AsStored, Make, TOGETHER};
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::rotation_vector;
 use crate::quaternion::{dot, nearest_unit, rounded};
 use crate::warnings::Warnings;
-
-/// Tracks whose keys are held twice at a time, in the file's form and in ours.
-const AT_ONCE: usize = 64;
 
 /// Reads the clip. The plan then knows its rate.
 pub(crate) fn read(
@@ -27,13 +24,14 @@ pub(crate) fn read(
     options: &ReadOptions,
     warnings: &mut Warnings,
 ) -> Result<Motion, Diagnostic> {
-    let mut times = plan.read_times(archive, options)?;
-    plan.all_times.clone_from(&times);
     let arrays: Vec<Array<'_>> = plan
         .parts
         .iter()
         .map(|part| archive.array(part.member))
         .collect::<Result<_, _>>()?;
+    // There are as many frames as the arrays have bytes for.
+    let mut times = plan.read_times(archive, options)?;
+    plan.all_times.clone_from(&times);
     let kept = kept_frames(archive, plan, &arrays, &times, options, warnings)?;
     select(&mut times, kept.as_deref());
     let mut motion = Motion {
@@ -50,29 +48,46 @@ pub(crate) fn read(
             format!("the clip cannot be kept: {error}"),
         )
     };
-    for (part, array) in plan.parts.iter().zip(&arrays) {
-        for start in part.tracks.clone().step_by(AT_ONCE) {
-            let tracks = start..(start + AT_ONCE).min(part.tracks.end);
-            if part.values.is_rotation() {
-                let lists = rotations(archive, plan, part, array, tracks.clone(), warnings)?;
-                for (track, mut keys) in tracks.zip(lists) {
-                    select(&mut keys, kept.as_deref());
-                    let name = plan.names.get(track).map_or("", String::as_str);
-                    set.push(name, &times, &keys).map_err(refuse)?;
-                }
-                continue;
-            }
-            let lists = vectors(archive, plan, part, array, tracks.clone())?;
-            for (track, mut keys) in tracks.zip(lists) {
-                select(&mut keys, kept.as_deref());
-                let set_keys = match part.values {
-                    Values::Scale => TrackSet::set_scales,
-                    _ => TrackSet::set_translations,
-                };
-                set_keys(set, track, &times, &keys, &[]).map_err(refuse)?;
-            }
+    // While the keys of some tracks go into the set, those of the next ones are read.
+    let at_once = TOGETHER * rayon::current_num_threads();
+    let jobs = plan.parts.iter().zip(&arrays).flat_map(|(part, array)| {
+        let starts = part.tracks.clone().step_by(at_once);
+        starts.map(move |start| (part, array, start..(start + at_once).min(part.tracks.end)))
+    });
+    let mut push = |track: usize, values: Values, keys: Keys| match keys {
+        Keys::Rotations(mut keys) => {
+            select(&mut keys, kept.as_deref());
+            let name = plan.names.get(track).map_or("", String::as_str);
+            set.push(name, &times, &keys).map_err(refuse)
         }
+        Keys::Vectors(mut keys) => {
+            select(&mut keys, kept.as_deref());
+            let set_keys = match values {
+                Values::Scale => TrackSet::set_scales,
+                _ => TrackSet::set_translations,
+            };
+            set_keys(set, track, &times, &keys, &[]).map_err(refuse)
+        }
+    };
+    let mut pending = Vec::new();
+    for (part, array, tracks) in jobs {
+        let (pushed, read) = rayon::join(
+            || {
+                pending
+                    .drain(..)
+                    .try_for_each(|(track, values, keys)| push(track, values, keys))
+            },
+            || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings),
+        );
+        pushed?;
+        pending = tracks
+            .zip(read?)
+            .map(|(track, keys)| (track, part.values, keys))
+            .collect();
     }
+    pending
+        .into_iter()
+        .try_for_each(|(track, values, keys)| push(track, values, keys))?;
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
         let joint = |track| Joint {
             parent: plan.parents.get(track).copied().flatten(),
@@ -109,55 +124,108 @@ fn kept_frames(
 }
 
 /// The numbers of all tracks of a part at one frame.
-fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<[f64; 4]> {
+fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
     let mut at = part.at;
     at.first += frame * at.frame;
     let tracks = 0..part.tracks.len();
-    let first = |list: Vec<[f64; 4]>| list[0];
     match part.values {
-        Values::Quaternion(_) => array.tracks(at, tracks, 1, |q: [f64; 4]| q, first),
-        _ => array.tracks(at, tracks, 1, |[x, y, z]: [f64; 3]| [x, y, z, 0.0], first),
+        Values::Quaternion(_) => array.tracks::<AsStored, 4, _>(at, tracks, 1, |l| l.concat()),
+        _ => array.tracks::<AsStored, 3, _>(at, tracks, 1, |l| l.concat()),
     }
 }
 
-/// The unit quaternions of some tracks of a part.
-fn rotations(
+/// The keys of one track.
+enum Keys {
+    /// Unit quaternions.
+    Rotations(Vec<Quat>),
+    /// Translations or scales.
+    Vectors(Vec<Vec3>),
+}
+
+/// The keys of some tracks of a part.
+fn read_keys(
     archive: &Archive,
-    plan: &Plan,
     part: &Part,
     array: &Array<'_>,
     tracks: Range<usize>,
+    frames: usize,
     warnings: &mut Warnings,
-) -> Result<Vec<Vec<Quat>>, Diagnostic> {
+) -> Result<Vec<Keys>, Diagnostic> {
     let own = tracks.start - part.tracks.start..tracks.end - part.tracks.start;
-    let (at, frames) = (part.at, plan.frames);
-    let done = |keys: Vec<Quat>| (keys.iter().all(|key| !key.w.is_nan())).then_some(keys);
+    let at = part.at;
+    let quiet = |keys: Vec<Quat>| (keys.iter().all(|key| !key.w.is_nan())).then_some(keys);
     let lists = match part.values {
-        Values::Quaternion(order) => {
-            let make = |numbers: [f64; 4]| quiet_unit(quaternion(order, numbers));
-            array.tracks(at, own.clone(), frames, make, done)
+        Values::Quaternion(Xyzw) => array.tracks::<QuietXyzw, 4, _>(at, own.clone(), frames, quiet),
+        Values::Quaternion(Wxyz) => array.tracks::<QuietWxyz, 4, _>(at, own.clone(), frames, quiet),
+        Values::RotationVector => {
+            let finish = |keys| quiet(continue_signs(keys));
+            array.tracks::<FromVector, 3, _>(at, own.clone(), frames, finish)
         }
-        _ => {
-            let make = |vector: [f64; 3]| rounded(rotation_vector::exp(vector));
-            let done = |keys| done(continue_signs(keys));
-            array.tracks(at, own.clone(), frames, make, done)
-        }
+        _ => return vectors(archive, part, array, own, frames),
     };
     let keys = lists.into_iter().zip(own).map(|(keys, own)| match keys {
-        Some(keys) => Ok(keys),
-        None => remarkable(archive, part, array, own, frames, warnings),
+        Some(keys) => Ok(Keys::Rotations(keys)),
+        None => remarkable(archive, part, array, own, frames, warnings).map(Keys::Rotations),
     });
     keys.collect()
 }
 
+#[inline(always)]
 fn quaternion(order: ComponentOrder, [a, b, c, d]: [f64; 4]) -> DQuat {
     match order {
-        ComponentOrder::Xyzw => DQuat::from_xyzw(a, b, c, d),
-        ComponentOrder::Wxyz => DQuat::from_xyzw(b, c, d, a),
+        Xyzw => DQuat::from_xyzw(a, b, c, d),
+        Wxyz => DQuat::from_xyzw(b, c, d, a),
+    }
+}
+
+/// Unit quaternions of rotation vectors.
+struct FromVector;
+/// Unit quaternions, or NaN where something is to be said.
+struct QuietXyzw;
+/// Likewise.
+struct QuietWxyz;
+
+impl Make<3> for FromVector {
+    type Key = Quat;
+
+    #[inline(always)]
+    fn make(vector: [f64; 3]) -> Quat {
+        rounded(rotation_vector::exp(vector))
+    }
+}
+
+impl Make<4> for QuietXyzw {
+    type Key = Quat;
+
+    #[inline(always)]
+    fn make(numbers: [f64; 4]) -> Quat {
+        quiet_unit(quaternion(Xyzw, numbers))
+    }
+}
+
+impl Make<4> for QuietWxyz {
+    type Key = Quat;
+
+    #[inline(always)]
+    fn make(numbers: [f64; 4]) -> Quat {
+        quiet_unit(quaternion(Wxyz, numbers))
+    }
+}
+
+/// Translations and scales.
+struct InF32;
+
+impl Make<3> for InF32 {
+    type Key = Vec3;
+
+    #[inline(always)]
+    fn make(numbers: [f64; 3]) -> Vec3 {
+        Vec3::from_array(numbers.map(|number| number as f32))
     }
 }
 
 /// The nearest unit quaternion, or NaN where something is to be said about it.
+#[inline(always)]
 fn quiet_unit(key: DQuat) -> Quat {
     let near = rounded(key);
     let exact = near.as_dquat();
@@ -188,7 +256,7 @@ fn remarkable(
     };
     let one = own..own + 1;
     let Values::Quaternion(order) = part.values else {
-        let vectors = array.tracks(part.at, one, frames, |vector: [f64; 3]| vector, |list| list);
+        let vectors = array.tracks::<AsStored, 3, _>(part.at, one, frames, |list| list);
         let is_bad = |vector: &[f64; 3]| !rotation_vector::exp(*vector).is_finite();
         let bad = vectors
             .iter()
@@ -202,9 +270,9 @@ fn remarkable(
             ..Diagnostic::new(&archive.file, Code::NotFinite, message)
         });
     };
-    let make = |numbers: [f64; 4]| quaternion(order, numbers);
-    let keys = array.tracks(part.at, one, frames, make, |list| list);
-    origin.unit(keys.into_iter().flatten(), warnings)
+    let keys = array.tracks::<AsStored, 4, _>(part.at, one, frames, |list| list);
+    let keys = keys.into_iter().flatten();
+    origin.unit(keys.map(|numbers| quaternion(order, numbers)), warnings)
 }
 
 /// Gives each rotation the sign that is nearer to the one before it: a vector that jumps to the other
@@ -221,24 +289,22 @@ fn continue_signs(mut keys: Vec<Quat>) -> Vec<Quat> {
 /// The vectors of some tracks of a part.
 fn vectors(
     archive: &Archive,
-    plan: &Plan,
     part: &Part,
     array: &Array<'_>,
-    tracks: Range<usize>,
-) -> Result<Vec<Vec<Vec3>>, Diagnostic> {
-    let own = tracks.start - part.tracks.start..tracks.end - part.tracks.start;
-    let make = |numbers: [f64; 3]| Vec3::from_array(numbers.map(|number| number as f32));
-    let lists = array.tracks(part.at, own, plan.frames, make, |list| {
+    own: Range<usize>,
+    frames: usize,
+) -> Result<Vec<Keys>, Diagnostic> {
+    let lists = array.tracks::<InF32, 3, _>(part.at, own.clone(), frames, |list| {
         let bad = list.iter().position(|vector| !vector.is_finite());
         (list, bad)
     });
-    let check = |(track, (list, bad)): (usize, (Vec<Vec3>, Option<usize>))| match bad {
-        None => Ok(list),
+    let check = |(own, (list, bad)): (usize, (Vec<Vec3>, Option<usize>))| match bad {
+        None => Ok(Keys::Vectors(list)),
         Some(frame) => {
             let message = format!("the vector {} is not finite in f32", list[frame]);
             let refusal = Diagnostic::new(&archive.file, Code::NotFinite, message);
-            Err(refusal.inside(part.place(archive, track, frame)))
+            Err(refusal.inside(part.place(archive, part.tracks.start + own, frame)))
         }
     };
-    tracks.zip(lists).map(check).collect()
+    own.zip(lists).map(check).collect()
 }

@@ -10,6 +10,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::motion::{Motion, Sampled};
 use crate::npz::archive::{Archive, Member};
+use crate::npz::array::{Array, AsStored};
 use crate::npz::header::{Element, Header};
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::write::{Members, check, keys, note_name, notes, times};
@@ -102,8 +103,11 @@ impl NpzDocument {
                 continue;
             }
             let array = self.archive.array(piece.member)?;
-            let own = array.tracks(piece.at, 0..piece.tracks.len(), frames, bits, |list| list);
-            let same = poses.tracks(whole.at, piece.tracks.clone(), frames, bits, |list| list);
+            let stored = |array: &Array<'_>, at, tracks| {
+                array.tracks::<AsStored, 3, _>(at, tracks, frames, |list| list)
+            };
+            let own = stored(&array, piece.at, 0..piece.tracks.len());
+            let same = stored(&poses, whole.at, piece.tracks.clone());
             if own == same {
                 parts.push(piece);
             }
@@ -312,10 +316,6 @@ impl Document for NpzDocument {
         }
         Ok(warnings.into_list())
     }
-}
-
-fn bits(vector: [f64; 3]) -> [u64; 3] {
-    vector.map(f64::to_bits)
 }
 
 /// The type of a rate: as it was, if it can hold the new one.

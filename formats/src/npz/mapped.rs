@@ -134,8 +134,8 @@ fn part(
 ) -> Result<(Part, usize), Diagnostic> {
     let member = source(archive, entry)?;
     check_float(archive, member)?;
-    let array = archive.array(member)?;
-    let (shape, strides) = (&*array.header.shape, array.header.strides());
+    let header = archive.header(member)?;
+    let (shape, strides) = (&*header.shape, header.strides());
     let refuse = |code, message: String| archive.refuse(member, code, message);
     if shape.contains(&0) {
         let message = format!("the array has shape {}: no keys", shape_text(shape));

@@ -103,8 +103,8 @@ impl Part {
         };
         check_float(archive, member)?;
         let width = values.width();
-        let array = archive.array(member)?;
-        let (header, shape) = (array.header, &*array.header.shape);
+        let header = archive.header(member)?;
+        let shape = &*header.shape;
         let strides = header.strides();
         let found = match (shape, layout) {
             _ if shape.contains(&0) => None,

@@ -31,7 +31,12 @@ fn numpy_and_scipy_agree() {
             ..picked.sampled(clip)
         };
         let (mut own, mut kept) = (Vec::new(), Vec::new());
-        write_npz(&[sampled.clone()], &MotionOptions::default(), &mut own).unwrap();
+        write_npz(
+            std::slice::from_ref(&sampled),
+            &MotionOptions::default(),
+            &mut own,
+        )
+        .unwrap();
         let document = loaded.document.as_ref().unwrap();
         let options = MotionOptions::default();
         document

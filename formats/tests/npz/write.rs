@@ -61,7 +61,12 @@ fn our_layout_reads_back_as_written() {
         notes: &[("method", "slerp".to_owned()), ("names", "odd".to_owned())],
     };
     let mut bytes = Vec::new();
-    let warnings = write_npz(&[sampled.clone()], &MotionOptions::default(), &mut bytes).unwrap();
+    let warnings = write_npz(
+        std::slice::from_ref(&sampled),
+        &MotionOptions::default(),
+        &mut bytes,
+    )
+    .unwrap();
     assert!(warnings.is_empty());
     let loaded = read(bytes.clone()).unwrap();
     let found = &loaded.clips[0];
@@ -274,8 +279,10 @@ fn what_does_not_fit_the_layout_is_refused() {
     assert_refused(write(&[(0, picked.sampled(clip))], ""), Code::Layout);
     assert_refused(write(&[(0, rated.clone())], "dmpls"), Code::NotPerFrame);
     assert_refused(write(&[(0, rated)], "trans"), Code::NotPerFrame);
-    let mut other = Motion::default();
-    other.set = TrackSet::with_shared_times(&[0.0], &[Quat::IDENTITY]).unwrap();
+    let other = Motion {
+        set: TrackSet::with_shared_times(&[0.0], &[Quat::IDENTITY]).unwrap(),
+        ..Motion::default()
+    };
     let single = Picked::of(&other, 1);
     let sampled = Sampled {
         rate: clip.rate,
