@@ -36,7 +36,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy --ends lop               | loop
 4 | eval a.dat -o o.npy --ends loop              | repeat the first
 2 | eval a.dat -o o.npy --memory 5parsecs        | 256MiB
-2 | eval a.dat -o o.txt                          | .npy or .csv
+2 | eval a.dat -o o.txt                          | .npy, .parquet
 2 | eval a.dat -o a.dat --format npy --overwrite | is the input
 2 | eval a.dat -o old.npy                        | --overwrite
 0 | eval a.dat -o old.npy --overwrite            | old.npy

@@ -93,7 +93,7 @@ fn choose(path: &Path, format: Option<&'static Format>) -> Result<&'static Forma
     };
     format.or(named).ok_or_else(|| {
         let (path, extensions) = (path.display(), extensions(|name| format!(".{name}")));
-        let extensions = extensions.join(" or ");
+        let extensions = extensions.join(", ");
         Failure::usage(format!(
             "{path}: end the output in {extensions}, or give --format"
         ))
