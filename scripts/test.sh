@@ -109,7 +109,6 @@ for package in tumble tumble-formats tumble-cli; do
     done
 done
 as_release+=(--config profile.dev.package.tumble.opt-level=3)
-as_release+=(--config profile.dev.package.tumble-formats.opt-level=3)
 CARGO_INCREMENTAL=0 cargo test -p tumble-cli --test cost "${as_release[@]}" |
     tee /dev/stderr | grep -q "^test result: ok. 2 passed"
 # Twenty seconds for each fuzz target, five for motion files; ten minutes each are FUZZ_SECONDS=600.

@@ -60,8 +60,15 @@ impl Decimal {
 
     /// Seconds behind a whole second, correctly rounded.
     pub(crate) fn since(self, whole: i64) -> f64 {
-        let difference = Self(self.0 - i128::from(whole) * SECOND);
-        difference.to_string().parse().unwrap_or(f64::NAN) // digits and a point
+        match self.0.checked_sub(i128::from(whole) * SECOND) {
+            // Digits and a point.
+            Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
+            // Seconds are exact in f64, and of what is behind them nothing is left so far away.
+            None => {
+                let rest = self.0.rem_euclid(SECOND) as f64 / SECOND as f64;
+                (self.whole_seconds() - whole) as f64 + rest
+            }
+        }
     }
 }
 
@@ -80,6 +87,14 @@ impl fmt::Display for Decimal {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_as_far_apart_as_can_be_are_told() {
+        let (first, last) = ("-1e14", "99999999999999.57");
+        let [first, last] = [first, last].map(|text| Decimal::parse(text).unwrap());
+        let apart = last.since(first.whole_seconds());
+        assert!((apart - 199_999_999_999_999.57).abs() < 0.02, "{apart}");
+    }
 
     #[test]
     fn every_digit_is_kept() {

@@ -19,6 +19,7 @@ use crate::source::Source;
 use crate::table::arrays::{Gather, chosen};
 use crate::table::clips::clips;
 use crate::table::columns::Table;
+use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
 use crate::table::plan::Plan;
 
@@ -58,7 +59,7 @@ pub fn open_arrow(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnost
 /// # Errors
 /// The first fault that refuses the input.
 pub fn read_arrow(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let (table, plan) = read_table(name, bytes, options)?;
+    let (table, plan) = decoded(name, "a batch", || read_table(name, bytes, options))?;
     clips(&table, &plan, options)
 }
 

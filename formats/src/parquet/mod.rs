@@ -3,7 +3,6 @@
 mod pages;
 mod write;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,6 +21,7 @@ use crate::source::Source;
 use crate::table::arrays::{Gather, chosen};
 use crate::table::clips::clips;
 use crate::table::columns::Table;
+use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
 use crate::table::plan::{Need, Plan};
 
@@ -74,14 +74,8 @@ pub fn read_parquet(
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     check_tail(name, &bytes)?;
-    // The decoders of the crate assert what a damaged page does not keep. Nothing that they have
-    // touched is used after that.
     let bytes = Bytes::from(bytes);
-    let decoded = catch_unwind(AssertUnwindSafe(|| read_table(name, bytes, options)));
-    let (table, plan) = decoded.unwrap_or_else(|_| {
-        let message = "a page cannot be decoded; the file is damaged, write it again";
-        Err(Diagnostic::new(name, Code::TableDamaged, message))
-    })?;
+    let (table, plan) = decoded(name, "a page", || read_table(name, bytes, options))?;
     clips(&table, &plan, options)
 }
 

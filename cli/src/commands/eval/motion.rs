@@ -30,7 +30,7 @@ impl Job<'_> {
         let is_more = |clip: &&Motion| !clip.skeleton.is_empty() || clip.has_vectors();
         self.arguments.what.is_rotations()
             && format.write_motion.is_some()
-            && (format.write.is_none() || clips.iter().any(is_more))
+            && (format.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
     }
 
     /// Clips as a file of their own.
