@@ -12,6 +12,7 @@ mod plot;
 mod render;
 mod validation;
 mod view;
+mod view_controls;
 mod view_skeletons;
 
 #[path = "../../tests/support/application.rs"]

@@ -37,7 +37,7 @@ pub static FORMAT: Format = Format {
     summary: "keyframes of a chain of boxes, as text",
     extensions: &[],
     probe: |_| false,
-    read: Some(open_dat),
+    read: open_dat,
     write: None,
     write_motion: None,
     many_clips: false,

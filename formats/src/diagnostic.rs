@@ -150,7 +150,6 @@ codes! {
     KeyNorm = "E027", "no rotation", "A key's quaternion has a norm under 1e-6; no rotation can be told from it.";
     EqualTimes = "E028", "two keys at one time", "The values differ, so one of the keys has to go: --duplicates first or last says which.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
-    Unrecognised = "E031", "an unknown format", "Neither the first bytes nor the ending of the name tell a format that can be read; --format names it.";
     Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     // E1xx and W1xx: glTF.
     Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks behind it.";

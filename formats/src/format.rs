@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::Quat;
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::keys::Duplicates;
 use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
@@ -20,9 +20,9 @@ use crate::text::lines::Limits;
 use crate::{arrow, parquet};
 use crate::{bvh, csv, dat, gltf, npy, npz, tum};
 
-/// Every format. Inputs are known by their first bytes, then by the ending of their name; the first
-/// format that can be read is that of inputs which tell neither way, the first that can be written
-/// that of such outputs.
+/// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
+/// their name; the first format is that of inputs which tell neither way, the first of
+/// [`Format::writable`] that of such outputs.
 pub static FORMATS: [&Format; COUNT] = [
     &dat::FORMAT,
     &gltf::FORMAT,
@@ -50,7 +50,7 @@ pub struct Format {
     /// Whether a file that begins with these bytes (up to 64) is one.
     pub probe: fn(&[u8]) -> bool,
     /// Reads keyframes from a file; `-` is standard input.
-    pub read: Option<ReadKeys>,
+    pub read: ReadKeys,
     /// How rotations are written as they come.
     pub write: Option<WriteResults>,
     /// How sampled clips are written.
@@ -260,12 +260,6 @@ impl Format {
         Self::named(path.extension()?.to_str()?)
     }
 
-    /// The formats that keyframes are read from.
-    pub fn readable() -> impl Iterator<Item = (&'static Self, ReadKeys)> {
-        let formats = FORMATS.into_iter();
-        formats.filter_map(|format| Some((format, format.read?)))
-    }
-
     /// The formats that results are written in, those that hold them as they come first.
     pub fn writable() -> impl Iterator<Item = &'static Self> {
         let as_they_come = FORMATS.into_iter().filter(|format| format.write.is_some());
@@ -299,14 +293,9 @@ impl Format {
     /// Reads a file in this format.
     ///
     /// # Errors
-    /// The first fault that refuses the file; also when the format cannot be read.
+    /// The first fault that refuses the file.
     pub fn open(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-        let Some(read) = self.read else {
-            let message = format!("{} files are written, not read", self.name);
-            let name = path.display().to_string();
-            return Err(Diagnostic::new(name, Code::Unrecognised, message));
-        };
-        read(path, options)
+        (self.read)(path, options)
     }
 }
 
@@ -321,7 +310,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_found_again_and_every_format_serves_for_something() {
+    fn names_are_found_again() {
         for format in FORMATS {
             assert!(std::ptr::eq(Format::named(format.name).unwrap(), format));
             let shouted = format!("a.b.{}", format.name.to_uppercase());
@@ -329,7 +318,6 @@ mod tests {
                 Format::of(Path::new(&shouted)).unwrap(),
                 format
             ));
-            assert!(format.read.is_some() || format.is_writable());
         }
         assert!(Format::of(Path::new("walk")).is_none());
         assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");

@@ -13,30 +13,26 @@ pub(crate) fn usable_name(name: &str, index: usize, taken: &mut HashSet<String>)
     if usable.is_empty() {
         usable = format!("joint{index}");
     }
-    if taken.contains(&usable) {
-        usable = format!("{usable}#{index}");
+    untaken(usable, index, taken)
+}
+
+/// The name itself; one that is taken gets the number behind it, and as many `_` as it takes.
+fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
+    if taken.contains(&name) {
+        name = format!("{name}#{index}");
     }
-    while taken.contains(&usable) {
-        usable.push('_');
+    while taken.contains(&name) {
+        name.push('_');
     }
-    taken.insert(usable.clone());
-    usable
+    taken.insert(name.clone());
+    name
 }
 
 /// The names of a set's tracks, told apart: a name that is taken gets the track's number behind it.
 pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
     let mut taken = HashSet::new();
-    let names = (0..set.track_count()).map(|track| {
-        let mut name = set.track_name(track);
-        if taken.contains(&name) {
-            name = format!("{name}#{track}");
-        }
-        while taken.contains(&name) {
-            name.push('_');
-        }
-        taken.insert(name.clone());
-        name
-    });
+    let names =
+        (0..set.track_count()).map(|track| untaken(set.track_name(track), track, &mut taken));
     names.collect()
 }
 

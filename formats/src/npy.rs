@@ -27,7 +27,7 @@ pub static FORMAT: Format = Format {
     summary: "NumPy's, float32",
     extensions: &[],
     probe: |start| start.starts_with(b"\x93NUMPY"),
-    read: Some(open_npy),
+    read: open_npy,
     write: Some(WriteResults {
         is_text: false,
         layout: None,

@@ -1,8 +1,11 @@
 //! Sampling clips: each channel by its own sampler, or all by one method.
 
+use std::borrow::Cow;
+
 use glam::{Quat, Vec3};
 use tumble::{
-    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, VectorMethod, method,
+    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, TrackSet,
+    VectorMethod, method,
 };
 
 use crate::motion::{Channels, Motion, Sampled, Sampler};
@@ -34,18 +37,27 @@ impl ChannelMethods<'_> {
     /// The one method for the rotations of all tracks; `None` where their samplers differ.
     #[must_use]
     pub fn method_of(&self, clip: &Motion) -> Option<Method> {
-        let first = self.rotation_method(clip, 0);
-        let same = |track| self.rotation_method(clip, track).name == first.name;
-        (0..clip.set.track_count()).all(same).then_some(first)
+        let resting = self.resting_method(clip);
+        let mut methods = (0..clip.set.track_count())
+            .map(|track| self.rotation_method(clip.channel(track), resting));
+        let first = methods.next().unwrap_or(resting);
+        methods
+            .all(|method| method.name == first.name)
+            .then_some(first)
     }
 
-    fn rotation_method(&self, clip: &Motion, track: usize) -> Method {
-        match clip.channel(track).rotation {
+    /// The method of tracks whose rotation has no sampler. One at rest has one key, which every
+    /// method holds: it goes with most of the others.
+    fn resting_method(&self, clip: &Motion) -> Method {
+        self.method.unwrap_or_else(|| clip.most_common_method())
+    }
+
+    fn rotation_method(&self, channels: Channels, resting: Method) -> Method {
+        match channels.rotation {
             Some(Sampler::Step) => method::STEP,
             Some(Sampler::Linear) => self.method.unwrap_or(method::SLERP),
             Some(Sampler::Cubic) => self.method.unwrap_or(method::GLTF_CUBIC),
-            // A track at rest has one key, which every method holds: it goes with the others.
-            None => self.method.unwrap_or_else(|| clip.most_common_method()),
+            None => resting,
         }
     }
 
@@ -107,11 +119,14 @@ impl ChannelMethods<'_> {
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let tracks = clip.set.track_count();
-        let methods: Vec<Method> = (0..tracks).map(|t| self.rotation_method(clip, t)).collect();
+        let resting = self.resting_method(clip);
+        let methods: Vec<Method> = (0..tracks)
+            .map(|track| self.rotation_method(clip.channel(track), resting))
+            .collect();
         let mut all = Vec::new();
         for group in groups(tracks, |track| methods[track].name) {
             let interpolation = (self.with)(methods[group[0]]);
-            let set = clip.set.select(group.iter().copied());
+            let set = clip.tracks(&group);
             let found = engine.evaluate_as(&set, interpolation, frames, layout)?;
             all.resize(tracks * found.samples(), Quat::IDENTITY);
             scatter(found.as_quats(), &group, tracks, layout, &mut all);
@@ -143,7 +158,7 @@ impl ChannelMethods<'_> {
             if !is_keyed(group[0]) {
                 continue;
             }
-            let set = clip.set.select(group.iter().copied());
+            let set = clip.tracks(&group);
             let interpolation = (self.with)(method::SLERP);
             let method = method(group[0]);
             let layout = Layout::FrameMajor;
@@ -206,6 +221,14 @@ impl Motion {
             Channel::Translation => rest.translation,
             Channel::Scale => rest.scale,
         }
+    }
+
+    /// Some tracks as a set of their own, without a copy where they are all tracks in their order.
+    fn tracks(&self, group: &[usize]) -> Cow<'_, TrackSet> {
+        if group.len() == self.set.track_count() {
+            return Cow::Borrowed(&self.set);
+        }
+        Cow::Owned(self.set.select(group.iter().copied()))
     }
 
     /// Whether any track has keys of translations or scales.

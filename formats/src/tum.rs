@@ -33,7 +33,7 @@ pub static FORMAT: Format = Format {
         let has = |words: &[u8]| line.windows(words.len()).any(|part| part == words);
         line.starts_with(b"#") && (has(b"ground truth trajectory") || has(b"tx ty tz"))
     },
-    read: Some(open_tum),
+    read: open_tum,
     write: None,
     write_motion: Some(write_motion),
     many_clips: false,

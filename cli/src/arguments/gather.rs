@@ -88,7 +88,7 @@ fn below(directory: &Path) -> Vec<Found> {
     for entry in walk.sort_by_file_name() {
         let path = match entry {
             Ok(entry) if entry.file_type().is_dir() => continue,
-            Ok(entry) if is_readable(entry.path()) => entry.into_path(),
+            Ok(entry) if Format::of(entry.path()).is_some() => entry.into_path(),
             Ok(_) => continue,
             Err(error) => match error.path() {
                 Some(path) => path.to_owned(),
@@ -99,10 +99,6 @@ fn below(directory: &Path) -> Vec<Found> {
         found.push(Found { path, below });
     }
     found
-}
-
-fn is_readable(path: &Path) -> bool {
-    Format::of(path).is_some_and(|format| format.read.is_some())
 }
 
 /// The files that a pattern matches: shells expand patterns, but not in lists, not in

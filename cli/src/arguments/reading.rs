@@ -10,7 +10,7 @@ use tumble_formats::adjust::adjust;
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
-use tumble_formats::{Format, Limits, Loaded, ReadOptions};
+use tumble_formats::{FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::input::{clip_names, name};
 use crate::messages::exit::{self, Failure};
@@ -20,7 +20,7 @@ use crate::messages::exit::{self, Failure};
 #[command(next_help_heading = READING)]
 pub(crate) struct Reading {
     /// The format of the inputs [default: by their first bytes, then by their names]
-    #[arg(long, value_name = "FORMAT", value_parser = readable())]
+    #[arg(long, value_name = "FORMAT", value_parser = format())]
     pub(crate) from: Option<&'static Format>,
     /// The animation of a file that has several: its name, or its place, from 0
     #[arg(long, value_name = "NAME")]
@@ -86,10 +86,9 @@ enum TimeUnitArgument {
     Ns,
 }
 
-/// Reads the name of a format that can be read, for clap.
-fn readable() -> impl TypedValueParser<Value = &'static Format> {
-    let values =
-        Format::readable().map(|(format, _)| PossibleValue::new(format.name).help(format.summary));
+/// Reads the name of a format, for clap.
+fn format() -> impl TypedValueParser<Value = &'static Format> {
+    let values = FORMATS.map(|format| PossibleValue::new(format.name).help(format.summary));
     PossibleValuesParser::new(values)
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }

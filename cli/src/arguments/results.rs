@@ -1,5 +1,6 @@
 //! Arguments that say where results go and in which format, and the run over all inputs.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -88,11 +89,10 @@ pub(crate) fn each_file(
     if target.format().many_clips || clips.len() == 1 {
         done(target.name(), make(name, &clips, target)?)?;
     } else {
-        for clip in &loaded.clips {
-            let clip_name = clip_name(clip);
-            let target = target.of_clip(&clip_name);
+        for (clip, file) in clips.iter().zip(file_names(&clips)) {
+            let target = target.of_clip(&file);
             let target = target.ok_or_else(|| several(path, loaded))??;
-            let made = make(&format!("{name} {clip_name}"), &[clip], &target)?;
+            let made = make(&format!("{name} {}", clip_name(clip)), &[clip], &target)?;
             done(target.name(), made)?;
         }
     }
@@ -103,5 +103,56 @@ pub(crate) fn each_file(
             let message = format!("{name}: {refused} of {all} animations failed");
             Err(Failure::new(SOME_INPUTS, message))
         }
+    }
+}
+
+/// What the files of clips are called: by the clips' names, as far as file systems take them; names
+/// that are then the same get the clip's place in its file behind them.
+fn file_names(clips: &[&Motion]) -> Vec<String> {
+    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
+    let plain = |clip: &&Motion| -> String {
+        let name = clip_name(clip);
+        let each = name.chars().map(|c| if is_plain(c) { c } else { '_' });
+        each.collect()
+    };
+    let mut taken = HashSet::new();
+    let names = clips.iter().map(|clip| {
+        let mut name = plain(clip);
+        while !taken.insert(name.to_lowercase()) {
+            name = format!("{name}.{}", clip.place);
+        }
+        name
+    });
+    names.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clips_never_share_a_file() {
+        let names = [
+            Some("Run"),
+            Some("run"),
+            Some("a/b"),
+            Some("a:b"),
+            None,
+            Some("4"),
+        ];
+        let clips: Vec<Motion> = names
+            .iter()
+            .enumerate()
+            .map(|(place, name)| Motion {
+                name: name.map(str::to_owned),
+                place,
+                ..Motion::default()
+            })
+            .collect();
+        let clips: Vec<&Motion> = clips.iter().collect();
+        assert_eq!(
+            file_names(&clips),
+            ["Run", "run.1", "a_b", "a_b.3", "4", "4.5"]
+        );
     }
 }

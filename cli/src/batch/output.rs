@@ -9,7 +9,10 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
 use tumble::{Chunk, Encoding, Error};
-use tumble_formats::format::{Format, MotionOptions, ResultShape, ResultWriter, WriteResults};
+use tumble_formats::Diagnostic;
+use tumble_formats::format::{
+    Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
+};
 use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::gather::{Found, Gathered};
@@ -20,7 +23,7 @@ use crate::batch::room;
 use crate::batch::stream::Stream;
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
-use crate::messages::signals;
+use crate::messages::{signals, words};
 
 /// Where one result goes.
 pub(crate) struct Target {
@@ -256,11 +259,6 @@ impl Target {
         if self.name.is_empty() {
             return None;
         }
-        let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
-        let clip: String = clip
-            .chars()
-            .map(|c| if is_plain(c) { c } else { '_' })
-            .collect();
         let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
         let name = with(Path::new(&self.name));
         let place = self.place.renamed(&with(self.place.path()));
@@ -297,6 +295,22 @@ impl Target {
         write: impl FnOnce(&mut Stream) -> io::Result<()>,
     ) -> Result<Written, Failure> {
         self.place.prepare(None, write)
+    }
+
+    /// Writes a motion file, which `write` makes in memory, and says its warnings.
+    pub(crate) fn write_motion(
+        &self,
+        write: impl FnOnce(&mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
+    ) -> Result<Written, Failure> {
+        let mut bytes = Vec::new();
+        let warnings = write(&mut bytes).map_err(|error| match error {
+            WriteError::Io(error) => Failure::writing(&self.to_string(), &error),
+            WriteError::Refused(diagnostic) => Failure::input(&diagnostic, ""),
+        })?;
+        for warning in warnings {
+            words::note(&warning.to_string());
+        }
+        self.prepare(|out| out.write_all(&bytes))
     }
 
     /// Writes one result that is in memory.

@@ -1,10 +1,8 @@
 //! `tumble convert`: the keys of a file in another format, as they are.
 
-use std::io::Write;
 use std::time::Instant;
 
 use clap::Args;
-use tumble_formats::format::WriteError;
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::sample::Samples;
@@ -65,19 +63,11 @@ fn convert(name: &str, clips: &[&Motion], target: &Target) -> Result<Evaluated, 
         .map(|(clip, keys)| keys.of(clip, clip.rate, &notes))
         .collect();
     let options = target.motion_options();
-    let mut bytes = Vec::new();
-    let warnings = match target.format().write_motion {
-        Some(write) => write(&sampled, &options, &mut bytes),
+    let write = target.format().write_motion;
+    let written = target.write_motion(|out| match write {
+        Some(write) => write(&sampled, &options, out),
         None => Ok(Vec::new()),
-    };
-    let warnings = warnings.map_err(|error| match error {
-        WriteError::Io(error) => Failure::writing(&target.to_string(), &error),
-        WriteError::Refused(diagnostic) => Failure::input(&diagnostic, ""),
     })?;
-    for warning in warnings {
-        words::note(&warning.to_string());
-    }
-    let written = target.prepare(|out| out.write_all(&bytes))?;
     let told = format!(
         "{name}: {}, {} in {} → {target}",
         words::count(clips.len(), "clip"),

@@ -29,7 +29,7 @@ pub static FORMAT: Format = Format {
     summary: "a table in columns as it lies in memory, a row for each key",
     extensions: &["arrows", "feather", "ipc"],
     probe: |start| start.starts_with(messages::MAGIC) || messages::is_stream(start),
-    read: Some(open_arrow),
+    read: open_arrow,
     write: Some(WriteResults {
         is_text: false,
         layout: None,

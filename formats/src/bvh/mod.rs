@@ -31,7 +31,7 @@ pub static FORMAT: Format = Format {
         let word = start.trim_ascii_start().get(..hierarchy::FIRST_WORD.len());
         word.is_some_and(|word| word.eq_ignore_ascii_case(hierarchy::FIRST_WORD.as_bytes()))
     },
-    read: Some(open_bvh),
+    read: open_bvh,
     write: None,
     write_motion: Some(write_motion),
     many_clips: false,

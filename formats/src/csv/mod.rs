@@ -19,7 +19,7 @@ pub static FORMAT: Format = Format {
     summary: "text, a row for each frame or key",
     extensions: &[],
     probe: |_| false,
-    read: Some(read::open_csv),
+    read: read::open_csv,
     write: Some(WriteResults {
         is_text: true,
         // A row holds one frame.

@@ -44,7 +44,7 @@ pub static FORMAT: Format = Format {
     summary: "glTF 2.0 animations, as GLB or text",
     extensions: &["gltf"],
     probe: is_gltf,
-    read: Some(open_gltf),
+    read: open_gltf,
     write: None,
     write_motion: Some(write_new::write_new),
     many_clips: true,

@@ -34,7 +34,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     // A local file header, or the end of an archive without files.
     probe: |start| start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06"),
-    read: Some(open_npz),
+    read: open_npz,
     write: None,
     write_motion: Some(write::write_npz),
     many_clips: false,

@@ -31,7 +31,7 @@ pub static FORMAT: Format = Format {
     summary: "a table in columns, a row for each key",
     extensions: &["pq"],
     probe: |start| start.starts_with(MAGIC),
-    read: Some(open_parquet),
+    read: open_parquet,
     write: Some(WriteResults {
         is_text: false,
         layout: None,

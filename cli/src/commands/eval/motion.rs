@@ -1,6 +1,5 @@
 //! Results that are motion files themselves: clips with their skeletons, sampled.
 
-use std::io::Write;
 use tumble::{FrameRate, Frames};
 
 use tumble_formats::format::{MotionOptions, WriteError};
@@ -13,7 +12,6 @@ use crate::batch::room;
 use crate::batch::run::Evaluated;
 use crate::commands::eval::Job;
 use crate::messages::exit::Failure;
-use crate::messages::words;
 
 impl Job<'_> {
     /// Whether the result is the input's own file with other keys.
@@ -129,15 +127,7 @@ impl Job<'_> {
         let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
-        let mut bytes = Vec::new();
-        let warnings = write(&sampled, &mut bytes).map_err(|error| match error {
-            WriteError::Io(error) => Failure::writing(&target.to_string(), &error),
-            WriteError::Refused(diagnostic) => Failure::input(&diagnostic, ""),
-        })?;
-        for warning in warnings {
-            words::note(&warning.to_string());
-        }
-        let written = target.prepare(|out| out.write_all(&bytes))?;
+        let written = target.write_motion(|out| write(&sampled, out))?;
         let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
         let samples = all.iter().map(|samples| samples.times.len()).sum();
         Ok(self.evaluated(
