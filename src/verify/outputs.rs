@@ -16,6 +16,7 @@ use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::TrackSet;
+use crate::verify::moments;
 
 /// What was found of one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +30,8 @@ pub struct OutputVerification {
     /// Values whose bits differ.
     pub differing: u64,
     /// Largest error against the reference: in radians for rotations, relative to the track's
-    /// largest value for velocities and accelerations.
+    /// largest value for velocities and accelerations, which counts as at least a thousandth of a
+    /// radian an interval (an interval squared) of mean length.
     pub max_error: f64,
     /// The largest error allowed.
     pub error_bound: f64,
@@ -168,26 +170,57 @@ fn rate_error(
     let samples = timeline.len();
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
     let track = |index: usize| {
-        let curve = Curve::of(&interpolation, set.track(index));
-        let (mut error, mut largest) = (0.0f64, 1e-3f64);
-        for sample in (0..samples).step_by(each) {
-            let time = timeline.time(index, sample);
+        let track = set.track(index);
+        let curve = Curve::of(&interpolation, track);
+        let expected = |time: f64| {
             let (body, axes) = match interpolation.quantity {
                 Quantity::Velocity(axes) => (curve.velocity(time), axes),
                 Quantity::Acceleration(axes) => (curve.acceleration(time), axes),
                 Quantity::Rotation => unreachable!("a rate"),
             };
-            let expected = match axes {
+            match axes {
                 Axes::Body => body,
                 Axes::World => curve.rotation(time) * body,
-            };
+            }
+        };
+        let (mut error, mut largest) = (0.0f64, rate_floor(track.times, interpolation.quantity));
+        for sample in (0..samples).step_by(each) {
+            let time = timeline.time(index, sample);
             let [x, y, z, _] = found.get(index, sample).unwrap_or(Quat::NAN).to_array();
             let found = DVec3::new(x.into(), y.into(), z.into());
-            error = error.max(worse((found - expected).length()));
-            largest = largest.max(expected.length());
+            let errors_at =
+                moments(track.times, time).map(|time| (found - expected(time)).length());
+            error = error.max(worse(errors_at[0]).min(worse(errors_at[1])));
+            // Samples may all lie on keys, where a rate can be 0 and large between them.
+            for near in within_interval(track.times, time).into_iter().chain([time]) {
+                largest = largest.max(expected(near).length());
+            }
         }
         error / largest
     };
     let errors = (0..set.track_count()).into_par_iter().map(track);
     errors.reduce(|| 0.0, f64::max)
+}
+
+/// The least scale of errors: a thousandth of a radian in a key interval of mean length, or in its
+/// square for accelerations. A curve that turns evenly has no acceleration but rounding.
+fn rate_floor(keys: &[f64], quantity: Quantity) -> f64 {
+    let mean = match keys {
+        [first, .., last] => (last - first) / (keys.len() - 1) as f64,
+        _ => 1.0,
+    };
+    match quantity {
+        Quantity::Acceleration(_) => 1e-3 / (mean * mean),
+        _ => 1e-3 / mean,
+    }
+}
+
+/// Some times within the key interval of a time; the time itself outside the keys.
+fn within_interval(keys: &[f64], time: f64) -> [f64; 3] {
+    let after = keys.partition_point(|&key| key <= time);
+    let (Some(before), Some(&end)) = (after.checked_sub(1), keys.get(after)) else {
+        return [time; 3];
+    };
+    let start = keys[before];
+    [0.02, 0.25, 0.5].map(|t| start + (end - start) * t)
 }
