@@ -336,6 +336,37 @@ fn listings_say_what_there_is() {
     }
 }
 
+#[test]
+fn bench_reads_and_resamples_clips_of_every_format() {
+    let place = sample_folder();
+    let line = "bench files --json --rounds 1 --shrink 1500";
+    let line: Vec<&str> = line.split(' ').collect();
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    let formats: Vec<&str> = (sections.iter())
+        .map(|section| section["method"].as_str().unwrap())
+        .collect();
+    assert!(
+        formats.contains(&"bvh") && formats.contains(&"parquet"),
+        "{formats:?}"
+    );
+    for section in sections {
+        // Two clips of 22 joints, 240 frames at 30 a second: 479 at 60.
+        assert_eq!(section["rotations"], 2 * 22 * 479, "{section}");
+        assert!(
+            section["file_bytes"].as_u64().unwrap() > 2 * 22 * 240 * 12,
+            "{section}"
+        );
+        for row in section["rows"].as_array().unwrap() {
+            assert!(
+                row["share_of_reading_rate"].as_f64().unwrap() > 0.0,
+                "{row}"
+            );
+        }
+    }
+}
+
 /// That everything is measured and told; not how fast it is.
 #[test]
 fn bench_measures_every_workload_in_one_run() {

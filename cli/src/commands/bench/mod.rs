@@ -2,6 +2,7 @@
 //! would write. Everything is measured in one run, in turns, because machines are
 //! shared and their clocks drift; what counts are the ratios.
 
+pub(crate) mod files;
 pub(crate) mod naive;
 pub(crate) mod report;
 pub(crate) mod stream;
@@ -50,7 +51,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let mut sections = Vec::new();
     for &kind in &arguments.workloads {
-        let workload = kind.workload(arguments.shrink as usize);
+        let Some(workload) = kind.workload(arguments.shrink as usize) else {
+            words::note("measuring files …");
+            let turns = Turns {
+                rounds: arguments.rounds,
+                calls: 1,
+            };
+            sections.extend(files::measure(arguments.shrink as usize, turns)?);
+            continue;
+        };
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
             words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
             // A short call is repeated, so that the clock can see it.

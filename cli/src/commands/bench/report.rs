@@ -1,5 +1,6 @@
 //! What was measured, as a table and as JSON.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -26,11 +27,29 @@ pub(crate) struct Section {
     workload: Kind,
     method: &'static str,
     rotations: usize,
+    /// Of the files, where files are read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file_bytes: Option<u64>,
     /// The most memory that the process has had so far, where that was asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     peak_memory_bytes: Option<u64>,
+    #[serde(skip)]
+    ratios: &'static [Ratio],
     rows: Vec<Row>,
 }
+
+/// A ratio's name in JSON, and its heading in the table.
+type Ratio = (&'static str, &'static str);
+
+/// Ratios to the first row of a section and to its second.
+const WRITING: [Ratio; 2] = [
+    ("share_of_write_rate", "writing"),
+    ("ratio_to_naive", "naive"),
+];
+const READING: [Ratio; 2] = [
+    ("share_of_bytes_rate", "bytes"),
+    ("share_of_reading_rate", "reading"),
+];
 
 /// One contestant. Times are medians.
 #[derive(Serialize)]
@@ -39,10 +58,9 @@ pub(crate) struct Row {
     pub(crate) milliseconds: f64,
     million_rotations_per_second: f64,
     nanoseconds_per_rotation: f64,
-    /// 1 is as fast as memory can be written.
-    share_of_write_rate: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ratio_to_naive: Option<f64>,
+    /// Its speed beside what the section says.
+    #[serde(flatten)]
+    ratios: BTreeMap<&'static str, f64>,
     /// Where the time went, milliseconds.
     parts: Vec<(&'static str, f64)>,
 }
@@ -76,25 +94,52 @@ impl Report {
 
 impl Section {
     /// `rows`: the write rate first, then the naive peer where there is one.
-    pub(crate) fn new(
+    pub(crate) fn new(workload: Kind, method: Method, rotations: usize, rows: Vec<Row>) -> Self {
+        let ratios = match workload {
+            Kind::Stream => &WRITING[..1],
+            _ => &WRITING,
+        };
+        Self {
+            peak_memory_bytes: (workload == Kind::Stream).then(peak_memory).flatten(),
+            ..Self::with(workload, method.name, rotations, rows, ratios)
+        }
+    }
+
+    /// `rows`: reading the bytes first, then reading the clips.
+    pub(crate) fn of_files(
+        format: &'static str,
+        rotations: usize,
+        file_bytes: u64,
+        rows: Vec<Row>,
+    ) -> Self {
+        Self {
+            file_bytes: Some(file_bytes),
+            peak_memory_bytes: peak_memory(),
+            ..Self::with(Kind::Files, format, rotations, rows, &READING)
+        }
+    }
+
+    fn with(
         workload: Kind,
-        method: Method,
+        method: &'static str,
         rotations: usize,
         mut rows: Vec<Row>,
+        ratios: &'static [Ratio],
     ) -> Self {
-        let write = rows[0].milliseconds;
-        let naive = (workload != Kind::Stream).then_some(rows[1].milliseconds);
+        let firsts: Vec<f64> = rows.iter().take(2).map(|row| row.milliseconds).collect();
         for row in &mut rows {
             row.million_rotations_per_second = rotations as f64 / row.milliseconds / 1e3;
             row.nanoseconds_per_rotation = row.milliseconds * 1e6 / rotations as f64;
-            row.share_of_write_rate = write / row.milliseconds;
-            row.ratio_to_naive = naive.map(|naive| naive / row.milliseconds);
+            let ratio = |(&(name, _), first): (&Ratio, &f64)| (name, first / row.milliseconds);
+            row.ratios = ratios.iter().zip(&firsts).map(ratio).collect();
         }
         Self {
             workload,
-            method: method.name,
+            method,
             rotations,
-            peak_memory_bytes: (workload == Kind::Stream).then(peak_memory).flatten(),
+            file_bytes: None,
+            peak_memory_bytes: None,
+            ratios,
             rows,
         }
     }
@@ -104,27 +149,36 @@ impl Section {
         let (method, rotations) = (self.method, self.rotations);
         let width = self.rows.iter().map(|row| row.name.chars().count()).max();
         let width = width.unwrap_or(0);
-        let _ = writeln!(
+        let _ = write!(
             text,
             "\n\x1b[1m{workload}, {method}\x1b[0m: {rotations} rotations\n\
-             {:width$}  {:>10}  {:>8}  {:>8}  {:>7}  {:>7}",
-            "", "ms", "M/s", "ns each", "writing", "naive"
+             {:width$}  {:>10}  {:>8}  {:>8}",
+            "", "ms", "M/s", "ns each"
         );
+        for (_, heading) in self.ratios {
+            let _ = write!(text, "  {heading:>7}");
+        }
+        let _ = writeln!(text);
         for row in &self.rows {
-            let _ = writeln!(
+            let _ = write!(
                 text,
-                "{:width$}  {:>10.3}  {:>8.1}  {:>8.2}  {:>6.2}x  {:>7}",
+                "{:width$}  {:>10.3}  {:>8.1}  {:>8.2}",
                 row.name,
                 row.milliseconds,
                 row.million_rotations_per_second,
                 row.nanoseconds_per_rotation,
-                row.share_of_write_rate,
-                row.ratio_to_naive
-                    .map_or(String::new(), |ratio| format!("{ratio:.2}x"))
             );
+            for (name, _) in self.ratios {
+                let _ = write!(text, "  {:>6.2}x", row.ratios[name]);
+            }
+            let _ = writeln!(text);
             for (name, milliseconds) in &row.parts {
                 let _ = writeln!(text, "{:width$}  {milliseconds:>10.3}", format!("  {name}"));
             }
+        }
+        if let Some(bytes) = self.file_bytes {
+            let bytes = words::bytes(bytes as f64);
+            let _ = writeln!(text, "the files have {bytes}");
         }
         if let Some(bytes) = self.peak_memory_bytes {
             let bytes = words::bytes(bytes as f64);
@@ -150,8 +204,7 @@ impl Row {
             milliseconds: milliseconds(time),
             million_rotations_per_second: 0.0,
             nanoseconds_per_rotation: 0.0,
-            share_of_write_rate: 0.0,
-            ratio_to_naive: None,
+            ratios: BTreeMap::new(),
             parts: parts
                 .into_iter()
                 .map(|(name, time)| (name, milliseconds(time)))

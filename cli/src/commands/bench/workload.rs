@@ -31,17 +31,19 @@ pub(crate) enum Kind {
     Long,
     /// 8 GiB of rotations, written to a file in chunks
     Stream,
+    /// 3000 clips of 22 joints and 240 frames in each motion format: read, resampled to 60 fps
+    Files,
 }
 
 /// Frames per second, in every workload.
-const RATE: f64 = 60.0;
+pub(crate) const RATE: f64 = 60.0;
 
 impl Kind {
     /// Makes the workload with one `shrink`th of its tracks, or of its keys where
-    /// there is one track.
-    pub(crate) fn workload(self, shrink: usize) -> Workload {
+    /// there is one track; none for files.
+    pub(crate) fn workload(self, shrink: usize) -> Option<Workload> {
         let few = |count: usize| (count / shrink).max(1);
-        match self {
+        Some(match self {
             Self::Sparse => frames(uneven(few(4096), 26, 1200.0 / RATE), 0.0, 1200),
             Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
             // Half way between keys: on them there would be nothing to evaluate.
@@ -55,7 +57,8 @@ impl Kind {
                 frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
             }
             Self::Crowd => crowd(few(1_000_000)),
-        }
+            Self::Files => return None,
+        })
     }
 }
 
@@ -119,7 +122,7 @@ fn push(set: &mut TrackSet, times: &[f64], keys: Vec<Quat>) {
 }
 
 /// Rotations, each up to `step` radians from the one before.
-fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
+pub(crate) fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
     let mut rotation = DQuat::IDENTITY;
     let mut next = || {
         let axis = DVec3::from_array([(); 3].map(|()| between(random, -1.0, 1.0)));
