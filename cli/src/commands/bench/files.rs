@@ -28,7 +28,7 @@ const FRAMES: usize = 240;
 /// Frames a second that the clips are keyed at: half of those that they are resampled to.
 const SOURCE_RATE: u32 = 30;
 
-/// One section for each format that holds clips, of the same clips.
+/// One section for each format that holds clips of several joints, of the same clips.
 pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failure> {
     let clips = (CLIPS / shrink).max(1);
     let mut random = Rng::with_seed(4);
@@ -37,21 +37,22 @@ pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failu
     let section = |format: &'static Format| {
         let folder = tempfile::tempdir().map_err(|error| Failure::writing("a folder", &error))?;
         let paths = library(format, &joints, clips, folder.path())?;
-        of_format(format, &paths, turns)
+        paths
+            .map(|paths| of_format(format, &paths, turns))
+            .transpose()
     };
-    let formats = FORMATS
-        .iter()
-        .filter(|format| format.write_motion.is_some());
-    formats.map(|&format| section(format)).collect()
+    let sections = FORMATS.iter().map(|&format| section(format));
+    sections.filter_map(Result::transpose).collect()
 }
 
-/// Writes the clips: each begins a frame later in the walk than the one before.
+/// Writes the clips: each begins a frame later in the walk than the one before. Nothing where the
+/// format holds one joint.
 fn library(
     format: &Format,
     walk: &[Vec<Quat>],
     clips: usize,
     folder: &Path,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<Option<Vec<PathBuf>>, Failure> {
     let clip = skeleton(walk);
     let rate = Some(FrameRate::new(SOURCE_RATE.into(), 1).expect("a rate"));
     let times: Vec<f64> = (0..FRAMES)
@@ -77,13 +78,13 @@ fn library(
         let written = format
             .write_motion
             .map(|write| write(&[samples.of(&clip, rate, &[])], &options, &mut bytes));
-        match written {
-            Some(Err(WriteError::Refused(diagnostic))) => Err(Failure::input(&diagnostic, "")),
-            Some(Err(WriteError::Io(error))) => Err(Failure::writing(&options.name, &error)),
-            _ => std::fs::write(&path, bytes)
-                .map_err(|error| Failure::writing(&options.name, &error)),
-        }?;
-        Ok(path)
+        let written = match written {
+            None | Some(Err(WriteError::Refused(_))) => return Ok(None),
+            Some(Err(WriteError::Io(error))) => Err(error),
+            Some(Ok(_)) => std::fs::write(&path, bytes),
+        };
+        written.map_err(|error| Failure::writing(&options.name, &error))?;
+        Ok(Some(path))
     };
     (0..clips).map(write).collect()
 }
