@@ -1,6 +1,6 @@
 //! Clips in other units and about other axes.
 
-use glam::{DQuat, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError, TrackSet};
 
 use crate::motion::{Motion, Transform};
@@ -55,6 +55,36 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
         }
     }
     Ok(adjusted)
+}
+
+/// Says where each joint rests relative to its parent, for files that do not: bodies of SMPL, whose
+/// joints lie where their shape puts them. `numbers` are x, y, z of each joint, in the order of the
+/// tracks.
+///
+/// # Errors
+/// When there are not three numbers for each joint of the clip, which is then unchanged.
+pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsError> {
+    let joints = clip.skeleton.len();
+    let (offsets, rest) = numbers.as_chunks::<3>();
+    if joints == 0 || offsets.len() != joints || !rest.is_empty() {
+        let numbers = numbers.len();
+        return Err(OffsetsError { numbers, joints });
+    }
+    for (joint, &[x, y, z]) in clip.skeleton.iter_mut().zip(offsets) {
+        joint.rest.translation = DVec3::new(x, y, z).as_vec3();
+    }
+    clip.no_world = None;
+    Ok(())
+}
+
+/// Why a skeleton's joints cannot be placed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{numbers} numbers of offsets for {joints} joints; three are wanted for each, x y z")]
+pub struct OffsetsError {
+    /// How many numbers there are.
+    pub numbers: usize,
+    /// How many joints the clip has.
+    pub joints: usize,
 }
 
 #[cfg(test)]

@@ -1,18 +1,18 @@
 //! Arguments that say how motion files are read, and what becomes of their clips.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DQuat;
 use tumble::FrameRate;
-use tumble_formats::adjust::adjust;
+use tumble_formats::adjust::{adjust, set_offsets};
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
 use tumble_formats::{FORMATS, Format, Limits, Loaded, ReadOptions};
 
-use crate::arguments::input::{clip_names, name};
+use crate::arguments::input::{clip_names, name, times};
 use crate::messages::exit::{self, Failure};
 
 /// How files are read. All of it decides over results.
@@ -40,6 +40,10 @@ pub(crate) struct Reading {
     /// The unit of times that are whole numbers
     #[arg(long, value_enum, value_name = "UNIT")]
     time_unit: Option<TimeUnitArgument>,
+    /// Where each joint is relative to its parent, for bodies of SMPL, whose files do not say it:
+    /// text with x y z a line, in the order of the joints
+    #[arg(long, value_name = "FILE")]
+    offsets: Option<PathBuf>,
     /// Multiply all translations by this
     #[arg(long, value_name = "FACTOR", value_parser = positive)]
     scale: Option<f64>,
@@ -119,6 +123,18 @@ impl Reading {
     pub(crate) fn apply(&self, loaded: &mut Loaded, path: &Path) -> Result<(), Failure> {
         if let Some(wanted) = &self.animation {
             choose(loaded, wanted, path)?;
+        }
+        if let Some(file) = &self.offsets {
+            let offsets = times(file)?;
+            for clip in &mut loaded.clips {
+                set_offsets(clip, &offsets).map_err(|error| {
+                    let (name, file) = (name(path), file.display());
+                    Failure::new(
+                        exit::ALL_INPUTS,
+                        format!("{name}: --offsets {file}: {error}"),
+                    )
+                })?;
+            }
         }
         if self.scale.is_some() || self.up.is_some() {
             let quarter = std::f64::consts::FRAC_PI_2;

@@ -91,7 +91,9 @@ pub(crate) fn each_file(
     } else {
         for (clip, file) in clips.iter().zip(file_names(&clips)) {
             let target = target.of_clip(&file);
-            let target = target.ok_or_else(|| several(path, loaded))??;
+            let target = target.ok_or_else(|| {
+                several(path, loaded).hinted(", or give a directory for all of them: -o RESULTS/")
+            })??;
             let made = make(&format!("{name} {}", clip_name(clip)), &[clip], &target)?;
             done(target.name(), made)?;
         }

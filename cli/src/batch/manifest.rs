@@ -133,9 +133,10 @@ impl Manifest {
         })
     }
 
-    /// Whether the manifest names that output, which is then not a stranger's.
+    /// Whether the manifest names that output, or results of several clips in its place, which are
+    /// then not a stranger's.
     pub(crate) fn knows(&self, output: &str) -> bool {
-        self.previous.contains_key(output)
+        self.previous.contains_key(output) || of_clips(&self.previous, output).next().is_some()
     }
 
     /// What it said when it was opened.
@@ -209,19 +210,26 @@ impl Previous {
         if let Some(entry) = self.entries.get(output) {
             return is_whole(entry);
         }
-        // `fox.npy` would hold what `fox.Run.npy` and its like do.
-        let Some((stem, _)) = output.rsplit_once('.') else {
-            return false;
-        };
-        let beside = self.entries.range(format!("{stem}.")..);
-        let own = beside.take_while(|(name, _)| name.starts_with(stem));
-        let clips = own.filter_map(|(_, entry)| {
-            let (all, count) = entry.one_of.as_ref()?;
-            (all == output && is_whole(entry)).then_some(*count)
-        });
+        let clips = of_clips(&self.entries, output);
+        let clips = clips.filter_map(|(entry, count)| is_whole(entry).then_some(count));
         let counts: Vec<usize> = clips.collect();
         counts.first().is_some_and(|&count| count == counts.len())
     }
+}
+
+/// The results of single clips in the place of one of all, with how many there are: `fox.Run.npy` and
+/// its like for `fox.npy`.
+fn of_clips<'a>(
+    entries: &'a BTreeMap<String, Entry>,
+    output: &'a str,
+) -> impl Iterator<Item = (&'a Entry, usize)> {
+    let stem = output.rsplit_once('.').map_or(output, |(stem, _)| stem);
+    let beside = entries.range(format!("{stem}.")..);
+    let own = beside.take_while(move |(name, _)| name.starts_with(stem));
+    own.filter_map(move |(_, entry)| {
+        let (all, count) = entry.one_of.as_ref()?;
+        (all == output).then_some((entry, *count))
+    })
 }
 
 fn line(entry: &Entry) -> String {

@@ -61,8 +61,9 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
     let paths = inputs.paths();
     // One file goes into one file, however it was found.
     let is_file = out.is_file() || of(out).is_some() || input::is_standard(out);
+    let is_folder = out.is_dir() || out.as_os_str().as_encoded_bytes().ends_with(b"/");
     let plan = match &*paths {
-        [_] if is_file || !inputs.many && !out.is_dir() => {
+        [_] if is_file || !inputs.many && !is_folder => {
             if wish.resume {
                 let message = "--resume is for a directory of results";
                 return Err(Failure::usage(message));

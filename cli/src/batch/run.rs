@@ -1,6 +1,7 @@
 //! Many inputs into a directory of results: the next one is read while one is evaluated,
 //! and the manifest is kept.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -52,6 +53,7 @@ impl Batch<'_> {
     ) -> Result<(), Failure> {
         let previous = manifest.previous();
         let mut skipped = 0;
+        let mut made = HashSet::new();
         let outcome = thread::scope(|scope| {
             // One is waiting at most: two sets are in memory.
             let (hand_over, inputs) = sync_channel(0);
@@ -66,6 +68,15 @@ impl Batch<'_> {
                 };
                 let clips = loaded.clips.len();
                 evaluate(path, &loaded, target, &mut |name, mut evaluated| {
+                    // Clips of one input may be called as another input is: walk.glb's `Run` and
+                    // walk.Run.bvh.
+                    if !made.insert(name.to_owned()) {
+                        let input = input::name(path);
+                        return Err(Failure::usage(format!(
+                            "{input}: another input's result is {name} already; evaluate them into \
+                             different directories"
+                        )));
+                    }
                     let digest = evaluated.written.digest.take().unwrap_or_default();
                     manifest.add(Entry {
                         output: name.to_owned(),

@@ -22,6 +22,7 @@ use crate::gltf::write_new::json::{
 use crate::gltf::write_new::rig::{Nodes, UniqueNames};
 use crate::gltf::write_new::samples::{Property, Samples};
 use crate::motion::Sampled;
+use crate::warnings::Warnings;
 
 /// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
 const HEADERS: u64 = 28;
@@ -94,7 +95,21 @@ pub fn write_new(
         write_glb(json, &binary, length, &mut out)?;
     }
     out.flush()?;
-    Ok(Vec::new())
+    Ok(moved_starts(clips, options))
+}
+
+/// Says which clips count their times from whole seconds that an f32 cannot hold beside them.
+fn moved_starts(clips: &[Sampled<'_>], options: &MotionOptions) -> Vec<Diagnostic> {
+    let mut warnings = Warnings::new(&options.name);
+    for offset in clips.iter().map(|clip| clip.clip.time_offset) {
+        if offset != 0 {
+            warnings.warn(Code::StartMoved, || {
+                let message = format!("times count from {offset} s; glTF's are too short for both");
+                (None, message)
+            });
+        }
+    }
+    warnings.into_list()
 }
 
 /// A clip that can be written.

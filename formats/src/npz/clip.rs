@@ -38,6 +38,7 @@ pub(crate) fn read(
         name: plan.name.clone(),
         rate: plan.rate,
         is_world: plan.is_world,
+        no_world: plan.no_world.clone(),
         ..Motion::default()
     };
     let set = &mut motion.set;

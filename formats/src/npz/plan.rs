@@ -37,6 +37,8 @@ pub(crate) struct Plan {
     /// Members that hold the same for all frames, whatever their shape looks like.
     pub(crate) constants: Vec<usize>,
     pub(crate) is_world: bool,
+    /// Why poses in the world cannot be told.
+    pub(crate) no_world: Option<String>,
     /// The layout is ours: what made the samples is written beside them.
     pub(crate) is_own: bool,
 }

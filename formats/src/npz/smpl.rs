@@ -153,6 +153,10 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
     };
     if let Some(skeleton) = skeleton {
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
+        plan.no_world = Some(
+            "where a body's joints are depends on its shape; give their places with --offsets"
+                .to_owned(),
+        );
     }
     let root = Part::of(archive, "trans", Values::Translation, 0, Layout::FrameMajor)?;
     if let Some(root) = root {

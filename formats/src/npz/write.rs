@@ -248,7 +248,11 @@ pub fn write_npz(
 pub(super) fn times(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<()> {
     let shape = [sampled.times.len()];
     members.numbers("times.npy", (&Element::F64, &shape), false, |put| {
-        sampled.times.iter().try_for_each(|&time| put(time))
+        let offset = sampled.clip.time_offset as f64;
+        sampled
+            .times
+            .iter()
+            .try_for_each(|&time| put(time + offset))
     })
 }
 

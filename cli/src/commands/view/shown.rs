@@ -58,7 +58,8 @@ impl Shown {
 
     /// Whether its tracks are joints at places of their own; else they are the boxes of a chain.
     pub(crate) fn has_places(&self) -> bool {
-        !self.clip.skeleton.is_empty() || self.clip.has_vectors()
+        let is_placed = !self.clip.skeleton.is_empty() || self.clip.has_vectors();
+        is_placed && self.clip.no_world.is_none()
     }
 
     /// Bytes that one method's results at so many samples take before they are packed.
