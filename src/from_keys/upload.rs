@@ -8,8 +8,7 @@ use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::pieces::{KeyJob, KeyPiece, Part, What};
-use crate::shader::{IS_KEY, SIGN_TURNED};
-use crate::shader::{KeySample, RowShape, TangentWeights};
+use crate::shader::{IS_KEY, KeySample, RowShape, SIGN_TURNED, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;

@@ -19,8 +19,7 @@ use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::in_flight::{InFlight, Stopwatch, Target, copy};
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::Kernel;
-use crate::shader::{FROM_KEYS_WORKGROUP, ROWS_PER_INVOCATION};
+use crate::shader::{FROM_KEYS_WORKGROUP, Kernel, ROWS_PER_INVOCATION};
 
 /// What one piece in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.

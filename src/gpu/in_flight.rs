@@ -8,8 +8,7 @@ use rayon::prelude::*;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::EvaluateError;
-use crate::gpu::error::VulkanError;
+use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
 use crate::gpu::sample_list::SampleList;
@@ -18,8 +17,7 @@ use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work}
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::List;
-use crate::shader::{Item, ListedSample};
+use crate::shader::{Item, List, ListedSample};
 use crate::time::frames::{Ticks, Timeline};
 
 /// What one window in flight needs. The submission is the first field: dropped first, it waits for

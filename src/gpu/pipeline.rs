@@ -1,6 +1,6 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
-use crate::shader::Kernel;
+use crate::shader::{Dispatch, Kernel, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -8,8 +8,6 @@ use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
-use crate::shader::Dispatch;
-use crate::shader::spirv;
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {

@@ -13,8 +13,7 @@ use crate::gpu::in_flight::{Finish, InFlight, Stopwatch, Target};
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::WORKGROUP;
-use crate::shader::{Dispatch, Kernel, List};
+use crate::shader::{Dispatch, Kernel, List, WORKGROUP};
 
 impl VulkanEngine {
     /// Evaluates a window of a result, cut into smaller windows that suit the device.

@@ -1,8 +1,8 @@
 //! The self-test: before a device is trusted it computes a fixed set of inputs, and every bit is
 //! compared with the CPU's. Each check of it is a canary.
 
-use crate::gpu::error::EvaluateError;
-use crate::shader::Kernel;
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::shader::{Dispatch, Kernel, Probe, Reply, WORKGROUP};
 use std::sync::Arc;
 
 use glam::{DVec3, Quat};
@@ -11,7 +11,6 @@ use crate::cpu::engine::CpuEngine;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{Job, VulkanEngine};
-use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::math::canonical::round_quat;
@@ -22,8 +21,6 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::shader::WORKGROUP;
-use crate::shader::{Dispatch, Probe, Reply};
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;

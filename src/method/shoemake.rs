@@ -1,13 +1,11 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::curve::options::Ends;
 use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
@@ -20,18 +18,10 @@ pub const SHOEMAKE: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 1500.0,
-        rotation: 4.1,
-    },
+    cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(

@@ -11,8 +11,7 @@ use crate::gpu::engine::VulkanEngine;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
-use crate::shader::Kernel;
-use crate::shader::PoseDispatch;
+use crate::shader::{Kernel, PoseDispatch};
 
 impl Engine {
     /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the

@@ -13,15 +13,13 @@ use bytemuck::Zeroable;
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
 use crate::curve::options::Quantity;
-use crate::fit::both_sides::Sides;
 use crate::fit::double::curve::{Curve, Piece};
 use crate::fit::double::intervals::{Intervals, LANES, Lane};
 use crate::fit::double::shape::Shape;
 use crate::fit::motion::arc_length::Pace;
 use crate::fit::motion::derivatives as motion;
 use crate::fit::nodes::{Nodes, tail};
-use crate::shader::POWERS;
-use crate::shader::PolynomialSegment;
+use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::lanes::{Lanes, canonical};
 
 /// The number of lanes in the widest vector.
@@ -134,10 +132,10 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
     /// and after the middle from the one at the middle.
     #[inline(always)]
-    pub(crate) fn set_differences(&mut self, k: usize, differences: [Sides<L>; 4]) {
-        for (c, &Sides { before, after }) in differences.iter().enumerate() {
-            self.even[k][c] = after + before;
-            self.odd[k][c] = after - before;
+    pub(crate) fn set_differences(&mut self, k: usize, before: [L; 4], after: [L; 4]) {
+        for c in 0..4 {
+            self.even[k][c] = after[c] + before[c];
+            self.odd[k][c] = after[c] - before[c];
         }
     }
 
@@ -161,13 +159,13 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Each is stored as a second sample, whose difference from the first is the derivative by s²
     /// that the divided differences of [`Nodes::powers`] need there.
     #[inline(always)]
-    pub(crate) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
+    pub(crate) fn set_slopes(&mut self, before: [L; 4], after: [L; 4]) {
         // At s = 1/2 the polynomials even / 2s² and odd / 2s have the values 2 even and odd, and
         // the derivatives by s² 2 (after - before) - 8 even and after + before - 2 odd.
-        for (c, &Sides { before, after }) in slopes.iter().enumerate() {
+        for c in 0..4 {
             let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
-            self.even[PAIRS - 1][c] = (after - before) - L::all(3.0) * even;
-            self.odd[PAIRS - 1][c] = (after + before) - odd;
+            self.even[PAIRS - 1][c] = (after[c] - before[c]) - L::all(3.0) * even;
+            self.odd[PAIRS - 1][c] = (after[c] + before[c]) - odd;
         }
     }
 

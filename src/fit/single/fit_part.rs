@@ -19,7 +19,7 @@ pub(crate) struct Part<const SAMPLED: usize, const PAIRS: usize> {
     pub(crate) bends: [f32; 3],
     /// The differences of the basis functions at `-s` and at `s` from the middle, for each node
     /// `s` that is sampled.
-    pub(crate) gains: [[[Gain; 2]; 3]; SAMPLED],
+    pub(crate) gains: [[[Gain; 3]; 2]; SAMPLED],
     /// The factor from a half-rotation vector at a key to the derivative there, by the part's
     /// parameter.
     pub(crate) slope: f32,
@@ -70,19 +70,14 @@ impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
                 ((3.0 - 6.0 * m) * square) as f32,
                 (3.0 * m * square) as f32,
             ],
-            gains: [[[Gain::new(0.0); 2]; 3]; SAMPLED],
+            gains: [[[Gain::new(0.0); 3]; 2]; SAMPLED],
             slope: (3.0 * width) as f32,
         };
         let mut k = 0;
         while k < SAMPLED {
             // The first node is the middle, which is not sampled.
             let s = nodes.at[k + 1] as f64 * width;
-            let (before, after) = (gains(m, -s), gains(m, s));
-            let mut j = 0;
-            while j < 3 {
-                part.gains[k][j] = [before[j], after[j]];
-                j += 1;
-            }
+            part.gains[k] = [gains(m, -s), gains(m, s)];
             k += 1;
         }
         part
@@ -96,8 +91,8 @@ impl Part<2, 5> {
         self.middle.weights = backward(self.middle.weights);
         self.middle.rates = backward(self.middle.rates);
         self.bends = backward(self.bends);
-        let [first, second] = self.gains;
-        self.gains = [backward(first), backward(second)];
+        let [[a, b], [c, d]] = self.gains;
+        self.gains = [[backward(a), backward(b)], [backward(c), backward(d)]];
         self
     }
 }
