@@ -151,8 +151,9 @@ pub(crate) mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
-    use crate::cpu::evaluate::{Affine, frames_past_caches};
+    use crate::cpu::evaluate::frames_past_caches;
     use crate::simd::line::EACH;
+    use crate::time::runs::Affine;
 
     /// Evaluates frames with streaming stores, after `filled` rotations of their first line.
     pub(crate) fn in_lines<L: Lanes, S: Evaluate>(

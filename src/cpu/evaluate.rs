@@ -4,17 +4,11 @@ use std::marker::PhantomData;
 
 use crate::cpu::destination::{Destination, Places, Turns};
 use crate::simd::lanes::{Lanes, Number as _};
+use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
 
 /// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
 pub(crate) const FEW: usize = 3;
-
-/// How a run's parameter follows from the distance to the segment's middle.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Affine {
-    pub(crate) scale: f32,
-    pub(crate) offset: f32,
-}
 
 /// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be
 /// overwritten, up to the end of a vector. All distances must be integers that f32 holds exactly,

@@ -5,10 +5,11 @@
 use std::ops::Range;
 
 use crate::cpu::destination::Places;
-use crate::cpu::evaluate::{Affine, FEW, frames, frames_past_caches};
+use crate::cpu::evaluate::{FEW, frames, frames_past_caches};
 use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
+use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
 /// Bytes from which on a result is written by streaming stores: caches would keep so little of it

@@ -2,8 +2,8 @@
 //! in flight: the host writes the keys of one while the device works on the other.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use glam::Quat;
@@ -13,10 +13,10 @@ use crate::from_keys::pieces::{KeyJob, KeyPiece};
 use crate::from_keys::upload::Keys;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{IN_FLIGHT, VulkanEngine};
+use crate::gpu::engine::{IN_FLIGHT, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{InFlight, Stopwatch, Target, copy};
+use crate::gpu::in_flight::{Flight, Stopwatch, Target, copy, grow};
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel, ROWS_PER_INVOCATION};
@@ -42,18 +42,6 @@ struct Borrowed<'a> {
     target: Target<'a>,
 }
 
-impl Borrowed<'_> {
-    /// See [`ImportedMemory::has_come_back`].
-    fn has_come_back(&mut self) {
-        if let Some(keys) = &mut self.keys {
-            keys.has_come_back();
-        }
-        if let Target::ImportedMemory(output) = &mut self.target {
-            output.has_come_back();
-        }
-    }
-}
-
 impl VulkanEngine {
     /// Evaluates a job into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_keys(
@@ -61,21 +49,14 @@ impl VulkanEngine {
         job: &KeyJob<'_>,
         output: &mut [[f32; 4]],
     ) -> Result<(), EvaluateError> {
-        let mut in_flight = self
-            .keys_in_flight
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = lock(&self.keys_in_flight);
         while in_flight.len() < IN_FLIGHT {
             in_flight.push(KeysInFlight::new(&self.device)?);
         }
         let each = size_of::<Quat>();
         // A piece's result may begin at any rotation, and a binding must be able to as well.
-        let alignment = self
-            .device
-            .physical
-            .info
-            .min_storage_buffer_offset_alignment;
-        let lends = self.lends && alignment <= each as u64;
+        let info = &self.device.physical.info;
+        let lends = self.lends && info.min_storage_buffer_offset_alignment <= each as u64;
         let output = bytemuck::cast_slice_mut(output);
         let mut imported = Borrowed {
             keys: (job.keys().filter(|_| lends && self.device.reads_texels))
@@ -96,22 +77,16 @@ impl VulkanEngine {
             &mut imported,
             &mut stopwatch,
         );
-        // Also after an error: work that was submitted uses the slots' buffers.
-        for i in 1..=IN_FLIGHT {
-            let finished =
-                in_flight[(next + i) % IN_FLIGHT].finish(&mut imported.target, &mut stopwatch);
-            result = result.and(finished.map_err(EvaluateError::from));
+        result = self.land(
+            &mut in_flight,
+            next,
+            &mut imported.target,
+            stopwatch,
+            result,
+        );
+        if let (Some(keys), Ok(())) = (&mut imported.keys, &result) {
+            keys.has_come_back();
         }
-        if result.is_ok() {
-            imported.has_come_back();
-        }
-        if stopwatch.is_slow() {
-            self.halve_windows(); // those of the next call
-        }
-        if result.is_err() {
-            in_flight.clear(); // a fence or a recording may be half way
-        }
-        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
     }
 
@@ -182,17 +157,11 @@ impl KeysInFlight {
             }
             _ => None,
         };
-        let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
-            InFlight::grow(device, buffer, bytes as u64, residence)
-        };
-        room(&mut self.samples, sample_bytes, Residence::Upload)?;
-        room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
-        room(&mut self.weights, weight_bytes.max(1), Residence::Upload)?;
-        let (Some(samples), Some(rotations), Some(weights)) =
-            (&mut self.samples, &self.rotations, &mut self.weights)
-        else {
-            unreachable!("grown above");
-        };
+        let upload = Residence::Upload;
+        let samples = grow(device, &mut self.samples, sample_bytes as u64, upload)?;
+        let weights = grow(device, &mut self.weights, weight_bytes as u64, upload)?;
+        let own = &mut self.rotations;
+        let rotations = grow(device, own, rotation_bytes as u64, Residence::Readback)?;
         let mut write = |keys: Keys<'_>| {
             piece.write(
                 keys,
@@ -206,10 +175,7 @@ impl KeysInFlight {
                 keys.binding()
             }
             _ => {
-                room(&mut self.keys, key_bytes, Residence::Upload)?;
-                let Some(keys) = &mut self.keys else {
-                    unreachable!("grown above");
-                };
+                let keys = grow(device, &mut self.keys, key_bytes as u64, upload)?;
                 let copied = bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes));
                 write(Keys::Copied(copied))?;
                 Binding::whole(keys)
@@ -234,8 +200,9 @@ impl KeysInFlight {
         self.output = output;
         Ok(())
     }
+}
 
-    /// Waits for the piece in flight, if any, and copies its rotations to the caller.
+impl Flight for KeysInFlight {
     fn finish(
         &mut self,
         target: &mut Target<'_>,

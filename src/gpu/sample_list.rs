@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use crate::cpu::evaluate::FEW;
 use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
-use crate::math::canonical::round_f32;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
@@ -16,7 +15,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
-use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::{NONE, Part, Source};
 use crate::time::times::TimeLanes;
 use crate::time::wrap::TrackCopy;
@@ -263,26 +262,11 @@ impl Piece<'_> {
         let first_sample = run.sample + skipped;
         match run.source {
             RunSource::Constant(constant) => own.fill(held(constant)),
-            RunSource::Segment {
-                index,
-                distance,
-                scale,
-                offset,
-            } => {
+            RunSource::Segment(source, distance, Affine { scale, offset }) => {
                 for (j, single) in own.iter_mut().enumerate() {
-                    let distance = match distance {
-                        Distance::Near { first } => first + (skipped + j) as f32,
-                        Distance::Frames { first } => {
-                            first.wrapping_add((skipped + j) as i32) as f32
-                        }
-                        Distance::Seconds { middle } => {
-                            round_f32(timeline.time(track, first_sample + j) - middle)
-                        }
-                    };
-                    *single = ListedSample {
-                        source: index,
-                        parameter: distance * scale + offset,
-                    };
+                    let time = || timeline.time(track, first_sample + j);
+                    let parameter = distance.of(skipped + j, time) * scale + offset;
+                    *single = ListedSample { source, parameter };
                 }
             }
             RunSource::Exact { index, parameter } => {
@@ -315,10 +299,8 @@ impl Piece<'_> {
             let parameters = found.parameters();
             let own = &mut self.list[self.told..][..found.count];
             for (lane, single) in own.iter_mut().enumerate() {
-                *single = ListedSample {
-                    source: found.sources[lane],
-                    parameter: parameters[lane],
-                };
+                let (source, parameter) = (found.sources[lane], parameters[lane]);
+                *single = ListedSample { source, parameter };
             }
             self.told += found.count;
         }
@@ -355,7 +337,7 @@ impl Piece<'_> {
         match found.first().map(|run| run.source) {
             Some(RunSource::Constant(constant)) => constant,
             // Neither occurs: outside the keys of a whole track lie constants or f64 curves.
-            Some(RunSource::Segment { .. }) | None => 0,
+            Some(RunSource::Segment(..)) | None => 0,
             Some(RunSource::Exact { index, parameter }) => {
                 let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);
                 self.patches.push((all.window.place(track, sample), exact));

@@ -196,7 +196,7 @@ impl Emit for RunItems<'_> {
             return;
         }
         let mut first = 0;
-        if let RunSource::Segment { distance, .. } = run.source {
+        if let RunSource::Segment(_, distance, _) = run.source {
             first = match distance {
                 Distance::Near { first } => first as i32,
                 Distance::Frames { first } => first,
@@ -223,12 +223,7 @@ impl Emit for RunItems<'_> {
 pub(crate) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
     let (source, count, scale, offset) = match source {
         RunSource::Constant(source) => (source, count | IS_CONSTANT, 0.0, 0.0),
-        RunSource::Segment {
-            index,
-            scale,
-            offset,
-            ..
-        } => (index, count, scale, offset),
+        RunSource::Segment(index, _, affine) => (index, count, affine.scale, affine.offset),
         RunSource::Exact { .. } => (0, IS_CONSTANT, 0.0, 0.0),
     };
     Item {
