@@ -10,6 +10,7 @@ use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::evaluate::uploaded::Uploaded;
+use crate::gpu::engine::lock;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
@@ -103,42 +104,43 @@ impl Engine {
         self.device_info().map_or("CPU", |info| &info.name)
     }
 
+    /// Its Vulkan device; `None` on the CPU.
+    fn opened(&self) -> Option<&Opened> {
+        match &*self.backend {
+            Backend::Cpu(_) => None,
+            Backend::Vulkan(opened) => Some(opened),
+        }
+    }
+
     /// What is known of its Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
-        match &*self.backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(&opened.info),
-        }
+        self.opened().map(|opened| &opened.info)
     }
 
     /// The results of the device's self-test, one report for each check; empty on the CPU, which
     /// devices are compared with.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
-        match &*self.backend {
-            Backend::Cpu(_) => &[],
-            Backend::Vulkan(opened) => &opened.self_tests,
-        }
+        self.opened().map_or(&[], |opened| &opened.self_tests)
     }
 
     /// What the validation layer has said so far; see [`Device::list_with`].
     #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
-        match &*self.backend {
-            Backend::Cpu(_) => Vec::new(),
-            Backend::Vulkan(opened) => opened.engine().validation_messages(),
-        }
+        let messages = |opened: &Opened| {
+            let device = &opened.engine().device;
+            device.physical.instance.validation_messages()
+        };
+        self.opened().map_or_else(Vec::new, messages)
     }
 
     /// Where the time of this engine's evaluations went since this was last asked,
     /// or since it was opened; nothing on the CPU.
     #[must_use]
     pub fn take_timings(&self) -> Timings {
-        match &*self.backend {
-            Backend::Cpu(_) => Timings::default(),
-            Backend::Vulkan(opened) => opened.engine().take_timings(),
-        }
+        let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
+        self.opened().map_or_else(Timings::default, timings)
     }
 
     /// Prepares a set for a method and brings it to the device, where it stays.

@@ -68,22 +68,15 @@ impl<'o> Stage<'o> {
     fn with(width: VectorWidth, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
         // Where a rotation may lie across two cache lines, rows are written directly.
         let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
-        if !is_staged || !is_aligned {
-            let place = Place {
-                before: output,
-                lines: &mut [],
-                after: &mut [],
-                stored: 0,
-            };
-            return Self {
-                width,
-                place,
-                lines: None,
-                filled: 0,
-            };
-        }
-        let (before, lines, after) = bytemuck::pod_align_to_mut(output);
-        let filled = before.len().wrapping_neg() % EACH;
+        let is_staged = is_staged && is_aligned;
+        let (before, lines, after) = match is_staged {
+            true => bytemuck::pod_align_to_mut(output),
+            false => (output, &mut [][..], &mut [][..]),
+        };
+        let filled = match is_staged {
+            true => before.len().wrapping_neg() % EACH,
+            false => 0,
+        };
         let place = Place {
             before,
             lines,
@@ -93,7 +86,7 @@ impl<'o> Stage<'o> {
         Self {
             width,
             place,
-            lines: Some(bytemuck::zeroed_box()),
+            lines: is_staged.then(bytemuck::zeroed_box),
             filled,
         }
     }

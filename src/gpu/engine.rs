@@ -150,10 +150,6 @@ impl VulkanEngine {
         })
     }
 
-    pub(crate) fn device(&self) -> &Arc<LogicalDevice> {
-        &self.device
-    }
-
     /// The pipeline of a kernel, made when it is first needed.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
         let mut all = lock(&self.pipelines);
@@ -163,28 +159,6 @@ impl VulkanEngine {
         }
         let pipeline = Pipeline::new(&self.device, kernel, Exactness::Demanded)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
-    }
-
-    /// Name, kind and limits of the device.
-    pub(crate) fn info(&self) -> &crate::gpu::physical::DeviceInfo {
-        &self.device.physical.info
-    }
-
-    /// Runs the self-test.
-    pub(crate) fn self_tests(
-        &self,
-    ) -> Result<Vec<crate::gpu::self_test::SelfTestReport>, VulkanError> {
-        crate::gpu::self_test::run(self)
-    }
-
-    /// Where the time went since the last call of this function.
-    pub(crate) fn take_timings(&self) -> Timings {
-        std::mem::take(&mut *lock(&self.timings))
-    }
-
-    /// What the validation layer has said so far.
-    pub(crate) fn validation_messages(&self) -> Vec<String> {
-        self.device.physical.instance.validation_messages()
     }
 
     /// Bytes of segments that go into one buffer.

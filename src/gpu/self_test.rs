@@ -39,7 +39,7 @@ pub struct SelfTestReport {
 
 /// Runs every canary on a device.
 pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
-    let mut reports = expressions(engine.device(), Exactness::Demanded)?;
+    let mut reports = expressions(&engine.device, Exactness::Demanded)?;
     for (name, method) in [
         ("arc kernel", SLERP),
         ("polynomial kernel", BESSEL_OVERHAUSER),

@@ -207,7 +207,7 @@ impl Direct {
         self.usual.clear();
         self.few_powers.take(numbers, places, prepared);
         self.halves.take(numbers, places, prepared);
-        let are_many = MOST_ALONE * self.left_over.count() > intervals.count;
+        let are_many = MOST_ALONE * self.left_over.count > intervals.count;
         if are_many && !is_exact {
             in_lanes(&mut Steps(intervals));
             (self.smooth.curves)(intervals, stretches, self.ends);

@@ -166,7 +166,7 @@ impl Fitting {
 
 /// Fits the curves of a block, which belong to the first of the `spans`.
 fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
-    let own = &spans[..block.count()];
+    let own = &spans[..block.count];
     let sources = &prepared.spans.sources;
     let places = own.iter().filter_map(|&span| match sources[span] {
         Source::Segment(place) => Some(place as usize),
@@ -177,11 +177,11 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     if !block.is_trusted() {
         for (lane, &span) in own.iter().enumerate() {
             if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), block.place(lane));
+                cutter.push(span, block.curve(lane), block.places[lane]);
             }
         }
     }
-    spans.drain(..block.count());
+    spans.drain(..block.count);
     block.clear();
 }
 

@@ -43,7 +43,7 @@ impl Preparation {
                 Box::new(SmoothPreparation::new(interpolation, moving))
             }
             Curves::Arcs(_) => Box::new(ArcPreparation::new(interpolation)),
-            Curves::Steps => Box::new(StepPreparation::new(interpolation)),
+            Curves::Steps => Box::new(StepPreparation(*interpolation)),
             Curves::Smooth(smooth) => Box::new(SmoothPreparation::new(interpolation, smooth)),
         })
     }

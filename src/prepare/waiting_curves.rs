@@ -16,7 +16,7 @@ use crate::simd::lanes::Lanes;
 
 /// A list of lanes.
 pub(crate) struct List {
-    count: usize,
+    pub(crate) count: usize,
     lanes: [u32; ROOM_FOR],
 }
 
@@ -53,11 +53,6 @@ impl List {
             count += usize::from(is_wanted(squared_extent));
         }
         self.count = count;
-    }
-
-    /// The number of lanes.
-    pub(crate) fn count(&self) -> usize {
-        self.count
     }
 
     /// Whether the list has as many lanes as a block.

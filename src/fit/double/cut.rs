@@ -111,7 +111,7 @@ impl Cutter {
                 if block.fits(lane, segments) {
                     self.parts.push(part);
                 } else if part.piece.is_finest() {
-                    segments[block.place(lane)] = PolynomialSegment::zeroed();
+                    segments[block.places[lane]] = PolynomialSegment::zeroed();
                     self.parts.push(Part {
                         segment: None,
                         ..part

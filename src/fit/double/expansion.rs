@@ -26,7 +26,7 @@ impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        match block.tier() {
+        match block.tier {
             Tier::SmallAngle | Tier::Full => {
                 fit::<L, PAIRS, OWN_BASIS, true>(block, nodes, segments);
             }

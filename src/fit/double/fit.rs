@@ -71,7 +71,7 @@ pub(crate) fn tier(squared_extent: f64) -> Tier {
 /// Up to [`LANES`] curves that wait to be fitted, all of one shape and tier.
 pub(crate) struct FitBlock {
     pub(crate) shape: &'static Shape,
-    tier: Tier,
+    pub(crate) tier: Tier,
     /// Each curve's own numbers.
     pub(crate) numbers: Vec<Lane64>,
     /// The middle of the piece to fit and its width, as fractions of the interval.
@@ -83,9 +83,10 @@ pub(crate) struct FitBlock {
     /// them or none.
     paces: Vec<Option<Arc<Pace>>>,
     pub(crate) quantity: Quantity,
-    count: usize,
+    /// How many curves it has.
+    pub(crate) count: usize,
     /// The segments that they become.
-    places: [usize; LANES],
+    pub(crate) places: [usize; LANES],
     /// Estimates of twice the truncation error, the largest of each curve's components.
     tails: Lane32,
     /// The squares of the farthest angles from the middle.
@@ -201,20 +202,6 @@ impl FitBlock {
             tails: [0.0; LANES],
             reaches: lane,
         }
-    }
-
-    pub(crate) fn tier(&self) -> Tier {
-        self.tier
-    }
-
-    /// The place of the segment for the curve in a lane.
-    pub(crate) fn place(&self, lane: usize) -> usize {
-        self.places[lane]
-    }
-
-    /// How many curves it has.
-    pub(crate) fn count(&self) -> usize {
-        self.count
     }
 
     /// How many more it takes.
