@@ -257,6 +257,16 @@ pub(crate) mod tests {
         results
     }
 
+    /// What `work` gives on this thread, which must be the same at every width.
+    pub(crate) fn same_at_every_width<R: PartialEq>(work: impl Fn() -> R) -> R {
+        let mut results = at_every_width(work).into_iter();
+        let (_, expected) = results.next().expect("the baseline");
+        for (width, found) in results {
+            assert!(found == expected, "{width:?}");
+        }
+        expected
+    }
+
     #[test]
     fn widths_have_names() {
         assert_eq!("AVX2".parse(), Ok(VectorWidth::Avx2));
