@@ -11,7 +11,7 @@ use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Stage;
 use crate::curve::options::InterpolationError;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::bring_near;
@@ -47,7 +47,7 @@ impl CpuEngine {
         let size = BatchSize {
             keys: BATCH_KEYS,
             tracks: shared.clamp(TASK / samples, BATCH_ROTATIONS / samples),
-            cut: cuts_tracks.then_some(PART),
+            cut: cuts_tracks.then_some(PART_INTERVALS),
         };
         let keys = set.keys_of(tracks.clone());
         let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
@@ -66,7 +66,7 @@ impl CpuEngine {
                     bring_near(bytemuck::cast_slice(&times[..some]));
                     bring_near(bytemuck::cast_slice(&keys[..some]));
                 }
-                let own = batch.samples(set, timeline, PART);
+                let own = batch.samples(set, timeline, PART_INTERVALS);
                 for part in memory.parts() {
                     stage.row(own.len(), |row, output| {
                         let copy = TrackCopy::own(own.start + row.start..own.start + row.end);
@@ -83,7 +83,7 @@ impl CpuEngine {
         }
         // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
-        let tasks = tasks(set, timeline, &batches, each, PART, output);
+        let tasks = tasks(set, timeline, &batches, each, PART_INTERVALS, output);
         self.on_threads(|| tasks.into_par_iter().try_for_each(task))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::cpu::destination::{Destination, Places, Turns};
+use crate::cpu::sink::{Places, Sink, Turns};
 use crate::simd::lanes::{Lanes, Number as _};
 use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
@@ -56,7 +56,7 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     affine: Affine,
     first: f32,
     count: usize,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     // Only a run that fits narrow vectors uses them: the rest of a longer run takes one more wide
     // vector.
@@ -164,7 +164,7 @@ fn run<L: Lanes, S: Evaluate>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     let turns = count.div_ceil(S::samples::<L>());
     let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
@@ -184,7 +184,7 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     let mut parameters = OfDistances {
         distances,
@@ -214,7 +214,7 @@ pub(crate) mod tests {
     use crate::twin::evaluate::COARSE;
 
     use super::*;
-    use crate::cpu::destination::tests::in_lines;
+    use crate::cpu::sink::tests::in_lines;
     use crate::shader::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.

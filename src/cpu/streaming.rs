@@ -4,8 +4,8 @@
 
 use std::ops::Range;
 
-use crate::cpu::destination::Places;
 use crate::cpu::evaluate::{FEW, frames, frames_past_caches};
+use crate::cpu::sink::Places;
 use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
@@ -108,17 +108,17 @@ impl<'o> Stage<'o> {
                 self.place.before = others;
                 return make(0..count, &mut Output::Here(row));
             };
-            let piece = (count - first).min(EACH * LINES - self.filled);
+            let some = (count - first).min(EACH * LINES - self.filled);
             let mut output = Output::Staged(Staged {
                 lines: &mut lines[..],
                 start: self.filled,
-                end: self.filled + piece,
+                end: self.filled + some,
                 made: self.filled,
                 place: &mut self.place,
             });
-            make(first..first + piece, &mut output)?;
-            self.filled += piece;
-            first += piece;
+            make(first..first + some, &mut output)?;
+            self.filled += some;
+            first += some;
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use crate::curve::segment::segment_size;
 use crate::evaluate::backend::Backend;
 use crate::evaluate::route::Route;
 use crate::evaluate::uploaded::Uploaded;
-use crate::from_keys::pieces::KeyJob;
+use crate::from_keys::dispatches::KeyJob;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::recovery::Opened;
@@ -20,7 +20,7 @@ use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::VectorWidth;
@@ -128,7 +128,7 @@ impl Backend {
         let size = BatchSize {
             keys,
             tracks: usize::MAX,
-            cut: cuts_tracks.then_some((keys / PART).max(1) * PART),
+            cut: cuts_tracks.then_some((keys / PART_INTERVALS).max(1) * PART_INTERVALS),
         };
         let batches: VecDeque<Batch> = Batches::new(set, whole.clone(), size).collect();
         match batches.is_empty() {
@@ -177,7 +177,7 @@ impl Backend {
             };
             let folded = clip.data.folded(&timeline);
             let window = Window {
-                samples: batch.samples(set, &timeline, PART),
+                samples: batch.samples(set, &timeline, PART_INTERVALS),
                 ..Window::whole(own.len(), timeline.len(), layout)
             };
             let evaluate = |output: &mut [Quat]| {

@@ -1,4 +1,4 @@
-//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two pieces are
+//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two dispatches are
 //! in flight: the host writes the keys of one while the device works on the other.
 
 use std::ops::Range;
@@ -9,7 +9,7 @@ use std::time::Instant;
 use glam::Quat;
 
 use crate::from_keys::KeyCurve;
-use crate::from_keys::pieces::{KeyJob, KeyPiece};
+use crate::from_keys::dispatches::{KeyDispatch, KeyJob};
 use crate::from_keys::upload::Keys;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
@@ -21,7 +21,7 @@ use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel, ROWS_PER_INVOCATION};
 
-/// What one piece in flight needs. The submission is the first field: dropped first, it waits for
+/// What one dispatch in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.
 pub(crate) struct KeysInFlight {
     submission: Submission,
@@ -29,7 +29,7 @@ pub(crate) struct KeysInFlight {
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
     weights: Option<Buffer>,
-    /// The bytes of the result that the piece in flight makes.
+    /// The bytes of the result that the dispatch in flight makes.
     output: Range<usize>,
     /// As [`InFlight::compiled`].
     compiled: bool,
@@ -54,7 +54,7 @@ impl VulkanEngine {
             in_flight.push(KeysInFlight::new(&self.device)?);
         }
         let each = size_of::<Quat>();
-        // A piece's result may begin at any rotation, and a binding must be able to as well.
+        // A dispatch's result may begin at any rotation, and a binding must be able to as well.
         let info = &self.device.physical.info;
         let lends = self.lends && info.min_storage_buffer_offset_alignment <= each as u64;
         let output = bytemuck::cast_slice_mut(output);
@@ -70,7 +70,7 @@ impl VulkanEngine {
         };
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
-        let mut result = self.submit_pieces(
+        let mut result = self.submit_dispatches(
             job,
             &mut in_flight,
             &mut next,
@@ -90,7 +90,7 @@ impl VulkanEngine {
         result
     }
 
-    fn submit_pieces(
+    fn submit_dispatches(
         &self,
         job: &KeyJob<'_>,
         in_flight: &mut [KeysInFlight],
@@ -104,21 +104,21 @@ impl VulkanEngine {
             KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
         };
         let pipeline = self.pipeline(kernel)?;
-        let mut pieces = job.pieces();
+        let mut dispatches = job.dispatches();
         let mut start = 0;
         loop {
             if stopwatch.is_slow() {
                 self.halve_windows();
             }
-            let Some(piece) = pieces.next(self.window())? else {
+            let Some(dispatch) = dispatches.next(self.window())? else {
                 return Ok(());
             };
             *next = (*next + 1) % IN_FLIGHT;
             let evaluation = &mut in_flight[*next];
             evaluation.finish(&mut imported.target, stopwatch)?;
             let writing = Instant::now();
-            let own = start..start + piece.rotation_count() * size_of::<Quat>();
-            evaluation.start(&self.device, &pipeline, &piece, imported, own.clone())?;
+            let own = start..start + dispatch.rotation_count() * size_of::<Quat>();
+            evaluation.start(&self.device, &pipeline, &dispatch, imported, own.clone())?;
             stopwatch.timings.work_lists += writing.elapsed();
             start = own.end;
         }
@@ -138,22 +138,22 @@ impl KeysInFlight {
         })
     }
 
-    /// Submits one piece; `output` are the bytes of the whole result that it makes.
+    /// Submits one dispatch; `output` are the bytes of the whole result that it makes.
     fn start(
         &mut self,
         device: &Arc<LogicalDevice>,
         pipeline: &Pipeline,
-        piece: &KeyPiece<'_, '_>,
+        dispatch: &KeyDispatch<'_, '_>,
         imported: &Borrowed<'_>,
         output: Range<usize>,
     ) -> Result<(), EvaluateError> {
-        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = piece.bytes();
+        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = dispatch.bytes();
         let place = match &imported.target {
             Target::ImportedMemory(memory) if !output.is_empty() => {
                 rotation_bytes = 0;
                 let start = memory.start() + output.start;
                 let size = output.len() as u64;
-                Some(Binding::stretch(memory.raw(), start as u64, size))
+                Some(Binding::range(memory.raw(), start as u64, size))
             }
             _ => None,
         };
@@ -163,14 +163,14 @@ impl KeysInFlight {
         let own = &mut self.rotations;
         let rotations = grow(device, own, rotation_bytes as u64, Residence::Readback)?;
         let mut write = |keys: Keys<'_>| {
-            piece.write(
+            dispatch.write(
                 keys,
                 bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
                 bytemuck::cast_slice_mut(weights.bytes_mut(0..weight_bytes)),
             )
         };
         let keys = match &imported.keys {
-            Some(keys) if piece.keys_are_as_given() => {
+            Some(keys) if dispatch.keys_are_as_given() => {
                 write(Keys::ImportedMemory(keys.start() / size_of::<Quat>()))?;
                 keys.binding()
             }
@@ -186,7 +186,7 @@ impl KeysInFlight {
             bindings.push(Binding::whole(weights));
         }
         bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));
-        let rows = piece.rows();
+        let rows = dispatch.rows();
         let groups = [
             rows.samples.div_ceil(FROM_KEYS_WORKGROUP),
             rows.count.div_ceil(ROWS_PER_INVOCATION),

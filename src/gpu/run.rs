@@ -129,10 +129,10 @@ impl VulkanEngine {
             (items, distances) = (own_items, own_distances);
         }
         let rotations = match (target, &evaluation.rotations) {
-            (Target::Buffer(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
-            (Target::ImportedMemory(memory), _) => Binding::stretch(memory.raw(), aligned, size),
-            (Target::External(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
-            (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
+            (Target::Buffer(buffer), _) => Binding::range(buffer.raw, aligned, size),
+            (Target::ImportedMemory(memory), _) => Binding::range(memory.raw(), aligned, size),
+            (Target::External(buffer), _) => Binding::range(buffer.raw, aligned, size),
+            (Target::Slice(_), Some(buffer)) => Binding::range(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let form = clip.interpolation.form();

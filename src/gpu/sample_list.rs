@@ -118,7 +118,7 @@ impl<'a> SampleList<'a> {
         mut list: &mut [ListedSample],
         shift: u32,
     ) -> Result<Work, FramesError> {
-        let mut pieces = Vec::new();
+        let mut chunks = Vec::new();
         let mut groups = Vec::new();
         for (i, own) in self.groups.iter().enumerate() {
             let end = (self.groups.get(i + 1)).map_or(self.window.len(), |next| next.first);
@@ -138,7 +138,7 @@ impl<'a> SampleList<'a> {
                 let next = next.min(end);
                 let (own_list, other_list) = list.split_at_mut(next - first);
                 list = other_list;
-                pieces.push(Piece {
+                chunks.push(SampleChunk {
                     all: self,
                     prepared: own.prepared,
                     parts,
@@ -151,15 +151,15 @@ impl<'a> SampleList<'a> {
                 first = next;
             }
         }
-        let pieces: Vec<_> = pieces
+        let chunks: Vec<_> = chunks
             .into_par_iter()
-            .map(|mut piece| {
-                in_lanes(&mut piece);
-                piece.result.map(|()| piece.patches)
+            .map(|mut chunk| {
+                in_lanes(&mut chunk);
+                chunk.result.map(|()| chunk.patches)
             })
             .collect();
         let mut patches = Vec::new();
-        for own in pieces {
+        for own in chunks {
             patches.append(&mut own?);
         }
         Ok(Work {
@@ -170,8 +170,8 @@ impl<'a> SampleList<'a> {
     }
 }
 
-/// The piece of the list that one thread writes.
-struct Piece<'a> {
+/// The chunk of the list that one thread writes.
+struct SampleChunk<'a> {
     all: &'a SampleList<'a>,
     prepared: &'a Prepared,
     parts: &'a [Part],
@@ -184,7 +184,7 @@ struct Piece<'a> {
     result: Result<(), FramesError>,
 }
 
-impl InLanes for Piece<'_> {
+impl InLanes for SampleChunk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let SampleList {
@@ -199,7 +199,7 @@ impl InLanes for Piece<'_> {
         for part in self.parts {
             let copy = TrackCopy::own(samples.clone());
             let mut list = PartSamples {
-                piece: self,
+                chunk: self,
                 track: part.track as usize,
             };
             let told = prepared.spans.runs(part, timeline, &copy, &mut list);
@@ -225,19 +225,19 @@ const fn held(constant: u32) -> ListedSample {
 
 /// The samples of one part.
 struct PartSamples<'p, 'a> {
-    piece: &'p mut Piece<'a>,
+    chunk: &'p mut SampleChunk<'a>,
     track: usize,
 }
 
 impl Emit for PartSamples<'_, '_> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        self.piece.tell(self.track, run);
+        self.chunk.tell(self.track, run);
     }
 }
 
-impl Piece<'_> {
-    /// Lists the samples of a run that belong to this piece and are not listed yet.
+impl SampleChunk<'_> {
+    /// Lists the samples of a run that belong to this chunk and are not listed yet.
     #[inline(always)]
     fn tell(&mut self, track: usize, run: Run) {
         let SampleList {

@@ -40,7 +40,7 @@ pub(crate) struct GroupWork {
     pub(crate) chunks: Vec<WorkChunk>,
 }
 
-/// A piece of a work list, made by one thread. Where items take their distances from `distances`,
+/// A chunk of a work list, made by one thread. Where items take their distances from `distances`,
 /// their `first` is an index into those of the chunk.
 #[derive(Default)]
 pub(crate) struct WorkChunk {

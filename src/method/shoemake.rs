@@ -29,13 +29,13 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
     ends::controls::<Bisector<1>>,
 ));
 
-/// Handles that go 1/`PART` of the way from the key to the bisector.
+/// Handles that go 1/`DIVISOR` of the way from the key to the bisector.
 ///
 /// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Relative to `q_i`,
 /// `Double(q_{i-1}, q_i)` is the step before the key, taken once more.
-pub(crate) struct Bisector<const PART: u8>;
+pub(crate) struct Bisector<const DIVISOR: u8>;
 
-impl<const PART: u8> HandleRule for Bisector<PART> {
+impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
     #[inline(always)]
     fn handles<A: Algebra>(
         algebra: &mut A,
@@ -57,7 +57,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
         let toward = sum(before.log, after.log);
         let handle = scaled(
             algebra.log_toward(bisector, toward),
-            A::Number::all(1.0 / f64::from(PART)),
+            A::Number::all(1.0 / f64::from(DIVISOR)),
         );
         Handles {
             incoming: handle,
@@ -68,9 +68,9 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // These handles are 3/PART times as long as the parabola's, at inner keys too.
+            // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
             EndHandle::Parabolic => {
-                let whole = scaled(log, 2.0 / f64::from(PART));
+                let whole = scaled(log, 2.0 / f64::from(DIVISOR));
                 sum(whole, scaled(other, -1.0))
             }
             EndHandle::Natural(rest) => scaled(rest, 0.5),

@@ -52,7 +52,7 @@ impl Engine {
     /// When their shapes differ, the weight lies outside, or the device fails.
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to)?;
-        part(weight)?;
+        fraction(weight)?;
         self.each_rotation(from, 1, |device, start, output| {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
@@ -79,7 +79,7 @@ impl Engine {
         weight: f32,
     ) -> Result<Rotations, Error> {
         same_shape(base, layer)?;
-        part(weight)?;
+        fraction(weight)?;
         if reference.len() != base.tracks() {
             return Err(Error::Poses(
                 "give one reference rotation for each track of the layer",
@@ -272,7 +272,7 @@ fn finite(weights: &[f32]) -> Result<(), Error> {
     }
 }
 
-fn part(weight: f32) -> Result<(), Error> {
+fn fraction(weight: f32) -> Result<(), Error> {
     if (0.0..=1.0).contains(&weight) {
         Ok(())
     } else {

@@ -10,7 +10,7 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
 /// Key intervals of a long track that are prepared as one part.
-pub(crate) const PART: usize = 4096;
+pub(crate) const PART_INTERVALS: usize = 4096;
 
 /// What is prepared together.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,10 +195,10 @@ mod tests {
         assert_eq!(found, expected);
         let timeline = Frames::fps(2).resolve(8, set.time_span()).unwrap();
         let samples: Vec<_> = (found[2..5].iter())
-            .map(|batch| batch.samples(&set, &timeline, PART))
+            .map(|batch| batch.samples(&set, &timeline, PART_INTERVALS))
             .collect();
         assert_eq!(samples, [0..24, 24..48, 48..59]);
-        assert_eq!(found[0].samples(&set, &timeline, PART), 0..59);
+        assert_eq!(found[0].samples(&set, &timeline, PART_INTERVALS), 0..59);
 
         let whole = BatchSize { cut: None, ..size };
         let long = Batches::new(&set, Batch::Tracks(4..5), whole).collect::<Vec<_>>();

@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::curve::options::Ends;
 use crate::fit::double::handles::Steps;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
+use crate::fit::single::fit_range::{FEW_POWERS, FitRange, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
 use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
 use crate::fit::single::hermite_fit::Halves;
 use crate::fit::single::key_steps::{FindSteps, KeySteps};
@@ -41,7 +41,7 @@ pub(crate) struct Direct {
     usual: List,
     /// Curves that are fitted with degree 8, and curves that are split at their middle. A block has
     /// few of each, so they wait until they fill a block.
-    few_powers: WaitingCurves<Part<1, 4>, 4>,
+    few_powers: WaitingCurves<FitRange<1, 4>, 4>,
     halves: WaitingCurves<Halves, 5>,
     /// Lanes with a squared extent above [`LONGEST_WHOLE`], before they are divided into `halves`
     /// and `left_over`.

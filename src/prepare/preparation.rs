@@ -80,7 +80,7 @@ mod tests {
 
     use super::*;
     use crate::method::METHODS;
-    use crate::prepare::batch::{Batch, PART};
+    use crate::prepare::batch::{Batch, PART_INTERVALS};
     use crate::prepare::clip_data::{ClipData, Wanted};
     use crate::simd::dispatch::tests::same_at_every_width;
     use crate::time::spans::Source;
@@ -100,7 +100,7 @@ mod tests {
     /// up tracks.
     #[test]
     fn a_track_in_pieces_is_prepared_like_a_whole_one() {
-        let count = 3 * PART + 17;
+        let count = 3 * PART_INTERVALS + 17;
         let times: Vec<f64> = (0..count)
             .map(|i| i as f64 + 0.3 * (i % 3) as f64)
             .collect();

@@ -6,7 +6,7 @@ use crate::fit::double::expansion::{AboutMiddle, SineCosm1};
 use crate::fit::double::fit::{MOST, Samples, interpolate};
 use crate::fit::double::intervals::rounded;
 use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp, widened};
-use crate::fit::single::fit_part::{Gain, HALF, LAST_HALF, Part, Place, SEAM};
+use crate::fit::single::fit_range::{FitRange, Gain, HALF, LAST_HALF, Place, SEAM};
 use crate::math::quaternion::{
     cross3, normalised, product, product_with_vector, scaled, square, sum,
 };
@@ -36,7 +36,7 @@ pub(crate) trait KeyFit<const PAIRS: usize> {
 }
 
 /// Fits the whole curve by one polynomial.
-impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for FitRange<SAMPLED, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes>(
         &self,
@@ -96,7 +96,7 @@ impl KeyFit<5> for Halves {
     }
 }
 
-/// The end of a part: the rotation there, and its derivative by the part's parameter.
+/// The end of a range: the rotation there, and its derivative by the range's parameter.
 #[derive(Clone, Copy)]
 struct End<L> {
     rotation: [L; 4],
@@ -156,7 +156,7 @@ impl<L: Lanes> Moment<L> {
         }
     }
 
-    /// The contribution of each vector to the rotation's rate, per unit of a part's parameter.
+    /// The contribution of each vector to the rotation's rate, per unit of a range's parameter.
     #[inline(always)]
     fn rates(&self, place: &Place) -> [[L; 3]; 3] {
         let ([v1, v2, v3], [r1, r2, r3]) = (self.vectors, place.rates);
@@ -187,20 +187,20 @@ fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     ]
 }
 
-/// Samples a part of curves about its middle.
+/// Samples a range of curves about its middle.
 #[inline(always)]
 fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     samples: &mut Samples<L, PAIRS>,
-    part: &Part<SAMPLED, PAIRS>,
+    range: &FitRange<SAMPLED, PAIRS>,
     middle: Moment<L>,
     [start, end]: [End<L>; 2],
 ) {
     samples.middle = middle.rotation;
-    set_middle(samples, part, &middle);
+    set_middle(samples, range, &middle);
     let curve = AboutMiddle::new(middle.rotation, middle.vectors);
     let [v1, v2, v3] = middle.vectors;
     let squares = [square(v1), square(v2), square(v3)];
-    for (k, [before, after]) in (1..).zip(&part.gains) {
+    for (k, [before, after]) in (1..).zip(&range.gains) {
         let before = curve.differences(turns(before, squares));
         samples.set_differences(k, before, curve.differences(turns(after, squares)));
     }
@@ -214,13 +214,13 @@ fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
 #[inline(always)]
 fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     samples: &mut Samples<L, PAIRS>,
-    part: &Part<SAMPLED, PAIRS>,
+    range: &FitRange<SAMPLED, PAIRS>,
     middle: &Moment<L>,
 ) {
     let m = middle.rotation;
-    let [u1, u2, u3] = middle.rates(&part.middle);
+    let [u1, u2, u3] = middle.rates(&range.middle);
     let rate = sum(sum(u1, u3), u2);
-    let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, part.bends);
+    let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, range.bends);
     let ends = sum(scaled(v1, L::all(b1)), scaled(v3, L::all(b3)));
     let bend = sum(ends, scaled(v2, L::all(b2)));
     // u₁ × rate is u₁ × u₂ + u₁ × u₃, as u₁ × u₁ is 0.
@@ -271,7 +271,7 @@ mod tests {
 
     use super::*;
     use crate::fit::single::exp_log::tests::assert_near;
-    use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
+    use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
     use crate::fit::single::handles::LONGEST_DIRECT;
 
     /// Catches a wrong digit in a coefficient, and a range that is too short.
