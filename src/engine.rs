@@ -6,6 +6,7 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::cpu::engine::CpuEngine;
+use crate::curve::options::Quantity;
 use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
@@ -16,7 +17,7 @@ use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
 use crate::gpu::self_test::SelfTestReport;
 use crate::method::interpolation::Interpolation;
-use crate::output::rotations::{Layout, Rotations};
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::prepare::clip_data::Wanted;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
@@ -192,11 +193,38 @@ impl Engine {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Rotations, Error> {
+        self.samples(set, interpolation.into(), frames, layout)
+    }
+
+    /// The angular velocity or acceleration of every track at every sample, as
+    /// [`Interpolation::quantity`] says.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`]; also when the quantity is the rotation.
+    pub fn rates(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vectors, Error> {
+        if interpolation.quantity == Quantity::Rotation {
+            return Err(Error::NotRates);
+        }
+        self.samples(set, interpolation, frames, layout)
+    }
+
+    fn samples<T>(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Samples<T>, Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let interpolation = interpolation.into();
         let storage = (self.backend).evaluate(set, interpolation, &timeline, layout)?;
         let (tracks, samples) = (set.track_count(), timeline.len());
-        Ok(Rotations::new(storage, tracks, samples, layout))
+        Ok(Samples::new(storage, tracks, samples, layout))
     }
 
     /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
