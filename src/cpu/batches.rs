@@ -14,7 +14,6 @@ use crate::method::interpolation::Interpolation;
 use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
-use crate::simd::dispatch::bring_near;
 use crate::time::frames::Timeline;
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
@@ -55,17 +54,8 @@ impl CpuEngine {
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);
             let mut memory = self.scratch_pool.take(interpolation, timeline, set);
-            for (i, batch) in batches.iter().enumerate() {
+            for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
-                // Fetches the next batch's times and keys while this batch is evaluated: the
-                // results push everything else out of the caches.
-                for (times, keys) in
-                    (batches.get(i + 1).into_iter()).flat_map(|next| next.times_and_keys(set))
-                {
-                    let some = keys.len().min(BATCH_KEYS);
-                    bring_near(bytemuck::cast_slice(&times[..some]));
-                    bring_near(bytemuck::cast_slice(&keys[..some]));
-                }
                 let own = batch.samples(set, timeline, PART_INTERVALS);
                 for part in memory.parts() {
                     stage.row(own.len(), |row, output| {

@@ -3,8 +3,6 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
@@ -42,17 +40,6 @@ impl Batch {
         self.tracks().map(move |track| {
             let all = || 0..set.times_and_keys(track).1.len() - 1;
             (track, own.clone().unwrap_or_else(all))
-        })
-    }
-
-    /// The times and keys of its intervals, one pair of slices for each track.
-    pub(crate) fn times_and_keys<'a>(
-        &self,
-        set: &'a TrackSet,
-    ) -> impl Iterator<Item = (&'a [f64], &'a [Quat])> {
-        self.intervals(set).map(|(track, own)| {
-            let (times, keys) = set.times_and_keys(track);
-            (&times[own.start..=own.end], &keys[own.start..=own.end])
         })
     }
 
@@ -159,6 +146,8 @@ impl Iterator for Batches<'_> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
     use crate::time::frames::Frames;
 

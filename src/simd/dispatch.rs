@@ -212,21 +212,6 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     None
 }
 
-/// Bytes of a cache line on most processors.
-pub(crate) const CACHE_LINE: usize = 64;
-
-/// Prefetches memory into the second-level cache, while other work goes on.
-pub(crate) fn bring_near(memory: &[u8]) {
-    #[cfg(target_arch = "x86_64")]
-    for line in memory.chunks(CACHE_LINE) {
-        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        // SAFETY: SSE is part of x86-64, and a prefetch gives no value.
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = memory;
-}
-
 /// Orders this thread's streaming stores: others see them before anything it stores from here on.
 pub(crate) fn fence() {
     #[cfg(target_arch = "x86_64")]
