@@ -1,7 +1,7 @@
 //! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
 //! through three keys, computed with logarithms.
 
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles, Interval};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
@@ -33,11 +33,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         Handles {
             incoming: handle(before, after, before.duration, [A::Number::all(1.0); 2]),
             outgoing: handle(before, after, after.duration, [A::Number::all(1.0); 2]),

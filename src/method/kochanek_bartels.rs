@@ -1,6 +1,6 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
@@ -46,11 +46,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let [tension, continuity, bias, _] = after.key;
         let one = A::Number::all(1.0);
         let tight = one - tension;

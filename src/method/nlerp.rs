@@ -1,6 +1,6 @@
 //! Normalised linear interpolation.
 
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector};
 use crate::math::ranges::Algebra;
@@ -31,11 +31,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        _: Interval<A::Number>,
-        _: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, _: BothSides<A>) -> Handles<A::Number> {
         Handles {
             incoming: [A::Number::all(0.0); 3],
             outgoing: [A::Number::all(0.0); 3],

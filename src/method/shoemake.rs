@@ -1,6 +1,6 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
 use crate::math::ranges::Algebra;
@@ -37,11 +37,7 @@ pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        algebra: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let (a, b) = (before.step, after.step);
         let both = [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
         let norm = dot(both, both).root();

@@ -1,6 +1,6 @@
 //! Spherical quadrangle interpolation.
 
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
@@ -29,11 +29,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let bend = sum(after.log, scaled(before.log, A::Number::all(-1.0)));
         Handles {
             incoming: scaled(bend, A::Number::all(0.25)),

@@ -22,7 +22,7 @@ pub(crate) fn find_long<R: HandleRule>(intervals: &Intervals, key: usize) -> Han
             key: [0.0; 4],
         }
     };
-    R::handles(&mut FullRange, interval(key - 1), interval(key))
+    R::handles(&mut FullRange, [key - 1, key].map(interval))
 }
 
 impl HandlesF32 {
