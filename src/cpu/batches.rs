@@ -11,7 +11,7 @@ use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Stage;
 use crate::curve::options::InterpolationError;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::time::frames::Timeline;
@@ -49,7 +49,7 @@ impl CpuEngine {
             cut: cuts_tracks.then_some(PART_INTERVALS),
         };
         let keys = set.keys_of(tracks.clone());
-        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
         let samples_of_a_run = || rotations / keys.max(1);
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);

@@ -12,7 +12,7 @@ use crate::cpu::fallback::Row;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::evaluate::KeyEvaluator;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::batch::{Batch, BatchSize, Batches};
+use crate::prepare::batch::{Batch, BatchSize, batches};
 use crate::prepare::error::SetError;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
@@ -61,7 +61,7 @@ impl CpuEngine {
                     self.resolve(row, output)
                 })
         };
-        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
         if let [batch] = &*batches {
             return task(&mut new(), batch, output);
         }

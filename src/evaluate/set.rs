@@ -20,7 +20,7 @@ use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::VectorWidth;
@@ -130,7 +130,7 @@ impl Backend {
             tracks: usize::MAX,
             cut: cuts_tracks.then_some((keys / PART_INTERVALS).max(1) * PART_INTERVALS),
         };
-        let batches: VecDeque<Batch> = Batches::new(set, whole.clone(), size).collect();
+        let batches = VecDeque::from(batches(set, whole.clone(), size));
         match batches.is_empty() {
             true => [whole].into(),
             false => batches,

@@ -11,7 +11,7 @@ use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
 use crate::curve::segment::segment_size;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART_INTERVALS};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
@@ -114,7 +114,7 @@ fn prepare(
         }
         Ok(prepared)
     };
-    let batches: Vec<Batch> = Batches::new(set, wanted.batch, size).collect();
+    let batches: Vec<Batch> = batches(set, wanted.batch, size);
     batches.into_par_iter().map(group).collect()
 }
 
