@@ -19,6 +19,7 @@ use crate::gpu::self_test::SelfTestReport;
 use crate::method::interpolation::Interpolation;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::prepare::clip_data::Wanted;
+use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -222,7 +223,8 @@ impl Engine {
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let storage = (self.backend).evaluate(set, interpolation, &timeline, layout)?;
+        let request = Request::whole(set, &interpolation, &timeline);
+        let storage = (self.backend).evaluate(&request, layout)?;
         let (tracks, samples) = (set.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -249,7 +251,8 @@ impl Engine {
             return Err(Error::OutputLength { given, needed });
         }
         let interpolation = interpolation.into();
-        (self.backend).evaluate_tracks(set, 0..tracks, interpolation, &timeline, layout, output)?;
+        let request = Request::whole(set, &interpolation, &timeline);
+        (self.backend).evaluate_tracks(&request, layout, output)?;
         Ok(())
     }
 
@@ -266,7 +269,9 @@ impl Engine {
         layout: Layout,
     ) -> Result<String, Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let route = (self.backend).route(set, &interpolation.into(), &timeline, layout);
+        let interpolation = interpolation.into();
+        let request = Request::whole(set, &interpolation, &timeline);
+        let route = (self.backend).route(&request, layout);
         Ok(route.to_string())
     }
 }

@@ -10,10 +10,10 @@ use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Stage;
 use crate::curve::options::InterpolationError;
-use crate::method::interpolation::Interpolation;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
+use crate::prepare::request::Request;
 use crate::time::frames::Timeline;
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
@@ -30,13 +30,11 @@ impl CpuEngine {
     /// be cut into parts, which the threads share.
     pub(crate) fn evaluate_batches(
         &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
+        request: &Request<'_>,
         cuts_tracks: bool,
         output: &mut [Quat],
     ) -> Result<(), SetError> {
+        let (set, tracks, timeline) = (request.set, request.tracks.clone(), request.timeline);
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (samples, rotations) = (timeline.len(), output.len());
         let threads = rayon::current_num_threads();
@@ -53,7 +51,7 @@ impl CpuEngine {
         let samples_of_a_run = || rotations / keys.max(1);
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);
-            let mut memory = self.scratch_pool.take(interpolation, timeline, set);
+            let mut memory = self.scratch_pool.take(request);
             for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
                 let own = batch.samples(set, timeline, PART_INTERVALS);

@@ -9,13 +9,12 @@ use rayon::prelude::*;
 use crate::cpu::engine::CpuEngine;
 use crate::cpu::streaming::Output;
 use crate::from_keys::UNRESOLVED;
-use crate::method::interpolation::Interpolation;
 use crate::prepare::batch::PART_INTERVALS;
 use crate::prepare::error::SetError;
+use crate::prepare::request::Request;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{Ticks, Timeline};
+use crate::time::frames::Ticks;
 use crate::time::wrap::TrackCopy;
-use crate::tracks::set::TrackSet;
 
 /// Two unresolved intervals with at most this many others between them are prepared together.
 const APART: usize = 2;
@@ -23,10 +22,8 @@ const APART: usize = 2;
 /// Consecutive samples of a track, some of which may be unresolved.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
-    pub(crate) set: &'a TrackSet,
+    pub(crate) request: &'a Request<'a>,
     pub(crate) index: usize,
-    pub(crate) interpolation: &'a Interpolation,
-    pub(crate) timeline: &'a Timeline,
     /// The first sample.
     pub(crate) first: usize,
     /// The index of a key at or before all of the samples between keys.
@@ -68,14 +65,17 @@ impl CpuEngine {
             }
         }
         let resolve = |batch: Group<'_>| -> Result<(), SetError> {
-            let mut memory = self
-                .scratch_pool
-                .take(row.interpolation, row.timeline, row.set);
+            let mut memory = self.scratch_pool.take(row.request);
             let intervals = (batch.iter()).map(|(one, _)| (row.index, one.intervals.clone()));
-            memory.prepare(row.set, intervals)?;
+            memory.prepare(row.request.set, intervals)?;
             for (part, (one, own)) in memory.parts().zip(batch) {
                 let own = &mut Output::Here(own);
-                self.part(part, row.timeline, &TrackCopy::own(one.samples), own)?;
+                self.part(
+                    part,
+                    row.request.timeline,
+                    &TrackCopy::own(one.samples),
+                    own,
+                )?;
             }
             self.scratch_pool.give_back(memory);
             Ok(())
@@ -86,10 +86,10 @@ impl CpuEngine {
 
 impl<'a> Row<'a> {
     fn unresolved(&self, output: &[[f32; 4]]) -> Vec<Unresolved> {
-        let (times, _) = self.set.times_and_keys(self.index);
+        let (times, _) = self.request.set.times_and_keys(self.index);
         let last = times.len() - 1;
         let mut all: Vec<Unresolved> = Vec::new();
-        let Ticks::Frames { rate, start } = self.timeline.ticks else {
+        let Ticks::Frames { rate, start } = self.request.timeline.ticks else {
             // Explicit times may be in any order, so the whole track is prepared.
             if output.contains(&UNRESOLVED) {
                 all.push(Unresolved {
@@ -104,7 +104,7 @@ impl<'a> Row<'a> {
             if *rotation != UNRESOLVED {
                 continue;
             }
-            let time = self.timeline.time(self.index, sample);
+            let time = self.request.timeline.time(self.index, sample);
             let after = times.partition_point(|&key| key <= time);
             let mut interval = after.saturating_sub(1).clamp(self.key, last - 1);
             // A sample within rounding of a key is that key.

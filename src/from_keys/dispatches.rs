@@ -8,10 +8,9 @@ use glam::Quat;
 use crate::curve::options::{Ends, InterpolationError};
 use crate::fit::tangent_weights::WeightRule;
 use crate::from_keys::KeyCurve;
-use crate::method::interpolation::Interpolation;
+use crate::prepare::request::Request;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{Ticks, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::time::frames::Ticks;
 use crate::tracks::track_keys::TrackKeys;
 
 /// The most rows of one dispatch; every Vulkan device allows as many workgroups along y.
@@ -22,10 +21,7 @@ const TASK_KEYS: usize = 16 * 1024;
 
 /// What is to be evaluated.
 pub(crate) struct KeyJob<'a> {
-    pub(crate) set: &'a TrackSet,
-    pub(crate) tracks: Range<usize>,
-    pub(crate) interpolation: &'a Interpolation,
-    pub(crate) timeline: &'a Timeline,
+    pub(crate) request: &'a Request<'a>,
     /// The curves that its samples lie on.
     pub(crate) curve: KeyCurve,
 }
@@ -42,14 +38,14 @@ impl<'a> KeyJob<'a> {
     /// All keys of the set, where kernels can read them as they are stored. For cubics they
     /// cannot, because weights are indexed like the keys of a dispatch.
     pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
-        self.weights().is_none().then_some(self.set.keys())
+        self.weights().is_none().then_some(self.request.set.keys())
     }
 
     /// Its dispatches, which are consecutive in the result.
     pub(crate) fn dispatches(&self) -> KeyDispatches<'a, '_> {
         KeyDispatches {
             job: self,
-            next: self.tracks.start,
+            next: self.request.tracks.start,
             long: None,
         }
     }
@@ -112,13 +108,13 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
         if let Some(dispatch) = self.next_of_long(most) {
             return Ok(Some(dispatch));
         }
-        let (set, samples, first) = (job.set, job.timeline.len(), self.next);
-        let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
+        let (set, samples, first) = (job.request.set, job.request.timeline.len(), self.next);
+        let in_frames = matches!(job.request.timeline.ticks, Ticks::Frames { .. });
         let within = |tracks: Range<usize>, most| set.tracks_within(tracks, most);
         let rows = most / samples.max(1);
-        let end = within(first..job.tracks.end, most).min(first.saturating_add(rows));
+        let end = within(first..job.request.tracks.end, most).min(first.saturating_add(rows));
         let is_long = end == first;
-        self.next = job.tracks.end.min(end.max(first + 1));
+        self.next = job.request.tracks.end.min(end.max(first + 1));
         job.check(first..self.next)?;
         if first == self.next {
             return Ok(None);
@@ -187,9 +183,9 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
 
     /// Takes the next window of a track that is larger than a dispatch, and notes what is left.
     fn window_of(&mut self, long: Long, most: usize) -> KeyWindow<'a> {
-        let whole = TrackKeys::whole(self.job.set, long.track);
+        let whole = TrackKeys::whole(self.job.request.set, long.track);
         let times = whole.times;
-        let samples = self.job.timeline.len();
+        let samples = self.job.request.timeline.len();
         let last = whole.all - 1;
         let last_key = (long.key + most - 1).min(last);
         let end = match self.job.clock(times) {
@@ -223,10 +219,10 @@ impl<'a> KeyJob<'a> {
     /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
     /// velocity that is too large.
     fn check(&self, tracks: Range<usize>) -> Result<(), InterpolationError> {
-        let ends = self.interpolation.ends;
+        let ends = self.request.interpolation.ends;
         if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
             for track in tracks {
-                ends.check(self.set.times_and_keys(track).1, track)?;
+                ends.check(self.request.set.times_and_keys(track).1, track)?;
             }
         }
         Ok(())
@@ -235,13 +231,13 @@ impl<'a> KeyJob<'a> {
     /// All of a track.
     pub(crate) fn track(&self, index: usize) -> KeyWindow<'a> {
         KeyWindow {
-            keys: TrackKeys::whole(self.set, index),
-            samples: 0..self.timeline.len(),
+            keys: TrackKeys::whole(self.request.set, index),
+            samples: 0..self.request.timeline.len(),
         }
     }
 
     fn clock(&self, times: &[f64]) -> Option<FrameClock> {
-        match self.timeline.ticks {
+        match self.request.timeline.ticks {
             Ticks::Frames { rate, start } => {
                 Some(FrameClock::new(rate, start, times[times.len() - 1]))
             }

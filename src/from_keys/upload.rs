@@ -7,7 +7,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
-use crate::from_keys::dispatches::{KeyDispatch, KeyJob, KeyWindow, What};
+use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, What};
 use crate::shader::{IS_KEY, KeySample, RowShape, SIGN_TURNED, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -50,7 +50,7 @@ impl KeyDispatch<'_, '_> {
     pub(crate) fn keys_are_as_given(&self) -> bool {
         self.tasks.iter().all(|task| {
             let signs = match &task.what {
-                What::Tracks(tracks) => self.job.set.signs_of(tracks.clone()),
+                What::Tracks(tracks) => self.job.request.set.signs_of(tracks.clone()),
                 What::Window(window) => window.keys.signs,
             };
             !signs.any()
@@ -91,7 +91,7 @@ impl KeyDispatch<'_, '_> {
             places.push((task, written));
             first_key += task.keys;
         }
-        let ends = self.job.interpolation.ends;
+        let ends = self.job.request.interpolation.ends;
         let rule = self.job.weights();
         let new = || Known {
             frames: FramePlan::new(),
@@ -104,14 +104,14 @@ impl KeyDispatch<'_, '_> {
                     What::Window(window) => return self.write_window(window, known, &mut written),
                     What::Tracks(tracks) => tracks.clone(),
                 };
-                if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
+                if let Ticks::Times { times, stride } = &self.job.request.timeline.ticks {
                     let mut of_tracks = TimesOfTracks {
-                        set: self.job.set,
+                        set: self.job.request.set,
                         tracks: tracks.clone(),
                         times,
                         stride: *stride,
-                        each: self.job.timeline.len(),
-                        first_key: written.place_of(self.job.set, tracks.start, 0),
+                        each: self.job.request.timeline.len(),
+                        first_key: written.place_of(self.job.request.set, tracks.start, 0),
                         samples: std::mem::take(&mut written.samples),
                     };
                     in_lanes(&mut of_tracks);
@@ -132,7 +132,11 @@ impl KeyDispatch<'_, '_> {
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
         let keys: &[[u32; 4]] = bytemuck::cast_slice(window.keys.keys);
-        let first_key = written.place_of(self.job.set, window.keys.index, window.keys.first_key);
+        let first_key = written.place_of(
+            self.job.request.set,
+            window.keys.index,
+            window.keys.first_key,
+        );
         if written.imported.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
             own.copy_from_slice(keys);
@@ -174,7 +178,7 @@ impl KeyDispatch<'_, '_> {
         samples: &mut [KeySample],
         known: &mut Known<'p>,
     ) -> Result<(), FramesError> {
-        let KeyJob { set, timeline, .. } = self.job;
+        let (set, timeline) = (self.job.request.set, self.job.request.timeline);
         let Ticks::Frames { rate, start } = timeline.ticks else {
             return Ok(());
         };

@@ -15,6 +15,7 @@ pub(crate) mod fitting;
 pub(crate) mod lane_lists;
 pub(crate) mod preparation;
 pub(crate) mod prepared;
+pub(crate) mod request;
 pub(crate) mod smooth;
 pub(crate) mod steps;
 pub(crate) mod vectors;
