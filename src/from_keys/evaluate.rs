@@ -94,61 +94,66 @@ impl<'a> KeyEvaluator<'a> {
         output: &mut Output<'_>,
     ) -> Result<(), FramesError> {
         let samples = self.plan.samples(keys, clock, window)?;
-        let mut done = 0;
-        if let Block::TwoKeys(block) = &mut self.block
-            && block.form == Form::Arc
-            && let Some(sign) = keys.signs.shared()
-        {
-            block.flush(output);
-            let left = std::mem::take(output).into_slice();
-            let mut run = ArcRun {
-                samples,
-                keys: bytemuck::cast_slice(keys.keys),
-                sign,
-                output: &mut *left,
-                done: 0,
-            };
-            in_lanes(&mut run);
-            done = run.done;
-            *output = left[done..].iter_mut();
+        match &mut self.block {
+            Block::TwoKeys(block) => {
+                let mut samples = samples;
+                if block.form == Form::Arc
+                    && let Some(sign) = keys.signs.shared()
+                {
+                    block.flush(output);
+                    let left = std::mem::take(output).into_slice();
+                    let mut run = ArcRun {
+                        samples,
+                        keys: bytemuck::cast_slice(keys.keys),
+                        sign,
+                        output: &mut *left,
+                        done: 0,
+                    };
+                    in_lanes(&mut run);
+                    let done = run.done;
+                    samples = &samples[done..];
+                    *output = left[done..].iter_mut();
+                }
+                let keys = SignedKeys::new(keys);
+                for &sample in samples {
+                    block.push(keys, sample, output);
+                }
+            }
+            Block::Cubics(block, weights) => {
+                let keys = CubicKeys::new(keys, weights);
+                for &sample in samples {
+                    block.push(keys, sample, output);
+                }
+            }
         }
-        self.block
-            .push(keys, samples[done..].iter().copied(), output);
         Ok(())
     }
 
     fn times(&mut self, keys: TrackKeys<'a>, times: &[f64], output: &mut Output<'_>) {
         let (mut near, plan) = (0, &mut self.time_plan);
-        let samples = times.iter().map(|&time| {
+        let mut next = |time: f64| {
             let sample = plan.sample(keys.times, time, near);
             near = (sample.key & !IS_KEY) as usize;
             sample
-        });
-        self.block.push(keys, samples, output);
-    }
-}
-
-impl<'a> Block<'a> {
-    /// Adds samples among some keys.
-    #[inline(always)]
-    fn push(
-        &mut self,
-        keys: TrackKeys<'a>,
-        samples: impl Iterator<Item = KeySample>,
-        output: &mut Output<'_>,
-    ) {
-        match self {
-            Self::TwoKeys(block) => {
+        };
+        match &mut self.block {
+            Block::TwoKeys(block) => {
                 let keys = SignedKeys::new(keys);
-                samples.for_each(|sample| block.push(keys, sample, output));
+                for &time in times {
+                    block.push(keys, next(time), output);
+                }
             }
-            Self::Cubics(block, weights) => {
+            Block::Cubics(block, weights) => {
                 let keys = CubicKeys::new(keys, weights);
-                samples.for_each(|sample| block.push(keys, sample, output));
+                for &time in times {
+                    block.push(keys, next(time), output);
+                }
             }
         }
     }
+}
 
+impl Block<'_> {
     /// Evaluates the samples that wait; returns whether all since the last call are resolved.
     fn flush(&mut self, output: &mut Output<'_>) -> bool {
         match self {

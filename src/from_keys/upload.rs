@@ -157,13 +157,8 @@ impl KeyDispatch<'_, '_> {
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
             let all = std::mem::take(&mut written.weights);
             let (own, others) = all.split_at_mut(keys.len());
-            let TrackKeys {
-                times,
-                first_key,
-                all,
-                ..
-            } = window.keys;
-            own.copy_from_slice(weights.of(times, first_key, all));
+            let TrackKeys { times, all, .. } = window.keys;
+            own.copy_from_slice(weights.of(times, window.keys.first_key, all));
             written.weights = others;
         }
         written.next_key += keys.len();

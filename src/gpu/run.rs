@@ -65,12 +65,7 @@ impl VulkanEngine {
         window: Window,
         target: &Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let Job {
-            clip,
-            buffers,
-            timeline,
-            encoding,
-        } = job;
+        let (clip, encoding) = (job.clip, job.encoding);
         let rotation = encoding.bytes() as u64;
         let info = &self.device.physical.info;
         let alignment = info.min_storage_buffer_offset_alignment.max(1);
@@ -89,7 +84,7 @@ impl VulkanEngine {
         }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let work = evaluation.list(&self.device, clip, timeline, &window, shift as u32)?;
+        let work = evaluation.list(&self.device, clip, job.timeline, &window, shift as u32)?;
 
         let room = |kept: &mut Option<Buffer>, size: u64, residence| {
             grow(&self.device, kept, size, residence).map(|_| ())
@@ -145,7 +140,7 @@ impl VulkanEngine {
             if item_count == 0 {
                 continue;
             }
-            let group = &buffers.groups[own.group];
+            let group = &job.buffers.groups[own.group];
             let mut bindings = vec![
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),

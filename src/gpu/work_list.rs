@@ -177,21 +177,14 @@ struct RunItems<'a> {
 impl Emit for RunItems<'_> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let &mut Self {
-            prepared,
-            timeline,
-            window,
-            shift,
-            track,
-            ..
-        } = self;
         let chunk = &mut *self.chunk;
-        let output = |sample| window.place(track, sample) as u32 + shift;
+        let output = |sample| self.window.place(self.track, sample) as u32 + self.shift;
         let samples = run.sample..run.sample + run.count;
         if let RunSource::Exact { index, parameter } = run.source {
             chunk.patches.extend(samples.map(|sample| {
-                let value = prepared.exact(index, parameter, timeline, track, sample);
-                (window.place(track, sample), value)
+                let (timeline, track) = (self.timeline, self.track);
+                let value = (self.prepared).exact(index, parameter, timeline, track, sample);
+                (self.window.place(track, sample), value)
             }));
             return;
         }
@@ -202,7 +195,8 @@ impl Emit for RunItems<'_> {
                 Distance::Frames { first } => first,
                 Distance::Seconds { middle } => {
                     let own = chunk.distances.len() as i32;
-                    let from_middle = |sample| round_f32(timeline.time(track, sample) - middle);
+                    let time = |sample| self.timeline.time(self.track, sample);
+                    let from_middle = |sample| round_f32(time(sample) - middle);
                     chunk.distances.extend(samples.clone().map(from_middle));
                     own
                 }

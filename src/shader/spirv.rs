@@ -113,11 +113,7 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
-        let Instruction {
-            start,
-            opcode,
-            words,
-        } = *instruction;
+        let (start, opcode, words) = (instruction.start, instruction.opcode, instruction.words);
         match opcode {
             op::TYPE_FLOAT if words.len() > 2 && words[2] != 32 => {
                 return Err(SpirvError::FloatWidth { bits: words[2] });

@@ -45,17 +45,12 @@ impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for FitRange<SAMPLE
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
-        let BetweenKeys {
-            start,
-            vectors,
-            end,
-        } = *curves;
-        let [w1, _, w3] = vectors;
+        let [w1, _, w3] = curves.vectors;
         let ends = [
-            End::new(start, w1, self.slope),
-            End::new(end, w3, self.slope),
+            End::new(curves.start, w1, self.slope),
+            End::new(curves.end, w3, self.slope),
         ];
-        let middle = Moment::new::<false>(start, vectors, &self.middle);
+        let middle = Moment::new::<false>(curves.start, curves.vectors, &self.middle);
         sample(samples, self, middle, ends);
         interpolate(true, self.nodes, samples, places, segments);
     }
@@ -73,11 +68,7 @@ impl KeyFit<5> for Halves {
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
-        let BetweenKeys {
-            start,
-            vectors,
-            end,
-        } = *curves;
+        let (start, vectors, end) = (curves.start, curves.vectors, curves.end);
         let [w1, ..] = vectors;
         let seam = Moment::new::<true>(start, vectors, &SEAM);
         let [u1, u2, u3] = seam.rates(&SEAM);
