@@ -3,13 +3,12 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes;
-use crate::fit::arc_lanes::{LANES as ARC_LANES, whole};
+use crate::fit::arc_lanes::{self, LANES as ARC_LANES, whole};
 use crate::fit::constant_velocity::arc_component;
-use crate::math::canonical;
+use crate::math::canonical::canonical;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
-use crate::simd::lanes::{Lanes, canonical};
+use crate::simd::lanes::{self, Lanes, Number};
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
@@ -82,10 +81,16 @@ impl TwoKeyBlock {
             let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
             for j in 0..LANES {
                 let own = arc_component(middle[j], tangent[j], squares[j]);
-                lanes[j] = canonical::canonical(polynomial(own, self.parameters[j]));
+                lanes[j] = canonical(polynomial(own, self.parameters[j]));
             }
         }
-        let ([x, y, z, w], mut rotations) = (&found, [[0.0; 4]; LANES]);
+        self.keep(&found);
+    }
+
+    /// Turns arrays of components into rotations.
+    #[inline(always)]
+    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
+        let mut rotations = [[0.0; 4]; LANES];
         for j in 0..whole(self.count) {
             rotations[j] = [x[j], y[j], z[j], w[j]];
         }
@@ -120,16 +125,24 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// The rotations on the arcs of a vector, times `sign`, which is 1 or -1.
+    /// The rotations on the arcs of a vector, times `sign`.
     #[inline(always)]
     fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
-        let place = vector % VECTORS;
-        let (middle, tangent) = (self.middles[place], self.tangents[place]);
-        let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
-        // Keys of the other sign would only flip the sign of every intermediate result, so the
-        // sign may come last.
-        canonical([x * sign, y * sign, z * sign, w * sign])
+        let (middle, tangent) = (
+            self.middles[vector % VECTORS],
+            self.tangents[vector % VECTORS],
+        );
+        at(middle, tangent, sign, parameter)
     }
+}
+
+/// The rotation on an arc, times `sign`, which is 1 or -1.
+#[inline(always)]
+fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
+    let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
+    // Keys of the other sign would only flip the sign of every intermediate result, so the sign
+    // may come last.
+    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
 }
 
 /// Samples of one track on arcs between keys that share one continued sign, evaluated straight

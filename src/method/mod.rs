@@ -48,7 +48,7 @@ use std::str::FromStr;
 use crate::fit::double::handles::HandleRule;
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::fit::single::long_tangents::{FindLong, find_long};
+use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
 use crate::reference;
@@ -173,7 +173,7 @@ pub(crate) struct FromKeys {
     /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
     /// Finds, in f64, the handles of keys whose tangents are too long for f32's formulas.
-    pub(crate) find_long: FindLong,
+    pub(crate) find_long: fn(&mut LongTangents),
 }
 
 /// The numbers that a method has for an interval beside its keys.
@@ -202,7 +202,7 @@ impl Smooth {
         Self {
             direct: Some(FromKeys {
                 weights,
-                find_long: find_long::<R>,
+                find_long: LongTangents::find::<R>,
             }),
             ..self
         }

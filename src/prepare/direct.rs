@@ -12,7 +12,7 @@ use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_D
 use crate::fit::single::hermite_fit::Halves;
 use crate::fit::single::key_steps::{FindSteps, KeySteps};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::FindLong;
+use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
@@ -52,7 +52,7 @@ pub(crate) struct Direct {
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
-    find_long: FindLong,
+    find_long: fn(&mut LongTangents),
     smooth: Smooth,
     ends: Ends,
 }

@@ -12,7 +12,7 @@ use crate::fit::single::exp_log::{
 };
 use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::FindLong;
+use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
 use crate::math::ranges::MEDIUM_SQUARE;
 use crate::shader::KEY_INNER;
@@ -80,7 +80,7 @@ pub(crate) struct FindHandles<'a> {
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
     /// Finds the handles for which the range of f32's formulas is too short, in f64.
-    pub(crate) find_long: FindLong,
+    pub(crate) find_long: fn(&mut LongTangents),
 }
 
 impl InLanes for FindHandles<'_> {
@@ -118,7 +118,9 @@ impl InLanes for FindHandles<'_> {
                 }
             }
         }
-        own.set_far(&long_tangents[..far_count], intervals, self.find_long);
+        for keys in long_tangents[..far_count].chunks(AT_ONCE) {
+            own.set_far(keys, intervals, self.find_long);
+        }
     }
 }
 

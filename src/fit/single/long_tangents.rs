@@ -1,41 +1,135 @@
 //! Long tangents: handles of keys whose tangents exceed the range of f32's formulas. They are
-//! computed in f64 over the full range.
+//! computed in f64 over the full range, in vectors of a few keys.
+
+use std::marker::PhantomData;
 
 use crate::fit::double::handles::{HandleRule, Handles, Interval};
 use crate::fit::double::intervals::Intervals;
 use crate::fit::single::handles::HandlesF32;
-use crate::math::quaternion::{log, step, unit};
+use crate::math::quaternion::{log, normalised, step};
 use crate::math::ranges::FullRange;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
 
-/// Finds by a rule the handles of the key at the start of an interval.
-pub(crate) type FindLong = fn(&Intervals, usize) -> Handles<f64>;
+/// The number of keys computed together; a block has few of them.
+pub(crate) const AT_ONCE: usize = 8;
 
-/// The [`FindLong`] of a rule.
-pub(crate) fn find_long<R: HandleRule>(intervals: &Intervals, key: usize) -> Handles<f64> {
-    let interval = |lane: usize| {
-        let [from, to] = intervals.keys(lane).map(unit);
-        let step = step(from, to);
-        Interval {
-            duration: intervals.durations[lane],
-            step,
-            log: log(step),
-            key: [0.0; 4],
-        }
-    };
-    R::handles(&mut FullRange, [key - 1, key].map(interval))
+/// One number for each key.
+type Row = [f64; AT_ONCE];
+
+/// Keys with long tangents, and their handles.
+pub(crate) struct LongTangents {
+    /// The intervals on both sides.
+    before: Side,
+    after: Side,
+    incoming: [Row; 3],
+    outgoing: [Row; 3],
+}
+
+/// The intervals on one side of the keys.
+struct Side {
+    from: [Row; 4],
+    to: [Row; 4],
+    durations: Row,
+}
+
+impl LongTangents {
+    /// Finds their handles by a rule.
+    pub(crate) fn find<R: HandleRule>(&mut self) {
+        in_lanes(&mut Find::<R> {
+            keys: self,
+            rule: PhantomData,
+        });
+    }
 }
 
 impl HandlesF32 {
     /// Sets the handles of a few keys, as `find` finds them.
     #[inline(never)]
-    pub(crate) fn set_far(&mut self, keys: &[usize], intervals: &Intervals, find: FindLong) {
-        for &key in keys {
-            let Handles { incoming, outgoing } = find(intervals, key);
+    pub(crate) fn set_far(
+        &mut self,
+        keys: &[usize],
+        intervals: &Intervals,
+        find: fn(&mut LongTangents),
+    ) {
+        let mut far = LongTangents {
+            before: Side::none(),
+            after: Side::none(),
+            incoming: [[0.0; AT_ONCE]; 3],
+            outgoing: [[0.0; AT_ONCE]; 3],
+        };
+        for (i, &key) in keys.iter().enumerate() {
+            far.before.set(i, intervals, key - 1);
+            far.after.set(i, intervals, key);
+        }
+        find(&mut far);
+        for (i, &key) in keys.iter().enumerate() {
             for c in 0..3 {
-                self.incoming[c][key] = incoming[c] as f32;
-                self.outgoing[c][key] = outgoing[c] as f32;
+                self.incoming[c][key] = far.incoming[c][i] as f32;
+                self.outgoing[c][key] = far.outgoing[c][i] as f32;
             }
             self.far[key] = 0.0;
+        }
+    }
+}
+
+impl Side {
+    fn none() -> Self {
+        Self {
+            from: [[0.0; AT_ONCE]; 4],
+            to: [[0.0; AT_ONCE]; 4],
+            durations: [1.0; AT_ONCE],
+        }
+    }
+
+    fn set(&mut self, i: usize, intervals: &Intervals, lane: usize) {
+        let [from, to] = intervals.keys(lane);
+        for c in 0..4 {
+            self.from[c][i] = f64::from(from[c]);
+            self.to[c][i] = f64::from(to[c]);
+        }
+        self.durations[i] = intervals.durations[lane];
+    }
+
+    #[inline(always)]
+    fn interval(&self, i: usize) -> Interval<f64> {
+        let [x0, y0, z0, w0] = &self.from;
+        let [x1, y1, z1, w1] = &self.to;
+        let from = normalised([x0[i], y0[i], z0[i], w0[i]]);
+        let to = normalised([x1[i], y1[i], z1[i], w1[i]]);
+        let step = step(from, to);
+        Interval {
+            duration: self.durations[i],
+            step,
+            log: log(step),
+            key: [0.0; 4],
+        }
+    }
+}
+
+struct Find<'a, R> {
+    keys: &'a mut LongTangents,
+    rule: PhantomData<R>,
+}
+
+impl<R: HandleRule> InLanes for Find<'_, R> {
+    // The compiler vectorises this loop.
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let LongTangents {
+            before,
+            after,
+            incoming,
+            outgoing,
+        } = &mut *self.keys;
+        for i in 0..AT_ONCE {
+            let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
+            let Handles {
+                incoming: [x0, y0, z0],
+                outgoing: [x1, y1, z1],
+            } = found;
+            (incoming[0][i], incoming[1][i], incoming[2][i]) = (x0, y0, z0);
+            (outgoing[0][i], outgoing[1][i], outgoing[2][i]) = (x1, y1, z1);
         }
     }
 }
