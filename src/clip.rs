@@ -7,7 +7,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::output::encoding::Encoding;
-use crate::output::rotations::{Layout, Rotations};
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::window::Window;
 use crate::time::frames::{Frames, FramesError, Timeline};
 
@@ -57,10 +57,27 @@ impl Clip {
     /// # Errors
     /// When the frames do not fit the clip, or the device fails.
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
+        self.samples(frames, layout)
+    }
+
+    /// The vectors of a clip of angular velocities or accelerations
+    /// ([`Interpolation::quantity`](crate::method::interpolation::Interpolation::quantity)).
+    ///
+    /// # Errors
+    /// As [`Clip::evaluate`]; also when the clip is of rotations.
+    pub fn rates(&self, frames: &Frames, layout: Layout) -> Result<Vectors, Error> {
+        if self.uploaded.data.interpolation.quantity == Quantity::Rotation {
+            return Err(Error::NotRates);
+        }
+        self.samples(frames, layout)
+    }
+
+    /// The stored values, whatever they are.
+    pub(crate) fn samples<T>(&self, frames: &Frames, layout: Layout) -> Result<Samples<T>, Error> {
         let timeline = self.timeline(frames)?;
         let storage = (self.uploaded).evaluate(&self.engine.backend, &timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
-        Ok(Rotations::new(storage, tracks, samples, layout))
+        Ok(Samples::new(storage, tracks, samples, layout))
     }
 
     /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it

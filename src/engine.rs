@@ -6,17 +6,20 @@ use glam::Quat;
 
 use crate::clip::Clip;
 use crate::cpu::engine::CpuEngine;
+use crate::curve::options::Quantity;
 use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::evaluate::uploaded::Uploaded;
+use crate::gpu::engine::lock;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
 use crate::gpu::self_test::SelfTestReport;
 use crate::method::interpolation::Interpolation;
-use crate::output::rotations::{Layout, Rotations};
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::prepare::clip_data::Wanted;
+use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -103,42 +106,43 @@ impl Engine {
         self.device_info().map_or("CPU", |info| &info.name)
     }
 
+    /// Its Vulkan device; `None` on the CPU.
+    fn opened(&self) -> Option<&Opened> {
+        match &*self.backend {
+            Backend::Cpu(_) => None,
+            Backend::Vulkan(opened) => Some(opened),
+        }
+    }
+
     /// What is known of its Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
-        match &*self.backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(&opened.info),
-        }
+        self.opened().map(|opened| &opened.info)
     }
 
     /// The results of the device's self-test, one report for each check; empty on the CPU, which
     /// devices are compared with.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
-        match &*self.backend {
-            Backend::Cpu(_) => &[],
-            Backend::Vulkan(opened) => &opened.self_tests,
-        }
+        self.opened().map_or(&[], |opened| &opened.self_tests)
     }
 
     /// What the validation layer has said so far; see [`Device::list_with`].
     #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
-        match &*self.backend {
-            Backend::Cpu(_) => Vec::new(),
-            Backend::Vulkan(opened) => opened.engine().validation_messages(),
-        }
+        let messages = |opened: &Opened| {
+            let device = &opened.engine().device;
+            device.physical.instance.validation_messages()
+        };
+        self.opened().map_or_else(Vec::new, messages)
     }
 
     /// Where the time of this engine's evaluations went since this was last asked,
     /// or since it was opened; nothing on the CPU.
     #[must_use]
     pub fn take_timings(&self) -> Timings {
-        match &*self.backend {
-            Backend::Cpu(_) => Timings::default(),
-            Backend::Vulkan(opened) => opened.engine().take_timings(),
-        }
+        let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
+        self.opened().map_or_else(Timings::default, timings)
     }
 
     /// Prepares a set for a method and brings it to the device, where it stays.
@@ -190,11 +194,39 @@ impl Engine {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Rotations, Error> {
+        self.samples(set, interpolation.into(), frames, layout)
+    }
+
+    /// The angular velocity or acceleration of every track at every sample, as
+    /// [`Interpolation::quantity`] says.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`]; also when the quantity is the rotation.
+    pub fn rates(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vectors, Error> {
+        if interpolation.quantity == Quantity::Rotation {
+            return Err(Error::NotRates);
+        }
+        self.samples(set, interpolation, frames, layout)
+    }
+
+    fn samples<T>(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Samples<T>, Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let interpolation = interpolation.into();
-        let storage = (self.backend).evaluate(set, interpolation, &timeline, layout)?;
+        let request = Request::whole(set, &interpolation, &timeline);
+        let storage = (self.backend).evaluate(&request, layout)?;
         let (tracks, samples) = (set.track_count(), timeline.len());
-        Ok(Rotations::new(storage, tracks, samples, layout))
+        Ok(Samples::new(storage, tracks, samples, layout))
     }
 
     /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
@@ -219,7 +251,8 @@ impl Engine {
             return Err(Error::OutputLength { given, needed });
         }
         let interpolation = interpolation.into();
-        (self.backend).evaluate_tracks(set, 0..tracks, interpolation, &timeline, layout, output)?;
+        let request = Request::whole(set, &interpolation, &timeline);
+        (self.backend).evaluate_tracks(&request, layout, output)?;
         Ok(())
     }
 
@@ -236,7 +269,9 @@ impl Engine {
         layout: Layout,
     ) -> Result<String, Error> {
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let route = (self.backend).route(set, &interpolation.into(), &timeline, layout);
+        let interpolation = interpolation.into();
+        let request = Request::whole(set, &interpolation, &timeline);
+        let route = (self.backend).route(&request, layout);
         Ok(route.to_string())
     }
 }

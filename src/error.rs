@@ -46,6 +46,9 @@ pub enum Error {
         /// What was asked for.
         encoding: Encoding,
     },
+    /// Rates of change are asked for, and the quantity is the rotation.
+    #[error("the quantity is the rotation; ask for its velocity or its acceleration")]
+    NotRates,
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownWidth),

@@ -79,12 +79,7 @@ impl Clip {
         };
         let done = opened.attempt_smaller(|engine| {
             let buffers = self.uploaded.buffers_on(engine)?;
-            let job = Job {
-                clip: &self.uploaded.data,
-                buffers: &buffers,
-                timeline: &timeline,
-                encoding,
-            };
+            let job = Job::new(&self.uploaded.data, &buffers, &timeline, encoding);
             engine.evaluate_to(job, layout, external)
         });
         Ok(done?)

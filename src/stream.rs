@@ -15,6 +15,7 @@ use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::Wanted;
+use crate::prepare::request::Request;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
@@ -111,10 +112,11 @@ impl Engine {
         }
         let whole = Window::whole(set.track_count(), timeline.len(), layout);
         let fill = |window: &Window, output: &mut [Quat]| {
-            let tracks = window.tracks.clone();
-            (self.backend)
-                .evaluate_tracks(set, tracks, interpolation, &timeline, layout, output)
-                .map_err(Error::from)
+            let request = Request {
+                tracks: window.tracks.clone(),
+                ..Request::whole(set, &interpolation, &timeline)
+            };
+            Ok((self.backend).evaluate_tracks(&request, layout, output)?)
         };
         run(whole.cut(chunk), fill, sink)
     }

@@ -5,7 +5,8 @@ use crate::support::{Random, first_difference, give_key_data, hostile_set, vulka
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::Curve;
 use tumble::{
-    Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Quantity, Track, TrackSet, method,
+    Axes, Device, Ends, Engine, Error, Frames, Interpolation, Layout, METHODS, Quantity, Track,
+    TrackSet, method,
 };
 
 const QUANTITIES: [Quantity; 4] = [
@@ -51,15 +52,15 @@ fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) 
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(set, interpolation).unwrap();
     let timeline = clip.timeline(frames).unwrap();
-    let found = clip.evaluate(frames).unwrap();
+    let found = clip.rates(frames, Layout::TrackMajor).unwrap();
+    assert!(found.as_slice().iter().all(|vector| vector.w == 0.0));
     let mut largest = 0.0f64;
     for (t, track) in set.tracks().enumerate() {
         let curve = Curve::of(&interpolation, track);
         for s in 0..found.samples() {
             let time = timeline.time(t, s);
-            let [x, y, z, w] = found.get(t, s).unwrap().to_array();
-            let found = DVec3::new(x.into(), y.into(), z.into());
-            assert!(w == 0.0 && found.is_finite());
+            let found = found.get(t, s).unwrap().as_dvec3();
+            assert!(found.is_finite());
             let error = (found - expected(&curve, interpolation.quantity, time)).length();
             largest = largest.max(error / scale(&curve, track, interpolation.quantity, time));
         }
@@ -162,16 +163,19 @@ fn a_door_turns_until_its_last_key() {
     let frames = Frames::fps(2).between(-1.0, 3.0);
     let times = Frames::at((-2..=6).map(|i| f64::from(i) * 0.5).collect());
     for frames in [frames, times] {
-        let found = engine.evaluate(&set, velocity, &frames).unwrap();
-        let speeds: Vec<f32> = found.as_quats()[..9].iter().map(|v| v.y).collect();
+        let layout = Layout::TrackMajor;
+        let found = engine.rates(&set, velocity, &frames, layout).unwrap();
+        let speeds: Vec<f32> = found.as_slice()[..9].iter().map(|v| v.y).collect();
         let expected = [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0];
         for (found, expected) in speeds.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-6, "{speeds:?}");
         }
         assert!(
-            found.as_quats()[9..]
+            found.as_slice()[9..]
                 .iter()
                 .all(|v| v.to_array() == [0.0; 4])
         );
+        let refused = engine.rates(&set, method::SLERP.into(), &frames, layout);
+        assert!(matches!(refused, Err(Error::NotRates)));
     }
 }

@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec3, Vec4};
 use tumble::{
-    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, TrackSet,
-    VectorMethod, method,
+    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, TrackSet,
+    VectorMethod, Vectors, method,
 };
 
 use crate::motion::{Channels, Motion, Sampled, Sampler};
@@ -118,6 +118,34 @@ impl ChannelMethods<'_> {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
+        let evaluate = |set: &TrackSet, how| engine.evaluate_as(set, how, frames, layout);
+        self.by_method(clip, layout, evaluate, Rotations::as_quats)
+    }
+
+    /// As [`ChannelMethods::rotations`], the angular velocities or accelerations, each followed by
+    /// 0.
+    ///
+    /// # Errors
+    /// As [`Engine::rates`].
+    pub fn rates(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Vec<Vec4>, Error> {
+        let evaluate = |set: &TrackSet, how| engine.rates(set, how, frames, layout);
+        self.by_method(clip, layout, evaluate, Vectors::as_slice)
+    }
+
+    /// The values of all tracks; `evaluate` gives those of tracks with one method.
+    fn by_method<S, T: Copy + Default>(
+        &self,
+        clip: &Motion,
+        layout: Layout,
+        evaluate: impl Fn(&TrackSet, Interpolation) -> Result<tumble::Samples<S>, Error>,
+        values: fn(&tumble::Samples<S>) -> &[T],
+    ) -> Result<Vec<T>, Error> {
         let tracks = clip.set.track_count();
         let resting = self.resting_method(clip);
         let methods: Vec<Method> = (0..tracks)
@@ -127,9 +155,9 @@ impl ChannelMethods<'_> {
         for group in groups(tracks, |track| methods[track].name) {
             let interpolation = (self.with)(methods[group[0]]);
             let set = clip.tracks(&group);
-            let found = engine.evaluate_as(&set, interpolation, frames, layout)?;
-            all.resize(tracks * found.samples(), Quat::IDENTITY);
-            scatter(found.as_quats(), &group, tracks, layout, &mut all);
+            let found = evaluate(&set, interpolation)?;
+            all.resize(tracks * found.samples(), T::default());
+            scatter(values(&found), &group, tracks, layout, &mut all);
         }
         Ok(all)
     }

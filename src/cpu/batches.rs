@@ -10,11 +10,10 @@ use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Stage;
 use crate::curve::options::InterpolationError;
-use crate::method::interpolation::Interpolation;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
-use crate::simd::dispatch::bring_near;
+use crate::prepare::request::Request;
 use crate::time::frames::Timeline;
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
@@ -31,13 +30,11 @@ impl CpuEngine {
     /// be cut into parts, which the threads share.
     pub(crate) fn evaluate_batches(
         &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
+        request: &Request<'_>,
         cuts_tracks: bool,
         output: &mut [Quat],
     ) -> Result<(), SetError> {
+        let (set, tracks, timeline) = (request.set, request.tracks.clone(), request.timeline);
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (samples, rotations) = (timeline.len(), output.len());
         let threads = rayon::current_num_threads();
@@ -47,26 +44,17 @@ impl CpuEngine {
         let size = BatchSize {
             keys: BATCH_KEYS,
             tracks: shared.clamp(TASK / samples, BATCH_ROTATIONS / samples),
-            cut: cuts_tracks.then_some(PART),
+            cut: cuts_tracks.then_some(PART_INTERVALS),
         };
         let keys = set.keys_of(tracks.clone());
-        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
         let samples_of_a_run = || rotations / keys.max(1);
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(self.width, rotations, samples, samples_of_a_run, output);
-            let mut memory = self.scratch_pool.take(interpolation, timeline, set);
-            for (i, batch) in batches.iter().enumerate() {
+            let mut memory = self.scratch_pool.take(request);
+            for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
-                // Fetches the next batch's times and keys while this batch is evaluated: the
-                // results push everything else out of the caches.
-                for (times, keys) in
-                    (batches.get(i + 1).into_iter()).flat_map(|next| next.times_and_keys(set))
-                {
-                    let some = keys.len().min(BATCH_KEYS);
-                    bring_near(bytemuck::cast_slice(&times[..some]));
-                    bring_near(bytemuck::cast_slice(&keys[..some]));
-                }
-                let own = batch.samples(set, timeline, PART);
+                let own = batch.samples(set, timeline, PART_INTERVALS);
                 for part in memory.parts() {
                     stage.row(own.len(), |row, output| {
                         let copy = TrackCopy::own(own.start + row.start..own.start + row.end);
@@ -83,7 +71,7 @@ impl CpuEngine {
         }
         // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
-        let tasks = tasks(set, timeline, &batches, each, PART, output);
+        let tasks = tasks(set, timeline, &batches, each, PART_INTERVALS, output);
         self.on_threads(|| tasks.into_par_iter().try_for_each(task))
     }
 }

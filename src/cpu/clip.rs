@@ -218,11 +218,11 @@ fn frame_tasks<'a>(
             (window, Vec::with_capacity(samples.len()))
         }));
         for frame in block.chunks_mut(tracks) {
-            for (task, piece) in all[of_block..]
+            for (task, row) in all[of_block..]
                 .iter_mut()
                 .zip(frame.chunks_mut(tracks_each))
             {
-                task.1.push(piece);
+                task.1.push(row);
             }
         }
     }

@@ -2,19 +2,13 @@
 
 use std::marker::PhantomData;
 
-use crate::cpu::destination::{Destination, Places, Turns};
+use crate::cpu::sink::{Places, Sink, Turns};
 use crate::simd::lanes::{Lanes, Number as _};
+use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
 
 /// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
 pub(crate) const FEW: usize = 3;
-
-/// How a run's parameter follows from the distance to the segment's middle.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Affine {
-    pub(crate) scale: f32,
-    pub(crate) offset: f32,
-}
 
 /// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be
 /// overwritten, up to the end of a vector. All distances must be integers that f32 holds exactly,
@@ -62,7 +56,7 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     affine: Affine,
     first: f32,
     count: usize,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     // Only a run that fits narrow vectors uses them: the rest of a longer run takes one more wide
     // vector.
@@ -170,7 +164,7 @@ fn run<L: Lanes, S: Evaluate>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     let turns = count.div_ceil(S::samples::<L>());
     let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
@@ -190,7 +184,7 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Destination,
+    output: impl Sink,
 ) {
     let mut parameters = OfDistances {
         distances,
@@ -220,7 +214,7 @@ pub(crate) mod tests {
     use crate::twin::evaluate::COARSE;
 
     use super::*;
-    use crate::cpu::destination::tests::in_lines;
+    use crate::cpu::sink::tests::in_lines;
     use crate::shader::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.

@@ -1,8 +1,6 @@
 //! Sets with fewer samples than keys on the CPU: straight from keys, and by way of segments
 //! where curves turn too far for that.
 
-use std::ops::Range;
-
 use glam::Quat;
 use rayon::prelude::*;
 
@@ -11,11 +9,10 @@ use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::fallback::Row;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::evaluate::KeyEvaluator;
-use crate::method::interpolation::Interpolation;
-use crate::prepare::batch::{Batch, BatchSize, Batches};
+use crate::prepare::batch::{Batch, BatchSize, batches};
 use crate::prepare::error::SetError;
-use crate::time::frames::{Ticks, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::prepare::request::Request;
+use crate::time::frames::Ticks;
 
 /// Keys of one task.
 const TASK_KEYS: usize = 16 * 1024;
@@ -24,13 +21,11 @@ impl CpuEngine {
     /// Evaluates some tracks, `[track][sample]`.
     pub(crate) fn evaluate_from_keys<'a>(
         &self,
-        set: &'a TrackSet,
-        tracks: Range<usize>,
-        interpolation: &'a Interpolation,
+        request: &'a Request<'a>,
         curve: KeyCurve,
-        timeline: &Timeline,
         output: &mut [Quat],
     ) -> Result<(), SetError> {
+        let (set, timeline) = (request.set, request.timeline);
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let size = BatchSize {
@@ -38,7 +33,7 @@ impl CpuEngine {
             tracks: TASK / timeline.len(),
             cut: in_order.then_some(TASK_KEYS),
         };
-        let new = || KeyEvaluator::new(interpolation, curve);
+        let new = || KeyEvaluator::new(request.interpolation, curve);
         let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
             let window = batch.samples(set, timeline, usize::MAX);
             let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
@@ -51,17 +46,15 @@ impl CpuEngine {
                 .zip(rows)
                 .try_for_each(|((index, own), output)| {
                     let row = Row {
-                        set,
+                        request,
                         index,
-                        interpolation,
-                        timeline,
                         first: window.start,
                         key: own.start,
                     };
                     self.resolve(row, output)
                 })
         };
-        let batches: Vec<Batch> = Batches::new(set, Batch::Tracks(tracks), size).collect();
+        let batches: Vec<Batch> = batches(set, Batch::Tracks(request.tracks.clone()), size);
         if let [batch] = &*batches {
             return task(&mut new(), batch, output);
         }

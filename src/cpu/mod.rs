@@ -3,7 +3,6 @@
 
 pub(crate) mod batches;
 pub(crate) mod clip;
-pub(crate) mod destination;
 pub(crate) mod engine;
 pub(crate) mod evaluate;
 pub(crate) mod fallback;
@@ -11,5 +10,6 @@ mod fill;
 pub(crate) mod from_keys;
 pub(crate) mod row;
 pub(crate) mod scratch;
+pub(crate) mod sink;
 pub(crate) mod sparse_times;
 pub(crate) mod streaming;

@@ -1,8 +1,9 @@
 //! The samples of one part of a track: its runs, evaluated as they are found.
 
-use crate::cpu::evaluate::{Affine, FEW, distances, frames, one};
+use glam::Vec4;
+
+use crate::cpu::evaluate::{FEW, distances, frames};
 use crate::cpu::streaming::{Output, Samples};
-use crate::math::canonical::round_f32;
 use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
@@ -94,10 +95,7 @@ impl<S: Evaluate> Row<'_, S> {
                 }
                 match source {
                     Source::Segment(index) => {
-                        let affine = Affine {
-                            scale: block.scale[j],
-                            offset: block.offset[j],
-                        };
+                        let affine = block.affine(j);
                         let segment = &self.segments[index as usize];
                         output.frames::<L, S>(segment, affine, distance, start, count);
                     }
@@ -108,11 +106,8 @@ impl<S: Evaluate> Row<'_, S> {
                     }
                     Source::Exact(index) => {
                         let parameter = block.parameter::<FrameClock>(j);
-                        let run = Run {
-                            sample: last - count,
-                            count,
-                            source: RunSource::Exact { index, parameter },
-                        };
+                        let source = RunSource::Exact { index, parameter };
+                        let run = Run::new(last - count, count, source);
                         self.exact(&run, &mut output.samples()[start..][..count]);
                         output.made(start..start + count);
                     }
@@ -121,9 +116,7 @@ impl<S: Evaluate> Row<'_, S> {
         }
         true
     }
-}
 
-impl<S: Evaluate> Row<'_, S> {
     /// Evaluates at most [`FEW`] samples, one by one.
     #[inline(never)]
     fn few(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
@@ -155,70 +148,13 @@ impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
 
     #[inline(always)]
     fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
-        let &Row { part, segments, .. } = self.row;
-        let mut from_middle = [0.0; CHUNK];
         for run in &self.runs {
-            let output = &mut output[run.sample - self.row.copy.samples.start..][..run.count];
-            match run.source {
-                RunSource::Constant(index) => output.fill(part.prepared.constants[index as usize]),
-                RunSource::Segment {
-                    index,
-                    distance,
-                    scale,
-                    offset,
-                } => {
-                    let segment = &segments[index as usize];
-                    let affine = Affine { scale, offset };
-                    if let Distance::Near { first } = distance {
-                        frames::<L, S>(segment, affine, first, run.count, output);
-                        continue;
-                    }
-                    for (chunk, output) in output.chunks_mut(CHUNK).enumerate() {
-                        let count = output.len();
-                        for (j, own) in from_middle[..count].iter_mut().enumerate() {
-                            *own = self.row.distance(distance, run, chunk * CHUNK + j);
-                        }
-                        distances::<L, S>(segment, affine, &from_middle, count, output);
-                    }
-                }
-                RunSource::Exact { .. } => self.row.exact(run, output),
-            }
+            self.row.evaluate_run::<L>(run, output);
         }
     }
 }
 
-impl<S> Row<'_, S> {
-    /// The distance of a run's `j`th sample from the middle of its segment, in frames or seconds.
-    #[inline(always)]
-    fn distance(&self, distance: Distance, run: &Run, j: usize) -> f32 {
-        match distance {
-            Distance::Near { first } => first + j as f32,
-            // An integer converts with one rounding, like the shader's sum of two exact
-            // halves.
-            Distance::Frames { first } => first.wrapping_add(j as i32) as f32,
-            Distance::Seconds { middle } => {
-                let track = self.part.part.track as usize;
-                round_f32(self.timeline.time(track, run.sample + j) - middle)
-            }
-        }
-    }
-
-    /// Evaluates a run in f64.
-    #[inline(never)]
-    fn exact(&self, run: &Run, output: &mut [[f32; 4]]) {
-        let RunSource::Exact { index, parameter } = run.source else {
-            return;
-        };
-        let PartRef { prepared, part } = self.part;
-        let samples = run.sample..run.sample + run.count;
-        for (sample, rotation) in samples.zip(output) {
-            let track = part.track as usize;
-            *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
-        }
-    }
-}
-
-/// Takes runs and evaluates their samples one by one; for few samples.
+/// Takes runs and evaluates them as they come; for few samples.
 struct OneByOne<'a, 'r, S> {
     row: &'a Row<'r, S>,
     output: &'a mut [[f32; 4]],
@@ -227,24 +163,49 @@ struct OneByOne<'a, 'r, S> {
 impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let &Row { part, segments, .. } = self.row;
-        let start = run.sample - self.row.copy.samples.start;
-        let output = &mut self.output[start..][..run.count];
+        self.row.evaluate_run::<Vec4>(&run, self.output);
+    }
+}
+
+impl<S: Evaluate> Row<'_, S> {
+    /// Evaluates a run; `output` starts at the first sample of the track copy.
+    #[inline(always)]
+    fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {
+        let PartRef { prepared, part } = self.part;
+        let output = &mut output[run.sample - self.copy.samples.start..][..run.count];
         match run.source {
-            RunSource::Constant(index) => output.fill(part.prepared.constants[index as usize]),
-            RunSource::Segment {
-                index,
-                distance,
-                scale,
-                offset,
-            } => {
-                let segment = &segments[index as usize];
-                for (j, rotation) in output.iter_mut().enumerate() {
-                    let distance = self.row.distance(distance, &run, j);
-                    *rotation = one(segment, Affine { scale, offset }, distance);
+            RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
+            RunSource::Segment(index, distance, affine) => {
+                let segment = &self.segments[index as usize];
+                if let Distance::Near { first } = distance {
+                    return frames::<L, S>(segment, affine, first, run.count, output);
+                }
+                let mut from_middle = [0.0; CHUNK];
+                for (chunk, output) in output.chunks_mut(CHUNK).enumerate() {
+                    let count = output.len();
+                    for (j, own) in (chunk * CHUNK..).zip(&mut from_middle[..count]) {
+                        let time = || self.timeline.time(part.track as usize, run.sample + j);
+                        *own = distance.of(j, time);
+                    }
+                    distances::<L, S>(segment, affine, &from_middle, count, output);
                 }
             }
-            RunSource::Exact { .. } => self.row.exact(&run, output),
+            RunSource::Exact { .. } => self.exact(run, output),
+        }
+    }
+}
+
+impl<S> Row<'_, S> {
+    /// Evaluates a run in f64.
+    #[inline(never)]
+    fn exact(&self, run: &Run, output: &mut [[f32; 4]]) {
+        let RunSource::Exact { index, parameter } = run.source else {
+            return;
+        };
+        let PartRef { prepared, part } = self.part;
+        for (sample, rotation) in (run.sample..).zip(output) {
+            let track = part.track as usize;
+            *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
         }
     }
 }

@@ -6,8 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
-use crate::time::frames::Timeline;
-use crate::tracks::set::TrackSet;
+use crate::prepare::request::Request;
 
 /// The scratch buffers of one thread, for one interpolation.
 pub(crate) struct Memory {
@@ -27,12 +26,8 @@ pub(crate) struct ScratchPool(Mutex<Vec<Memory>>);
 impl ScratchPool {
     /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
     /// only what the samples of this timeline need.
-    pub(crate) fn take(
-        &self,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
-        set: &TrackSet,
-    ) -> Memory {
+    pub(crate) fn take(&self, request: &Request<'_>) -> Memory {
+        let interpolation = request.interpolation;
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let suits = |memory: &Memory| memory.interpolation == *interpolation;
         let own = (kept.iter().rposition(suits)).map(|place| kept.remove(place));
@@ -42,7 +37,7 @@ impl ScratchPool {
             prepared: Prepared::new(interpolation),
             preparation: Preparation::new(interpolation),
         });
-        memory.preparation.only_for(timeline, set);
+        memory.preparation.only_for(request.timeline, request.set);
         memory
     }
 
@@ -76,7 +71,11 @@ mod tests {
             .unwrap();
         let timeline = clip.timeline(&Frames::fps(60)).unwrap();
         let scratch_pool = ScratchPool::default();
-        let take = |own| scratch_pool.take(&Interpolation::from(own), &timeline, &set);
+        let from = |pool: &ScratchPool, own| {
+            let interpolation = Interpolation::from(own);
+            pool.take(&Request::whole(&set, &interpolation, &timeline))
+        };
+        let take = |own| from(&scratch_pool, own);
         let kept = || scratch_pool.0.lock().unwrap().len();
         for own in [method::SLERP, method::BESSEL_OVERHAUSER] {
             scratch_pool.give_back(take(own));
@@ -86,11 +85,7 @@ mod tests {
         assert_eq!(kept(), 1);
         scratch_pool.give_back(first);
         for _ in 0..9 * rayon::current_num_threads() {
-            scratch_pool.give_back(ScratchPool::default().take(
-                &method::SLERP.into(),
-                &timeline,
-                &set,
-            ));
+            scratch_pool.give_back(from(&ScratchPool::default(), method::SLERP));
         }
         assert_eq!(kept(), KEPT_EACH * rayon::current_num_threads());
     }

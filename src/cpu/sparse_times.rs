@@ -1,15 +1,14 @@
 //! Sparse times: a few explicit times of each of many tracks, such as the poses of a crowd. Each
 //! lane evaluates one sample, and no runs are listed.
 
-use crate::cpu::evaluate::{Affine, one};
+use crate::cpu::evaluate::one;
 use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PartRef};
-use crate::shader::Form;
-use crate::shader::{ArcSegment, PolynomialSegment};
+use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
-use crate::time::runs::{Distance, RunSource};
+use crate::time::runs::{Affine, Distance, RunSource};
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Samples that are evaluated together.
@@ -119,12 +118,9 @@ impl<'a> PartRef<'a> {
             RunSource::Constant(index) => {
                 return Some(One::Constant(prepared.constants[index as usize]));
             }
-            RunSource::Segment {
-                index,
-                distance: Distance::Seconds { middle },
-                scale,
-                offset,
-            } => (index as usize, middle, Affine { scale, offset }),
+            RunSource::Segment(index, Distance::Seconds { middle }, affine) => {
+                (index as usize, middle, affine)
+            }
             _ => return None,
         };
         let distance = round_f32(time - middle);

@@ -4,11 +4,12 @@
 
 use std::ops::Range;
 
-use crate::cpu::destination::Places;
-use crate::cpu::evaluate::{Affine, FEW, frames, frames_past_caches};
+use crate::cpu::evaluate::{FEW, frames, frames_past_caches};
+use crate::cpu::sink::Places;
 use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
+use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
 /// Bytes from which on a result is written by streaming stores: caches would keep so little of it
@@ -67,22 +68,15 @@ impl<'o> Stage<'o> {
     fn with(width: VectorWidth, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
         // Where a rotation may lie across two cache lines, rows are written directly.
         let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
-        if !is_staged || !is_aligned {
-            let place = Place {
-                before: output,
-                lines: &mut [],
-                after: &mut [],
-                stored: 0,
-            };
-            return Self {
-                width,
-                place,
-                lines: None,
-                filled: 0,
-            };
-        }
-        let (before, lines, after) = bytemuck::pod_align_to_mut(output);
-        let filled = before.len().wrapping_neg() % EACH;
+        let is_staged = is_staged && is_aligned;
+        let (before, lines, after) = match is_staged {
+            true => bytemuck::pod_align_to_mut(output),
+            false => (output, &mut [][..], &mut [][..]),
+        };
+        let filled = match is_staged {
+            true => before.len().wrapping_neg() % EACH,
+            false => 0,
+        };
         let place = Place {
             before,
             lines,
@@ -92,7 +86,7 @@ impl<'o> Stage<'o> {
         Self {
             width,
             place,
-            lines: Some(bytemuck::zeroed_box()),
+            lines: is_staged.then(bytemuck::zeroed_box),
             filled,
         }
     }
@@ -114,17 +108,17 @@ impl<'o> Stage<'o> {
                 self.place.before = others;
                 return make(0..count, &mut Output::Here(row));
             };
-            let piece = (count - first).min(EACH * LINES - self.filled);
+            let some = (count - first).min(EACH * LINES - self.filled);
             let mut output = Output::Staged(Staged {
                 lines: &mut lines[..],
                 start: self.filled,
-                end: self.filled + piece,
+                end: self.filled + some,
                 made: self.filled,
                 place: &mut self.place,
             });
-            make(first..first + piece, &mut output)?;
-            self.filled += piece;
-            first += piece;
+            make(first..first + some, &mut output)?;
+            self.filled += some;
+            first += some;
         }
         Ok(())
     }

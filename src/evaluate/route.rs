@@ -6,10 +6,9 @@ use std::fmt;
 use crate::curve::options::Speed;
 use crate::evaluate::backend::Backend;
 use crate::from_keys::KeyCurve;
-use crate::method::interpolation::Interpolation;
 use crate::output::rotations::Layout;
-use crate::time::frames::{Ticks, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::prepare::request::Request;
+use crate::time::frames::Ticks;
 
 /// The average number of keys of a track up to which batches serve a set whose tracks must not be
 /// cut: with longer tracks, too few threads would have work.
@@ -35,13 +34,9 @@ pub(crate) enum Route {
 }
 
 impl Backend {
-    pub(crate) fn route(
-        &self,
-        set: &TrackSet,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
-        layout: Layout,
-    ) -> Route {
+    pub(crate) fn route(&self, request: &Request<'_>, layout: Layout) -> Route {
+        let (set, timeline) = (request.set, request.timeline);
+        let interpolation = request.interpolation;
         let in_rows = layout.of(timeline.len()) == Layout::TrackMajor;
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let are_held = interpolation.wrap().are_held();

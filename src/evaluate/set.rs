@@ -1,7 +1,6 @@
 //! Evaluates a set by its route.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 
 use glam::Quat;
 use rayon::prelude::*;
@@ -12,20 +11,19 @@ use crate::curve::segment::segment_size;
 use crate::evaluate::backend::Backend;
 use crate::evaluate::route::Route;
 use crate::evaluate::uploaded::Uploaded;
-use crate::from_keys::pieces::KeyJob;
+use crate::from_keys::dispatches::KeyJob;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::recovery::Opened;
-use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
+use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
-use crate::time::frames::{FramesError, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::time::frames::FramesError;
 
 /// Bytes of segments that a Vulkan device gets at once where a set has far more keys than samples.
 const DENSE_BYTES: usize = 64 << 20;
@@ -37,66 +35,46 @@ impl Backend {
     /// Evaluates a set; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
         &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        timeline: &Timeline,
+        request: &Request<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let tracks = 0..set.track_count();
-        let route = self.route(set, &interpolation, timeline, layout);
-        if let Route::Clips { cuts_tracks } = route
-            && self
-                .clips(set, tracks.clone(), &interpolation, timeline, cuts_tracks)
-                .len()
-                == 1
+        if let Route::Clips { cuts_tracks } = self.route(request, layout)
+            && self.clips(request, cuts_tracks).len() == 1
         {
             let wanted = Wanted {
-                only_for: Some(timeline),
-                ..Wanted::all(set)
+                only_for: Some(request.timeline),
+                ..Wanted::all(request.set)
             };
-            let clip = Uploaded::new(self, set, interpolation, wanted, None)?;
-            return clip.evaluate(self, timeline, layout);
+            let clip = Uploaded::new(self, request.set, *request.interpolation, wanted, None)?;
+            return clip.evaluate(self, request.timeline, layout);
         }
-        let mut quats = OutputBuffer::new(tracks.len() * timeline.len());
-        self.evaluate_tracks(set, tracks, interpolation, timeline, layout, &mut quats)?;
+        let mut quats = OutputBuffer::new(request.tracks.len() * request.timeline.len());
+        self.evaluate_tracks(request, layout, &mut quats)?;
         Ok(Box::new(quats))
     }
 
-    /// Evaluates some tracks into `output`, which is exactly as long as the result. The timeline
-    /// is that of the whole set.
+    /// Evaluates into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_tracks(
         &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: Interpolation,
-        timeline: &Timeline,
+        request: &Request<'_>,
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
-        let route = self.route(set, &interpolation, timeline, layout);
-        match (route, self) {
+        match (self.route(request, layout), self) {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
-                engine.evaluate_from_keys(set, tracks, &interpolation, curve, timeline, output)?;
-                Ok(())
+                Ok(engine.evaluate_from_keys(request, curve, output)?)
             }
             (Route::FromKeys(curve), Self::Vulkan(opened)) => {
-                let job = KeyJob {
-                    set,
-                    tracks,
-                    interpolation: &interpolation,
-                    timeline,
-                    curve,
-                };
+                let job = KeyJob { request, curve };
                 opened.evaluate_from_keys(&job, bytemuck::cast_slice_mut(output))
             }
-            (Route::Batches { cuts_tracks: cut }, Self::Cpu(engine)) => {
-                engine.evaluate_batches(set, tracks, &interpolation, timeline, cut, output)?;
-                Ok(())
+            (Route::Batches { cuts_tracks }, Self::Cpu(engine)) => {
+                Ok(engine.evaluate_batches(request, cuts_tracks, output)?)
             }
             (Route::Batches { cuts_tracks } | Route::Clips { cuts_tracks }, _) => {
-                let clips = self.clips(set, tracks.clone(), &interpolation, timeline, cuts_tracks);
-                let layout = layout.of(timeline.len());
-                self.evaluate_clips(set, tracks, interpolation, timeline, layout, clips, output)
+                let clips = self.clips(request, cuts_tracks);
+                let layout = layout.of(request.timeline.len());
+                self.evaluate_clips(request, layout, clips, output)
             }
         }
     }
@@ -104,19 +82,13 @@ impl Backend {
     /// Cuts tracks into batches whose segments fit the device's memory budget. Where keys are far
     /// more than samples a batch has at most 64 MiB, and each uses the buffers of the one before:
     /// fresh memory for all segments would cost more than preparing them.
-    fn clips(
-        &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
-        cuts_tracks: bool,
-    ) -> VecDeque<Batch> {
-        let whole = Batch::Tracks(tracks);
+    fn clips(&self, request: &Request<'_>, cuts_tracks: bool) -> VecDeque<Batch> {
+        let (set, timeline) = (request.set, request.timeline);
+        let whole = Batch::Tracks(request.tracks.clone());
         let Self::Vulkan(opened) = self else {
             return [whole].into();
         };
-        let key_bytes = segment_size(interpolation.form()) + size_of::<Quat>();
+        let key_bytes = segment_size(request.interpolation.form()) + size_of::<Quat>();
         let result = set.track_count() * timeline.len() * size_of::<Quat>();
         let is_dense = (set.key_count() * key_bytes) / 4 > result;
         let budget = opened.engine().clip_bytes().unwrap_or(usize::MAX);
@@ -128,9 +100,9 @@ impl Backend {
         let size = BatchSize {
             keys,
             tracks: usize::MAX,
-            cut: cuts_tracks.then_some((keys / PART).max(1) * PART),
+            cut: cuts_tracks.then_some((keys / PART_INTERVALS).max(1) * PART_INTERVALS),
         };
-        let batches: VecDeque<Batch> = Batches::new(set, whole.clone(), size).collect();
+        let batches = VecDeque::from(batches(set, whole.clone(), size));
         match batches.is_empty() {
             true => [whole].into(),
             false => batches,
@@ -138,17 +110,15 @@ impl Backend {
     }
 
     /// Prepares and evaluates one batch after another.
-    #[allow(clippy::too_many_arguments)]
     fn evaluate_clips(
         &self,
-        set: &TrackSet,
-        tracks: Range<usize>,
-        interpolation: Interpolation,
-        timeline: &Timeline,
+        request: &Request<'_>,
         layout: Layout,
         mut clips: VecDeque<Batch>,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
+        let (set, tracks, timeline) = (request.set, &request.tracks, request.timeline);
+        let interpolation = *request.interpolation;
         let is_whole = clips.len() == 1;
         // A clip uses the memory of the one before: fresh memory costs more than the work in it.
         let mut used: Option<Uploaded> = None;
@@ -177,7 +147,7 @@ impl Backend {
             };
             let folded = clip.data.folded(&timeline);
             let window = Window {
-                samples: batch.samples(set, &timeline, PART),
+                samples: batch.samples(set, &timeline, PART_INTERVALS),
                 ..Window::whole(own.len(), timeline.len(), layout)
             };
             let evaluate = |output: &mut [Quat]| {
@@ -216,16 +186,15 @@ impl Opened {
             return Ok(());
         }
         let engine = CpuEngine::on_shared_threads(VectorWidth::widest());
-        let rows = output.par_chunks_mut(job.timeline.len());
-        rows.zip(job.tracks.clone())
+        let rows = output.par_chunks_mut(job.request.timeline.len());
+        rows.zip(job.request.tracks.clone())
             .try_for_each(|(output, index)| {
+                let (request, first, key) = (job.request, 0, 0);
                 let row = Row {
-                    set: job.set,
+                    request,
                     index,
-                    interpolation: job.interpolation,
-                    timeline: job.timeline,
-                    first: 0,
-                    key: 0,
+                    first,
+                    key,
                 };
                 engine.resolve(row, output)
             })?;

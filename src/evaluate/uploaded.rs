@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::Quat;
 
 use crate::evaluate::backend::Backend;
-use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
@@ -118,12 +118,7 @@ impl Uploaded {
             }
             Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
                 let buffers = self.buffers_on(engine)?;
-                let job = Job {
-                    clip: &self.data,
-                    buffers: &buffers,
-                    timeline,
-                    encoding,
-                };
+                let job = Job::new(&self.data, &buffers, timeline, encoding);
                 engine.evaluate_into(job, window, output)
             }),
         }
@@ -134,7 +129,7 @@ impl Uploaded {
         &self,
         engine: &VulkanEngine,
     ) -> Result<Arc<ClipBuffers>, VulkanError> {
-        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buffers = lock(&self.buffers);
         if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
             return Ok(Arc::clone(there));
         }

@@ -6,9 +6,9 @@
 
 use crate::fit::arc_lanes::{LANES, arcs};
 use crate::math::canonical::canonical;
-use crate::shader::PolynomialSegment;
 use crate::shader::{
-    SERIES_2, SERIES_3, SERIES_4, SERIES_5, SERIES_6, SERIES_7, SERIES_8, SERIES_9, SERIES_10,
+    PolynomialSegment, SERIES_2, SERIES_3, SERIES_4, SERIES_5, SERIES_6, SERIES_7, SERIES_8,
+    SERIES_9, SERIES_10,
 };
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;

@@ -3,7 +3,6 @@
 //! tracks.
 
 pub(crate) mod arc_lanes;
-pub(crate) mod both_sides;
 pub(crate) mod constant_velocity;
 pub(crate) mod double;
 pub(crate) mod motion;

@@ -131,13 +131,11 @@ pub(crate) fn tail<L: Lanes, const PAIRS: usize>(
 
 #[cfg(test)]
 mod tests {
-    use std::array;
     use std::f64::consts::FRAC_PI_2;
 
     use glam::Vec4;
 
     use super::*;
-    use crate::fit::both_sides::Sides;
 
     /// Catches a wrong node or quotient, powers in another order, and a tail that takes one
     /// Chebyshev coefficient for another.
@@ -191,10 +189,6 @@ mod tests {
                     [1.0, 2.0, 3.0, 4.0].map(|times| Vec4::splat((times * value) as f32))
                 };
                 let (before, after) = (of_components(value(-s)), of_components(value(s)));
-                let sides = array::from_fn(|c| Sides {
-                    before: before[c],
-                    after: after[c],
-                });
                 if s == 0.0 {
                     let (n, angle) = (n as f64, n as f64 * FRAC_PI_2);
                     let derivative = 2.0 * n * libm::sin(angle);
@@ -203,9 +197,9 @@ mod tests {
                     let halves = of_components(0.5 * second);
                     samples.set_middle(of_components(derivative), halves);
                 } else if comes_again {
-                    samples.set_slopes(sides);
+                    samples.set_slopes(before, after);
                 } else {
-                    samples.set_differences(k, sides);
+                    samples.set_differences(k, before, after);
                 }
             }
             for c in 0..4 {

@@ -3,8 +3,7 @@
 //! in f64.
 
 use crate::curve::options::Ends;
-use crate::shader::TangentWeights;
-use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN};
+use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 

@@ -3,13 +3,10 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes;
-use crate::fit::arc_lanes::{LANES as ARC_LANES, whole};
+use crate::fit::arc_lanes::{self, LANES as ARC_LANES, whole};
 use crate::fit::constant_velocity::arc_component;
 use crate::math::canonical::canonical;
-use crate::shader::Form;
-use crate::shader::IS_KEY;
-use crate::shader::KeySample;
+use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{self, Lanes, Number};
 use crate::twin::arc_between::arc_between;

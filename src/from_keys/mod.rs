@@ -3,8 +3,8 @@
 
 pub(crate) mod arcs;
 pub(crate) mod cubics;
+pub(crate) mod dispatches;
 pub(crate) mod evaluate;
-pub(crate) mod pieces;
 pub(crate) mod upload;
 
 use crate::curve::options::Path;

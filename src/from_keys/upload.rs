@@ -1,4 +1,4 @@
-//! What a kernel reads of a piece: keys with their signs, the places of the samples among them,
+//! What a kernel reads of a dispatch: keys with their signs, the places of the samples among them,
 //! and tangent weights.
 
 use std::ops::Range;
@@ -7,9 +7,8 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
-use crate::from_keys::pieces::{KeyJob, KeyPiece, Part, What};
-use crate::shader::{IS_KEY, SIGN_TURNED};
-use crate::shader::{KeySample, RowShape, TangentWeights};
+use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, What};
+use crate::shader::{IS_KEY, KeySample, RowShape, SIGN_TURNED, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
@@ -19,7 +18,7 @@ use crate::time::times::{TimeLanes, key_before};
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 
-impl KeyPiece<'_, '_> {
+impl KeyDispatch<'_, '_> {
     pub(crate) fn rows(&self) -> RowShape {
         RowShape {
             samples: self.samples as u32,
@@ -51,8 +50,8 @@ impl KeyPiece<'_, '_> {
     pub(crate) fn keys_are_as_given(&self) -> bool {
         self.tasks.iter().all(|task| {
             let signs = match &task.what {
-                What::Tracks(tracks) => self.job.set.signs_of(tracks.clone()),
-                What::Part(part) => part.keys.signs,
+                What::Tracks(tracks) => self.job.request.set.signs_of(tracks.clone()),
+                What::Window(window) => window.keys.signs,
             };
             !signs.any()
         })
@@ -92,7 +91,7 @@ impl KeyPiece<'_, '_> {
             places.push((task, written));
             first_key += task.keys;
         }
-        let ends = self.job.interpolation.ends;
+        let ends = self.job.request.interpolation.ends;
         let rule = self.job.weights();
         let new = || Known {
             frames: FramePlan::new(),
@@ -102,17 +101,17 @@ impl KeyPiece<'_, '_> {
             .into_par_iter()
             .try_for_each_init(new, |known, (task, mut written)| {
                 let tracks = match &task.what {
-                    What::Part(part) => return self.write_part(part, known, &mut written),
+                    What::Window(window) => return self.write_window(window, known, &mut written),
                     What::Tracks(tracks) => tracks.clone(),
                 };
-                if let Ticks::Times { times, stride } = &self.job.timeline.ticks {
+                if let Ticks::Times { times, stride } = &self.job.request.timeline.ticks {
                     let mut of_tracks = TimesOfTracks {
-                        set: self.job.set,
+                        set: self.job.request.set,
                         tracks: tracks.clone(),
                         times,
                         stride: *stride,
-                        each: self.job.timeline.len(),
-                        first_key: written.place_of(self.job.set, tracks.start, 0),
+                        each: self.job.request.timeline.len(),
+                        first_key: written.place_of(self.job.request.set, tracks.start, 0),
                         samples: std::mem::take(&mut written.samples),
                     };
                     in_lanes(&mut of_tracks);
@@ -121,23 +120,27 @@ impl KeyPiece<'_, '_> {
                     }
                 }
                 tracks.into_iter().try_for_each(|index| {
-                    self.write_part(&self.job.track(index), known, &mut written)
+                    self.write_window(&self.job.track(index), known, &mut written)
                 })
             })
     }
 
-    fn write_part<'p>(
+    fn write_window<'p>(
         &self,
-        part: &Part<'p>,
+        window: &KeyWindow<'p>,
         known: &mut Known<'p>,
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
-        let keys: &[[u32; 4]] = bytemuck::cast_slice(part.keys.keys);
-        let first_key = written.place_of(self.job.set, part.keys.index, part.keys.first_key);
+        let keys: &[[u32; 4]] = bytemuck::cast_slice(window.keys.keys);
+        let first_key = written.place_of(
+            self.job.request.set,
+            window.keys.index,
+            window.keys.first_key,
+        );
         if written.imported.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
             own.copy_from_slice(keys);
-            let signs = part.keys.signs;
+            let signs = window.keys.signs;
             if signs.any() {
                 for (i, key) in own.iter_mut().enumerate() {
                     key[0] |= if signs.is_turned(i) { SIGN_TURNED } else { 0 };
@@ -147,41 +150,36 @@ impl KeyPiece<'_, '_> {
         }
         if !written.samples.is_empty() {
             let all = std::mem::take(&mut written.samples);
-            let (own, others) = all.split_at_mut(part.window.len());
-            self.write_frames(part, first_key as u32, own, known)?;
+            let (own, others) = all.split_at_mut(window.samples.len());
+            self.write_frames(window, first_key as u32, own, known)?;
             written.samples = others;
         }
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
             let all = std::mem::take(&mut written.weights);
             let (own, others) = all.split_at_mut(keys.len());
-            let TrackKeys {
-                times,
-                first_key,
-                all,
-                ..
-            } = part.keys;
-            own.copy_from_slice(weights.of(times, first_key, all));
+            let TrackKeys { times, all, .. } = window.keys;
+            own.copy_from_slice(weights.of(times, window.keys.first_key, all));
             written.weights = others;
         }
         written.next_key += keys.len();
         Ok(())
     }
 
-    /// Writes the places of a part's samples if these are frames.
+    /// Writes the places of a window's samples if these are frames.
     fn write_frames<'p>(
         &self,
-        part: &Part<'p>,
+        window: &KeyWindow<'p>,
         first_key: u32,
         samples: &mut [KeySample],
         known: &mut Known<'p>,
     ) -> Result<(), FramesError> {
-        let KeyJob { set, timeline, .. } = self.job;
+        let (set, timeline) = (self.job.request.set, self.job.request.timeline);
         let Ticks::Frames { rate, start } = timeline.ticks else {
             return Ok(());
         };
-        let all = set.times_and_keys(part.keys.index).0;
+        let all = set.times_and_keys(window.keys.index).0;
         let clock = FrameClock::new(rate, start, all[all.len() - 1]);
-        let found = known.frames.samples(part.keys, clock, &part.window)?;
+        let found = known.frames.samples(window.keys, clock, &window.samples)?;
         for (sample, found) in samples.iter_mut().zip(found) {
             *sample = KeySample {
                 key: found.key + first_key,
@@ -249,9 +247,9 @@ impl TimeLanes {
     }
 }
 
-/// Where a kernel reads the keys of a piece.
+/// Where a kernel reads the keys of a dispatch.
 pub(crate) enum Keys<'w> {
-    /// In a buffer of the piece: here they are written, with their signs.
+    /// In a buffer of the dispatch: here they are written, with their signs.
     Copied(&'w mut [[u32; 4]]),
     /// In imported memory, as they are stored: the set's first key has this place there. No key is
     /// turned.
@@ -270,7 +268,7 @@ struct Written<'w> {
     keys: &'w mut [[u32; 4]],
     samples: &'w mut [KeySample],
     weights: &'w mut [TangentWeights],
-    /// The place of the next key among the piece's.
+    /// The place of the next key among the dispatch's.
     next_key: usize,
     /// The place of the set's first key in imported memory, where keys are read from there.
     imported: Option<usize>,

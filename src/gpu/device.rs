@@ -2,12 +2,13 @@
 
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
 use crate::gpu::buffer::may_be_imported;
+use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::options::Reads;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
@@ -99,7 +100,7 @@ impl LogicalDevice {
 
     /// The queue; Vulkan wants one user at a time.
     pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.queue)
     }
 
     /// Gives an object the name that validation and debuggers show.

@@ -1,7 +1,7 @@
 //! Evaluation on a Vulkan device.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
@@ -54,6 +54,11 @@ pub(crate) struct VulkanEngine {
     pub(crate) timings: Mutex<Timings>,
 }
 
+/// Locks what a thread that panicked cannot have left half changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
     device: Arc<LogicalDevice>,
@@ -74,7 +79,21 @@ pub(crate) struct Job<'a> {
     pub(crate) encoding: Encoding,
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    pub(crate) fn new(
+        clip: &'a ClipData,
+        buffers: &'a ClipBuffers,
+        timeline: &'a Timeline,
+        encoding: Encoding,
+    ) -> Self {
+        Self {
+            clip,
+            buffers,
+            timeline,
+            encoding,
+        }
+    }
+
     /// All of the result.
     fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
@@ -131,41 +150,15 @@ impl VulkanEngine {
         })
     }
 
-    pub(crate) fn device(&self) -> &Arc<LogicalDevice> {
-        &self.device
-    }
-
     /// The pipeline of a kernel, made when it is first needed.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
-        let mut all = (self.pipelines.lock()).unwrap_or_else(PoisonError::into_inner);
+        let mut all = lock(&self.pipelines);
         let kept = &mut all[kernel as usize];
         if let Some(pipeline) = kept {
             return Ok(Arc::clone(pipeline));
         }
         let pipeline = Pipeline::new(&self.device, kernel, Exactness::Demanded)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
-    }
-
-    /// Name, kind and limits of the device.
-    pub(crate) fn info(&self) -> &crate::gpu::physical::DeviceInfo {
-        &self.device.physical.info
-    }
-
-    /// Runs the self-test.
-    pub(crate) fn self_tests(
-        &self,
-    ) -> Result<Vec<crate::gpu::self_test::SelfTestReport>, VulkanError> {
-        crate::gpu::self_test::run(self)
-    }
-
-    /// Where the time went since the last call of this function.
-    pub(crate) fn take_timings(&self) -> Timings {
-        std::mem::take(&mut *self.timings.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    /// What the validation layer has said so far.
-    pub(crate) fn validation_messages(&self) -> Vec<String> {
-        self.device.physical.instance.validation_messages()
     }
 
     /// Bytes of segments that go into one buffer.
@@ -248,13 +241,9 @@ impl VulkanEngine {
 
     /// Frees the buffers that are kept for the next evaluation; false when there are none.
     pub(crate) fn give_back(&self) -> bool {
-        let mut in_flight = self
-            .in_flight
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let mut keys_in_flight =
-            (self.keys_in_flight.lock()).unwrap_or_else(PoisonError::into_inner);
-        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = lock(&self.in_flight);
+        let mut keys_in_flight = lock(&self.keys_in_flight);
+        let mut free = lock(&self.free);
         let kept = in_flight.len() + keys_in_flight.len() + free.len();
         in_flight.clear();
         keys_in_flight.clear();
@@ -298,27 +287,22 @@ impl VulkanEngine {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let job = Job {
-            clip,
-            buffers,
-            timeline,
-            encoding: Encoding::F32,
-        };
+        let job = Job::new(clip, buffers, timeline, Encoding::F32);
         let whole = job.whole(layout);
         let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
-        if !self.in_place || bytes > self.device.physical.info.max_memory_allocation_size {
+        let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
+        let buffer = match self.in_place && fits {
+            true => match self.output_buffer(bytes) {
+                // Window by window the result may still be made.
+                Err(error) if error.is_out_of_memory() => None,
+                buffer => Some(buffer?),
+            },
+            false => None,
+        };
+        let Some(mut buffer) = buffer else {
             let mut quats = OutputBuffer::new(whole.len());
             self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
-        }
-        let mut buffer = match self.output_buffer(bytes) {
-            // Window by window the result may still be made.
-            Err(error) if error.is_out_of_memory() => {
-                let mut quats = OutputBuffer::new(whole.len());
-                self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
-                return Ok(Box::new(quats));
-            }
-            buffer => buffer?,
         };
         self.run(job, &whole, Target::Buffer(&mut buffer))?;
         Ok(Box::new(MappedQuats::new(buffer, whole.len(), &self.free)))
@@ -354,7 +338,7 @@ impl VulkanEngine {
 
     /// A buffer that was given back, when one fits closely, else a new one.
     fn output_buffer(&self, bytes: u64) -> Result<Buffer, VulkanError> {
-        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut free = lock(&self.free);
         let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size());
         if let Some(i) = free.iter().position(fits) {
             return Ok(free.swap_remove(i));

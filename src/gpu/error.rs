@@ -70,7 +70,7 @@ pub enum VulkanError {
     },
     /// The range of a buffer that was given for a result does not fit it.
     #[error(
-        "the buffer's stretch of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
+        "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
     )]
     OwnBuffer {
         /// Where the range starts, bytes.

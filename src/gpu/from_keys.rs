@@ -1,28 +1,27 @@
-//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two pieces are
+//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two dispatches are
 //! in flight: the host writes the keys of one while the device works on the other.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use glam::Quat;
 
 use crate::from_keys::KeyCurve;
-use crate::from_keys::pieces::{KeyJob, KeyPiece};
+use crate::from_keys::dispatches::{KeyDispatch, KeyJob};
 use crate::from_keys::upload::Keys;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{IN_FLIGHT, VulkanEngine};
+use crate::gpu::engine::{IN_FLIGHT, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{InFlight, Stopwatch, Target, copy};
+use crate::gpu::in_flight::{Flight, Stopwatch, Target, copy, grow};
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::Kernel;
-use crate::shader::{FROM_KEYS_WORKGROUP, ROWS_PER_INVOCATION};
+use crate::shader::{FROM_KEYS_WORKGROUP, Kernel, ROWS_PER_INVOCATION};
 
-/// What one piece in flight needs. The submission is the first field: dropped first, it waits for
+/// What one dispatch in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.
 pub(crate) struct KeysInFlight {
     submission: Submission,
@@ -30,7 +29,7 @@ pub(crate) struct KeysInFlight {
     samples: Option<Buffer>,
     rotations: Option<Buffer>,
     weights: Option<Buffer>,
-    /// The bytes of the result that the piece in flight makes.
+    /// The bytes of the result that the dispatch in flight makes.
     output: Range<usize>,
     /// As [`InFlight::compiled`].
     compiled: bool,
@@ -43,18 +42,6 @@ struct Borrowed<'a> {
     target: Target<'a>,
 }
 
-impl Borrowed<'_> {
-    /// See [`ImportedMemory::has_come_back`].
-    fn has_come_back(&mut self) {
-        if let Some(keys) = &mut self.keys {
-            keys.has_come_back();
-        }
-        if let Target::ImportedMemory(output) = &mut self.target {
-            output.has_come_back();
-        }
-    }
-}
-
 impl VulkanEngine {
     /// Evaluates a job into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_keys(
@@ -62,21 +49,14 @@ impl VulkanEngine {
         job: &KeyJob<'_>,
         output: &mut [[f32; 4]],
     ) -> Result<(), EvaluateError> {
-        let mut in_flight = self
-            .keys_in_flight
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = lock(&self.keys_in_flight);
         while in_flight.len() < IN_FLIGHT {
             in_flight.push(KeysInFlight::new(&self.device)?);
         }
         let each = size_of::<Quat>();
-        // A piece's result may begin at any rotation, and a binding must be able to as well.
-        let alignment = self
-            .device
-            .physical
-            .info
-            .min_storage_buffer_offset_alignment;
-        let lends = self.lends && alignment <= each as u64;
+        // A dispatch's result may begin at any rotation, and a binding must be able to as well.
+        let info = &self.device.physical.info;
+        let lends = self.lends && info.min_storage_buffer_offset_alignment <= each as u64;
         let output = bytemuck::cast_slice_mut(output);
         let mut imported = Borrowed {
             keys: (job.keys().filter(|_| lends && self.device.reads_texels))
@@ -90,33 +70,27 @@ impl VulkanEngine {
         };
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
-        let mut result = self.submit_pieces(
+        let mut result = self.submit_dispatches(
             job,
             &mut in_flight,
             &mut next,
             &mut imported,
             &mut stopwatch,
         );
-        // Also after an error: work that was submitted uses the slots' buffers.
-        for i in 1..=IN_FLIGHT {
-            let finished =
-                in_flight[(next + i) % IN_FLIGHT].finish(&mut imported.target, &mut stopwatch);
-            result = result.and(finished.map_err(EvaluateError::from));
+        result = self.land(
+            &mut in_flight,
+            next,
+            &mut imported.target,
+            stopwatch,
+            result,
+        );
+        if let (Some(keys), Ok(())) = (&mut imported.keys, &result) {
+            keys.has_come_back();
         }
-        if result.is_ok() {
-            imported.has_come_back();
-        }
-        if stopwatch.is_slow() {
-            self.halve_windows(); // those of the next call
-        }
-        if result.is_err() {
-            in_flight.clear(); // a fence or a recording may be half way
-        }
-        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
         result
     }
 
-    fn submit_pieces(
+    fn submit_dispatches(
         &self,
         job: &KeyJob<'_>,
         in_flight: &mut [KeysInFlight],
@@ -130,21 +104,21 @@ impl VulkanEngine {
             KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
         };
         let pipeline = self.pipeline(kernel)?;
-        let mut pieces = job.pieces();
+        let mut dispatches = job.dispatches();
         let mut start = 0;
         loop {
             if stopwatch.is_slow() {
                 self.halve_windows();
             }
-            let Some(piece) = pieces.next(self.window())? else {
+            let Some(dispatch) = dispatches.next(self.window())? else {
                 return Ok(());
             };
             *next = (*next + 1) % IN_FLIGHT;
             let evaluation = &mut in_flight[*next];
             evaluation.finish(&mut imported.target, stopwatch)?;
             let writing = Instant::now();
-            let own = start..start + piece.rotation_count() * size_of::<Quat>();
-            evaluation.start(&self.device, &pipeline, &piece, imported, own.clone())?;
+            let own = start..start + dispatch.rotation_count() * size_of::<Quat>();
+            evaluation.start(&self.device, &pipeline, &dispatch, imported, own.clone())?;
             stopwatch.timings.work_lists += writing.elapsed();
             start = own.end;
         }
@@ -164,53 +138,44 @@ impl KeysInFlight {
         })
     }
 
-    /// Submits one piece; `output` are the bytes of the whole result that it makes.
+    /// Submits one dispatch; `output` are the bytes of the whole result that it makes.
     fn start(
         &mut self,
         device: &Arc<LogicalDevice>,
         pipeline: &Pipeline,
-        piece: &KeyPiece<'_, '_>,
+        dispatch: &KeyDispatch<'_, '_>,
         imported: &Borrowed<'_>,
         output: Range<usize>,
     ) -> Result<(), EvaluateError> {
-        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = piece.bytes();
+        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = dispatch.bytes();
         let place = match &imported.target {
             Target::ImportedMemory(memory) if !output.is_empty() => {
                 rotation_bytes = 0;
                 let start = memory.start() + output.start;
                 let size = output.len() as u64;
-                Some(Binding::stretch(memory.raw(), start as u64, size))
+                Some(Binding::range(memory.raw(), start as u64, size))
             }
             _ => None,
         };
-        let room = |buffer: &mut Option<Buffer>, bytes: usize, residence| {
-            InFlight::grow(device, buffer, bytes as u64, residence)
-        };
-        room(&mut self.samples, sample_bytes, Residence::Upload)?;
-        room(&mut self.rotations, rotation_bytes, Residence::Readback)?;
-        room(&mut self.weights, weight_bytes.max(1), Residence::Upload)?;
-        let (Some(samples), Some(rotations), Some(weights)) =
-            (&mut self.samples, &self.rotations, &mut self.weights)
-        else {
-            unreachable!("grown above");
-        };
+        let upload = Residence::Upload;
+        let samples = grow(device, &mut self.samples, sample_bytes as u64, upload)?;
+        let weights = grow(device, &mut self.weights, weight_bytes as u64, upload)?;
+        let own = &mut self.rotations;
+        let rotations = grow(device, own, rotation_bytes as u64, Residence::Readback)?;
         let mut write = |keys: Keys<'_>| {
-            piece.write(
+            dispatch.write(
                 keys,
                 bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
                 bytemuck::cast_slice_mut(weights.bytes_mut(0..weight_bytes)),
             )
         };
         let keys = match &imported.keys {
-            Some(keys) if piece.keys_are_as_given() => {
+            Some(keys) if dispatch.keys_are_as_given() => {
                 write(Keys::ImportedMemory(keys.start() / size_of::<Quat>()))?;
                 keys.binding()
             }
             _ => {
-                room(&mut self.keys, key_bytes, Residence::Upload)?;
-                let Some(keys) = &mut self.keys else {
-                    unreachable!("grown above");
-                };
+                let keys = grow(device, &mut self.keys, key_bytes as u64, upload)?;
                 let copied = bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes));
                 write(Keys::Copied(copied))?;
                 Binding::whole(keys)
@@ -221,7 +186,7 @@ impl KeysInFlight {
             bindings.push(Binding::whole(weights));
         }
         bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));
-        let rows = piece.rows();
+        let rows = dispatch.rows();
         let groups = [
             rows.samples.div_ceil(FROM_KEYS_WORKGROUP),
             rows.count.div_ceil(ROWS_PER_INVOCATION),
@@ -235,8 +200,9 @@ impl KeysInFlight {
         self.output = output;
         Ok(())
     }
+}
 
-    /// Waits for the piece in flight, if any, and copies its rotations to the caller.
+impl Flight for KeysInFlight {
     fn finish(
         &mut self,
         target: &mut Target<'_>,

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::EvaluateError;
-use crate::gpu::error::VulkanError;
+use crate::gpu::engine::{VulkanEngine, lock};
+use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
 use crate::gpu::sample_list::SampleList;
@@ -18,8 +18,7 @@ use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work}
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::List;
-use crate::shader::{Item, ListedSample};
+use crate::shader::{Item, List, ListedSample};
 use crate::time::frames::{Ticks, Timeline};
 
 /// What one window in flight needs. The submission is the first field: dropped first, it waits for
@@ -46,6 +45,7 @@ pub(crate) struct InFlight {
 /// What is left to do when a window has been computed.
 pub(crate) struct Finish {
     pub(crate) window: Window,
+    pub(crate) encoding: Encoding,
     pub(crate) patches: Vec<Patch>,
 }
 
@@ -107,6 +107,84 @@ pub(crate) struct External {
     pub(crate) offset: u64,
 }
 
+/// Work in flight.
+pub(crate) trait Flight {
+    /// Waits for it, if there is any, and does what is left to do then.
+    fn finish(
+        &mut self,
+        target: &mut Target<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError>;
+}
+
+impl VulkanEngine {
+    /// Finishes all that is in flight after the `last`th was started, the oldest first; also after
+    /// an error, because work that was submitted uses the caller's buffers.
+    pub(crate) fn land(
+        &self,
+        in_flight: &mut Vec<impl Flight>,
+        last: usize,
+        target: &mut Target<'_>,
+        mut stopwatch: Stopwatch,
+        mut result: Result<(), EvaluateError>,
+    ) -> Result<(), EvaluateError> {
+        let count = in_flight.len();
+        for i in 1..=count {
+            let finished = in_flight[(last + i) % count].finish(target, &mut stopwatch);
+            result = result.and(finished.map_err(EvaluateError::from));
+        }
+        if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
+            memory.has_come_back();
+        }
+        if stopwatch.is_slow() {
+            self.halve_windows(); // those of the next call
+        }
+        if result.is_err() {
+            in_flight.clear(); // a fence or a recording may be half way
+        }
+        *lock(&self.timings) += stopwatch.timings;
+        result
+    }
+}
+
+impl Flight for InFlight {
+    fn finish(
+        &mut self,
+        target: &mut Target<'_>,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(), VulkanError> {
+        if let Some(spent) = self.submission.wait()? {
+            stopwatch.ran(spent, self.compiled);
+        }
+        let copying = Instant::now();
+        let Some(done) = self.done.take() else {
+            return Ok(());
+        };
+        let (window, encoding) = (done.window, done.encoding);
+        let rotation = encoding.bytes();
+        let all = window.start * rotation..(window.start + window.len()) * rotation;
+        let output: &mut [u8] = match target {
+            Target::Buffer(buffer) => buffer.bytes_mut(all),
+            Target::ImportedMemory(memory) => memory.bytes_mut(all),
+            Target::External(_) => &mut [],
+            Target::Slice(slice) => {
+                let output = &mut slice[all];
+                let written = self.readback.as_ref().or(self.rotations.as_ref());
+                let bytes = 0..output.len();
+                let written = written.map_or(&[][..], |buffer| buffer.bytes(bytes));
+                copy(output, written);
+                output
+            }
+        };
+        for (place, value) in done.patches {
+            let place = place * rotation;
+            encoding.encode(&[value], &mut output[place..place + rotation]);
+        }
+        stopwatch.timings.read_back += copying.elapsed();
+        Ok(())
+    }
+}
+
 impl InFlight {
     pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         Ok(Self {
@@ -121,20 +199,6 @@ impl InFlight {
             spare: Vec::new(),
             compiled: false,
         })
-    }
-
-    /// Makes a new buffer where there is none of at least `size` bytes.
-    pub(crate) fn grow(
-        device: &Arc<LogicalDevice>,
-        buffer: &mut Option<Buffer>,
-        size: u64,
-        residence: Residence,
-    ) -> Result<(), VulkanError> {
-        if buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
-            *buffer = None; // before the new one, so that both need not fit
-            *buffer = Some(Buffer::new(device, "tumble window", size, residence)?);
-        }
-        Ok(())
     }
 
     /// Writes the work list of a window into its buffers, one group after another; `shift`
@@ -190,46 +254,19 @@ impl InFlight {
         }
         Ok(work)
     }
+}
 
-    /// Waits for the window in flight, if any, copies its rotations to the caller, and adds those
-    /// that the host computed.
-    pub(crate) fn finish(
-        &mut self,
-        encoding: Encoding,
-        target: &mut Target<'_>,
-        stopwatch: &mut Stopwatch,
-    ) -> Result<(), VulkanError> {
-        if let Some(spent) = self.submission.wait()? {
-            stopwatch.ran(spent, self.compiled);
-        }
-        let copying = Instant::now();
-        let Some(Finish { window, patches }) = self.done.take() else {
-            return Ok(());
-        };
-        let rotation = encoding.bytes();
-        let all = window.start * rotation..(window.start + window.len()) * rotation;
-        let output: &mut [u8] = match target {
-            Target::Buffer(buffer) => buffer.bytes_mut(all),
-            Target::ImportedMemory(memory) => memory.bytes_mut(all),
-            Target::External(_) => &mut [],
-            Target::Slice(slice) => {
-                let output = &mut slice[all];
-                let written = self.readback.as_ref().or(self.rotations.as_ref());
-                let bytes = 0..output.len();
-                copy(
-                    output,
-                    written.map_or(&[][..], |buffer| buffer.bytes(bytes)),
-                );
-                output
-            }
-        };
-        for (place, value) in patches {
-            let place = place * rotation;
-            encoding.encode(&[value], &mut output[place..place + rotation]);
-        }
-        stopwatch.timings.read_back += copying.elapsed();
-        Ok(())
-    }
+/// A kept buffer of at least `size` bytes, which is replaced if it is shorter.
+pub(crate) fn grow<'b>(
+    device: &Arc<LogicalDevice>,
+    kept: &'b mut Option<Buffer>,
+    size: u64,
+    residence: Residence,
+) -> Result<&'b mut Buffer, VulkanError> {
+    // A shorter one is freed before the new one is made, so that both need not fit.
+    let own = kept.take().filter(|buffer| buffer.size() >= size);
+    let own = own.map_or_else(|| Buffer::new(device, "tumble window", size, residence), Ok);
+    Ok(kept.insert(own?))
 }
 
 /// The first `bytes` bytes of an upload buffer, which is replaced if it is shorter.

@@ -1,8 +1,7 @@
 //! The Vulkan instance: loader, validation, and the physical devices.
 
 use std::ffi::{CStr, c_void};
-use std::sync::Arc;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use ash::{ext, vk};
 

@@ -1,10 +1,11 @@
 //! Results that stay where the device wrote them.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use glam::Quat;
 
 use crate::gpu::buffer::Buffer;
+use crate::gpu::engine::lock;
 use crate::output::rotations::Storage;
 
 /// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
@@ -44,7 +45,7 @@ const KEPT: usize = 4;
 
 impl Drop for MappedQuats {
     fn drop(&mut self) {
-        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut free = lock(&self.free);
         if free.len() == KEPT {
             free.remove(0);
         }

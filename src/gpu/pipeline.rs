@@ -1,15 +1,15 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
-use crate::shader::Kernel;
+use crate::gpu::submission::{Access, Binding, Submission};
+use crate::shader::{Dispatch, Kernel, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use ash::vk;
 
+use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
-use crate::shader::Dispatch;
-use crate::shader::spirv;
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -89,6 +89,35 @@ impl Pipeline {
             .named("vkCreateComputePipelines")?[0];
         device.name(pipeline.raw, name);
         Ok(pipeline)
+    }
+
+    /// Runs the kernel once: copies inputs to the device, and what it makes of them back.
+    pub(crate) fn run_once(
+        &self,
+        inputs: &[&[u8]],
+        constants: &[u8],
+        groups: [u32; 2],
+        output: &mut [u8],
+    ) -> Result<(), VulkanError> {
+        let new = |bytes: usize, residence| {
+            Buffer::new(&self.device, "tumble once", bytes as u64, residence)
+        };
+        let mut buffers = Vec::with_capacity(inputs.len() + 1);
+        for input in inputs {
+            let mut buffer = new(input.len(), Residence::Upload)?;
+            buffer.bytes_mut(0..input.len()).copy_from_slice(input);
+            buffers.push(buffer);
+        }
+        buffers.push(new(output.len(), Residence::Readback)?);
+        let bindings: Vec<Binding> = buffers.iter().map(Binding::whole).collect();
+        let mut submission = Submission::new(&self.device)?;
+        submission.begin(1)?;
+        submission.dispatch(self, &bindings, constants, groups)?;
+        submission.barrier(Access::Kernel, Access::Host);
+        submission.submit()?;
+        submission.wait()?;
+        output.copy_from_slice(buffers[inputs.len()].bytes(0..output.len()));
+        Ok(())
     }
 
     /// The descriptor type of a binding.

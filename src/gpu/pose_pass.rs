@@ -1,10 +1,8 @@
 //! Passes over poses: the poses are copied to the device, one kernel runs, and its result is
 //! copied back.
 
-use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
-use crate::gpu::submission::{Access, Binding, Submission};
 use crate::shader::{Kernel, PoseDispatch};
 
 impl VulkanEngine {
@@ -29,26 +27,7 @@ impl VulkanEngine {
                 return Err(VulkanError::TooLarge { what, bytes, limit });
             }
         }
-        let pipeline = self.pipeline(kernel)?;
-        let mut buffers = Vec::with_capacity(inputs.len());
-        for input in inputs {
-            let size = input.len() as u64;
-            let mut buffer = Buffer::new(&self.device, "tumble poses", size, Residence::Upload)?;
-            buffer.bytes_mut(0..input.len()).copy_from_slice(input);
-            buffers.push(buffer);
-        }
-        let size = output.len() as u64;
-        let result = Buffer::new(&self.device, "tumble poses", size, Residence::Readback)?;
-        let mut bindings: Vec<Binding> = buffers.iter().map(Binding::whole).collect();
-        bindings.push(Binding::whole(&result));
-        let mut submission = Submission::new(&self.device)?;
-        submission.begin(1)?;
-        let groups = self.workgroups(pass.count);
-        submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&pass), groups)?;
-        submission.barrier(Access::Kernel, Access::Host);
-        submission.submit()?;
-        submission.wait()?;
-        output.copy_from_slice(result.bytes(0..output.len()));
-        Ok(())
+        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(pass.count));
+        pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)
     }
 }

@@ -7,7 +7,7 @@ use crate::gpu::engine::{ClipBuffers, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
-use crate::gpu::self_test::SelfTestReport;
+use crate::gpu::self_test::{self, SelfTestReport};
 use crate::prepare::clip_data::ClipData;
 
 /// How often a lost device is opened again for one call.
@@ -67,7 +67,7 @@ impl Opened {
     ) -> Result<Self, VulkanError> {
         Ok(Self {
             self_tests: trust(&engine, options)?,
-            info: engine.info().clone(),
+            info: engine.device.physical.info.clone(),
             current: RwLock::new(Arc::new(engine)),
             options: options.clone(),
         })
@@ -159,11 +159,11 @@ fn trust(
     engine: &VulkanEngine,
     options: &EngineOptions,
 ) -> Result<Vec<SelfTestReport>, VulkanError> {
-    let self_tests = engine.self_tests()?;
+    let self_tests = self_test::run(engine)?;
     let failed = self_tests.iter().find(|check| check.differing > 0);
     if let (Some(check), false) = (failed, options.allow_inexact) {
         return Err(VulkanError::Inexact {
-            device: engine.info().name.clone(),
+            device: engine.device.physical.info.name.clone(),
             check: check.name,
             differing: check.differing,
             total: check.total,

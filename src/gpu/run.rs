@@ -2,19 +2,17 @@
 //! device evaluates the other.
 
 use std::collections::VecDeque;
-use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use crate::gpu::buffer::Residence;
-use crate::gpu::engine::{IN_FLIGHT, Job, VulkanEngine};
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::engine::{IN_FLIGHT, Job, VulkanEngine, lock};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::{Finish, InFlight, Stopwatch, Target};
+use crate::gpu::in_flight::{Finish, Flight as _, InFlight, Stopwatch, Target, grow};
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::WORKGROUP;
-use crate::shader::{Dispatch, Kernel, List};
+use crate::shader::{Dispatch, Kernel, List, WORKGROUP};
 
 impl VulkanEngine {
     /// Evaluates a window of a result, cut into smaller windows that suit the device.
@@ -24,10 +22,7 @@ impl VulkanEngine {
         window: &Window,
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let mut in_flight = self
-            .in_flight
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut in_flight = lock(&self.in_flight);
         // `self.window()` counts rotations of 16 bytes; of larger ones a window holds fewer.
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
         let cut = |window: &Window| window.cut((self.window() / each).max(1));
@@ -47,7 +42,7 @@ impl VulkanEngine {
             next = (next + 1) % in_flight.len();
             let evaluation = &mut in_flight[next];
             result = evaluation
-                .finish(job.encoding, &mut target, &mut stopwatch)
+                .finish(&mut target, &mut stopwatch)
                 .map_err(EvaluateError::from)
                 .and_then(|()| {
                     let listing = Instant::now();
@@ -59,24 +54,7 @@ impl VulkanEngine {
                 break;
             }
         }
-        // Also after an error: work that was submitted uses the caller's buffers.
-        let oldest_first = in_flight.len();
-        for i in 1..=oldest_first {
-            let evaluation = &mut in_flight[(next + i) % oldest_first];
-            let finished = evaluation.finish(job.encoding, &mut target, &mut stopwatch);
-            result = result.and(finished.map_err(EvaluateError::from));
-        }
-        if let (Target::ImportedMemory(memory), Ok(())) = (&mut target, &result) {
-            memory.has_come_back();
-        }
-        if stopwatch.is_slow() {
-            self.halve_windows(); // those of the next call
-        }
-        if result.is_err() {
-            in_flight.clear(); // a fence or a recording may be half way
-        }
-        *self.timings.lock().unwrap_or_else(PoisonError::into_inner) += stopwatch.timings;
-        result
+        self.land(&mut in_flight, next, &mut target, stopwatch, result)
     }
 
     /// Submits one window.
@@ -87,19 +65,10 @@ impl VulkanEngine {
         window: Window,
         target: &Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let Job {
-            clip,
-            buffers,
-            timeline,
-            encoding,
-        } = job;
+        let (clip, encoding) = (job.clip, job.encoding);
         let rotation = encoding.bytes() as u64;
-        let alignment = self
-            .device
-            .physical
-            .info
-            .min_storage_buffer_offset_alignment
-            .max(1);
+        let info = &self.device.physical.info;
+        let alignment = info.min_storage_buffer_offset_alignment.max(1);
         let start = match target {
             Target::Buffer(_) => window.start as u64 * rotation,
             Target::ImportedMemory(memory) => {
@@ -115,21 +84,17 @@ impl VulkanEngine {
         }
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let work = evaluation.list(&self.device, clip, timeline, &window, shift as u32)?;
+        let work = evaluation.list(&self.device, clip, job.timeline, &window, shift as u32)?;
 
-        let staged_items = !self.in_place;
-        if staged_items {
-            InFlight::grow(
-                &self.device,
-                &mut evaluation.device_items,
-                evaluation.items.size(),
-                Residence::Device,
-            )?;
-            let size = evaluation.distances.size();
-            InFlight::grow(
-                &self.device,
+        let room = |kept: &mut Option<Buffer>, size: u64, residence| {
+            grow(&self.device, kept, size, residence).map(|_| ())
+        };
+        if !self.in_place {
+            let (items, distances) = (evaluation.items.size(), evaluation.distances.size());
+            room(&mut evaluation.device_items, items, Residence::Device)?;
+            room(
                 &mut evaluation.device_distances,
-                size,
+                distances,
                 Residence::Device,
             )?;
         }
@@ -139,14 +104,9 @@ impl VulkanEngine {
             } else {
                 Residence::Device
             };
-            InFlight::grow(&self.device, &mut evaluation.rotations, size, residence)?;
+            room(&mut evaluation.rotations, size, residence)?;
             if !self.in_place {
-                InFlight::grow(
-                    &self.device,
-                    &mut evaluation.readback,
-                    size,
-                    Residence::Readback,
-                )?;
+                room(&mut evaluation.readback, size, Residence::Readback)?;
             }
         }
         evaluation.submission.begin(work.groups.len() as u32)?;
@@ -164,10 +124,10 @@ impl VulkanEngine {
             (items, distances) = (own_items, own_distances);
         }
         let rotations = match (target, &evaluation.rotations) {
-            (Target::Buffer(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
-            (Target::ImportedMemory(memory), _) => Binding::stretch(memory.raw(), aligned, size),
-            (Target::External(buffer), _) => Binding::stretch(buffer.raw, aligned, size),
-            (Target::Slice(_), Some(buffer)) => Binding::stretch(buffer.raw, 0, size),
+            (Target::Buffer(buffer), _) => Binding::range(buffer.raw, aligned, size),
+            (Target::ImportedMemory(memory), _) => Binding::range(memory.raw(), aligned, size),
+            (Target::External(buffer), _) => Binding::range(buffer.raw, aligned, size),
+            (Target::Slice(_), Some(buffer)) => Binding::range(buffer.raw, 0, size),
             (Target::Slice(_), None) => unreachable!("grown above"),
         };
         let form = clip.interpolation.form();
@@ -180,7 +140,7 @@ impl VulkanEngine {
             if item_count == 0 {
                 continue;
             }
-            let group = &buffers.groups[own.group];
+            let group = &job.buffers.groups[own.group];
             let mut bindings = vec![
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
@@ -227,7 +187,11 @@ impl VulkanEngine {
             _ => evaluation.submission.barrier(Access::Kernel, Access::Host),
         }
         evaluation.submission.submit()?;
-        evaluation.done = Some(Finish { window, patches });
+        evaluation.done = Some(Finish {
+            window,
+            encoding,
+            patches,
+        });
         Ok(())
     }
 

@@ -6,19 +6,16 @@ use rayon::prelude::*;
 
 use crate::cpu::evaluate::FEW;
 use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
-use crate::math::canonical::round_f32;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::IS_CONSTANT;
-use crate::shader::List;
-use crate::shader::ListedSample;
+use crate::shader::{IS_CONSTANT, List, ListedSample};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
-use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::{NONE, Part, Source};
 use crate::time::times::TimeLanes;
 use crate::time::wrap::TrackCopy;
@@ -121,7 +118,7 @@ impl<'a> SampleList<'a> {
         mut list: &mut [ListedSample],
         shift: u32,
     ) -> Result<Work, FramesError> {
-        let mut pieces = Vec::new();
+        let mut chunks = Vec::new();
         let mut groups = Vec::new();
         for (i, own) in self.groups.iter().enumerate() {
             let end = (self.groups.get(i + 1)).map_or(self.window.len(), |next| next.first);
@@ -141,7 +138,7 @@ impl<'a> SampleList<'a> {
                 let next = next.min(end);
                 let (own_list, other_list) = list.split_at_mut(next - first);
                 list = other_list;
-                pieces.push(Piece {
+                chunks.push(SampleChunk {
                     all: self,
                     prepared: own.prepared,
                     parts,
@@ -154,15 +151,15 @@ impl<'a> SampleList<'a> {
                 first = next;
             }
         }
-        let pieces: Vec<_> = pieces
+        let chunks: Vec<_> = chunks
             .into_par_iter()
-            .map(|mut piece| {
-                in_lanes(&mut piece);
-                piece.result.map(|()| piece.patches)
+            .map(|mut chunk| {
+                in_lanes(&mut chunk);
+                chunk.result.map(|()| chunk.patches)
             })
             .collect();
         let mut patches = Vec::new();
-        for own in pieces {
+        for own in chunks {
             patches.append(&mut own?);
         }
         Ok(Work {
@@ -173,8 +170,8 @@ impl<'a> SampleList<'a> {
     }
 }
 
-/// The piece of the list that one thread writes.
-struct Piece<'a> {
+/// The chunk of the list that one thread writes.
+struct SampleChunk<'a> {
     all: &'a SampleList<'a>,
     prepared: &'a Prepared,
     parts: &'a [Part],
@@ -187,7 +184,7 @@ struct Piece<'a> {
     result: Result<(), FramesError>,
 }
 
-impl InLanes for Piece<'_> {
+impl InLanes for SampleChunk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let SampleList {
@@ -202,7 +199,7 @@ impl InLanes for Piece<'_> {
         for part in self.parts {
             let copy = TrackCopy::own(samples.clone());
             let mut list = PartSamples {
-                piece: self,
+                chunk: self,
                 track: part.track as usize,
             };
             let told = prepared.spans.runs(part, timeline, &copy, &mut list);
@@ -228,19 +225,19 @@ const fn held(constant: u32) -> ListedSample {
 
 /// The samples of one part.
 struct PartSamples<'p, 'a> {
-    piece: &'p mut Piece<'a>,
+    chunk: &'p mut SampleChunk<'a>,
     track: usize,
 }
 
 impl Emit for PartSamples<'_, '_> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        self.piece.tell(self.track, run);
+        self.chunk.tell(self.track, run);
     }
 }
 
-impl Piece<'_> {
-    /// Lists the samples of a run that belong to this piece and are not listed yet.
+impl SampleChunk<'_> {
+    /// Lists the samples of a run that belong to this chunk and are not listed yet.
     #[inline(always)]
     fn tell(&mut self, track: usize, run: Run) {
         let SampleList {
@@ -265,26 +262,11 @@ impl Piece<'_> {
         let first_sample = run.sample + skipped;
         match run.source {
             RunSource::Constant(constant) => own.fill(held(constant)),
-            RunSource::Segment {
-                index,
-                distance,
-                scale,
-                offset,
-            } => {
+            RunSource::Segment(source, distance, Affine { scale, offset }) => {
                 for (j, single) in own.iter_mut().enumerate() {
-                    let distance = match distance {
-                        Distance::Near { first } => first + (skipped + j) as f32,
-                        Distance::Frames { first } => {
-                            first.wrapping_add((skipped + j) as i32) as f32
-                        }
-                        Distance::Seconds { middle } => {
-                            round_f32(timeline.time(track, first_sample + j) - middle)
-                        }
-                    };
-                    *single = ListedSample {
-                        source: index,
-                        parameter: distance * scale + offset,
-                    };
+                    let time = || timeline.time(track, first_sample + j);
+                    let parameter = distance.of(skipped + j, time) * scale + offset;
+                    *single = ListedSample { source, parameter };
                 }
             }
             RunSource::Exact { index, parameter } => {
@@ -317,10 +299,8 @@ impl Piece<'_> {
             let parameters = found.parameters();
             let own = &mut self.list[self.told..][..found.count];
             for (lane, single) in own.iter_mut().enumerate() {
-                *single = ListedSample {
-                    source: found.sources[lane],
-                    parameter: parameters[lane],
-                };
+                let (source, parameter) = (found.sources[lane], parameters[lane]);
+                *single = ListedSample { source, parameter };
             }
             self.told += found.count;
         }
@@ -357,7 +337,7 @@ impl Piece<'_> {
         match found.first().map(|run| run.source) {
             Some(RunSource::Constant(constant)) => constant,
             // Neither occurs: outside the keys of a whole track lie constants or f64 curves.
-            Some(RunSource::Segment { .. }) | None => 0,
+            Some(RunSource::Segment(..)) | None => 0,
             Some(RunSource::Exact { index, parameter }) => {
                 let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);
                 self.patches.push((all.window.place(track, sample), exact));

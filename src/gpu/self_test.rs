@@ -1,19 +1,17 @@
 //! The self-test: before a device is trusted it computes a fixed set of inputs, and every bit is
 //! compared with the CPU's. Each check of it is a canary.
 
-use crate::gpu::error::EvaluateError;
-use crate::shader::Kernel;
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::shader::{Dispatch, Kernel, Probe, Reply, WORKGROUP};
 use std::sync::Arc;
 
+use bytemuck::Zeroable as _;
 use glam::{DVec3, Quat};
 
 use crate::cpu::engine::CpuEngine;
-use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{Job, VulkanEngine};
-use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::gpu::submission::{Access, Binding, Submission};
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::exp;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
@@ -22,8 +20,6 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::shader::WORKGROUP;
-use crate::shader::{Dispatch, Probe, Reply};
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -43,7 +39,7 @@ pub struct SelfTestReport {
 
 /// Runs every canary on a device.
 pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
-    let mut reports = expressions(engine.device(), Exactness::Demanded)?;
+    let mut reports = expressions(&engine.device, Exactness::Demanded)?;
     for (name, method) in [
         ("arc kernel", SLERP),
         ("polynomial kernel", BESSEL_OVERHAUSER),
@@ -73,12 +69,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
             let mut found = expected.clone();
             cpu.evaluate(&clip, &timeline, &whole, &mut expected)
                 .expect("short gaps");
-            let job = Job {
-                clip: &clip,
-                buffers: &buffers,
-                timeline: &timeline,
-                encoding: Encoding::F32,
-            };
+            let job = Job::new(&clip, &buffers, &timeline, Encoding::F32);
             match engine.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found)) {
                 Err(EvaluateError::Vulkan(error)) => return Err(error),
                 done => done.expect("short gaps"),
@@ -123,26 +114,8 @@ fn expressions(
     exactness: Exactness,
 ) -> Result<Vec<SelfTestReport>, VulkanError> {
     let probes = probes();
-    let probe_bytes: &[u8] = bytemuck::cast_slice(&probes);
-    let reply_bytes = probes.len() * size_of::<Reply>();
+    let mut replies = vec![Reply::zeroed(); probes.len()];
     let pipeline = Pipeline::new(device, Kernel::SelfTest, exactness)?;
-    let mut input = Buffer::new(
-        device,
-        "tumble probes",
-        probe_bytes.len() as u64,
-        Residence::Upload,
-    )?;
-    let output = Buffer::new(
-        device,
-        "tumble replies",
-        reply_bytes as u64,
-        Residence::Readback,
-    )?;
-    input
-        .bytes_mut(0..probe_bytes.len())
-        .copy_from_slice(probe_bytes);
-    let mut submission = Submission::new(device)?;
-    submission.begin(1)?;
     let dispatch = Dispatch {
         first_item: 0,
         item_count: probes.len() as u32,
@@ -150,17 +123,12 @@ fn expressions(
         detail: 0,
         first_output: 0,
     };
-    submission.dispatch(
-        &pipeline,
-        &[Binding::whole(&input), Binding::whole(&output)],
+    pipeline.run_once(
+        &[bytemuck::cast_slice(&probes)],
         bytemuck::bytes_of(&dispatch),
         [(probes.len() as u32).div_ceil(WORKGROUP), 1],
+        bytemuck::cast_slice_mut(&mut replies),
     )?;
-    submission.barrier(Access::Kernel, Access::Host);
-    submission.submit()?;
-    submission.wait()?;
-    let replies: &[Reply] = bytemuck::cast_slice(output.bytes(0..reply_bytes));
-
     let self_tests: [(&str, Value); 10] = [
         ("contraction", |reply| reply.contraction),
         ("re-association of a sum", |reply| reply.reassociation),
@@ -175,7 +143,7 @@ fn expressions(
     ];
     let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
     let count = |value: Value| {
-        let pairs = expected.iter().zip(replies);
+        let pairs = expected.iter().zip(&replies);
         pairs
             .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
             .count()

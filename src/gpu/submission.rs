@@ -55,7 +55,7 @@ pub(crate) struct Binding {
 
 impl Binding {
     /// A range of a buffer that no kernel reads as texels.
-    pub(crate) fn stretch(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
+    pub(crate) fn range(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
         Self {
             buffer,
             view: vk::BufferView::null(),

@@ -6,9 +6,7 @@ use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::Item;
-use crate::shader::List;
-use crate::shader::{IS_CONSTANT, ITEM_SAMPLES};
+use crate::shader::{IS_CONSTANT, ITEM_SAMPLES, Item, List};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frames::{FramesError, Timeline};
@@ -42,7 +40,7 @@ pub(crate) struct GroupWork {
     pub(crate) chunks: Vec<WorkChunk>,
 }
 
-/// A piece of a work list, made by one thread. Where items take their distances from `distances`,
+/// A chunk of a work list, made by one thread. Where items take their distances from `distances`,
 /// their `first` is an index into those of the chunk.
 #[derive(Default)]
 pub(crate) struct WorkChunk {
@@ -179,32 +177,26 @@ struct RunItems<'a> {
 impl Emit for RunItems<'_> {
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let &mut Self {
-            prepared,
-            timeline,
-            window,
-            shift,
-            track,
-            ..
-        } = self;
         let chunk = &mut *self.chunk;
-        let output = |sample| window.place(track, sample) as u32 + shift;
+        let output = |sample| self.window.place(self.track, sample) as u32 + self.shift;
         let samples = run.sample..run.sample + run.count;
         if let RunSource::Exact { index, parameter } = run.source {
             chunk.patches.extend(samples.map(|sample| {
-                let value = prepared.exact(index, parameter, timeline, track, sample);
-                (window.place(track, sample), value)
+                let (timeline, track) = (self.timeline, self.track);
+                let value = (self.prepared).exact(index, parameter, timeline, track, sample);
+                (self.window.place(track, sample), value)
             }));
             return;
         }
         let mut first = 0;
-        if let RunSource::Segment { distance, .. } = run.source {
+        if let RunSource::Segment(_, distance, _) = run.source {
             first = match distance {
                 Distance::Near { first } => first as i32,
                 Distance::Frames { first } => first,
                 Distance::Seconds { middle } => {
                     let own = chunk.distances.len() as i32;
-                    let from_middle = |sample| round_f32(timeline.time(track, sample) - middle);
+                    let time = |sample| self.timeline.time(self.track, sample);
+                    let from_middle = |sample| round_f32(time(sample) - middle);
                     chunk.distances.extend(samples.clone().map(from_middle));
                     own
                 }
@@ -225,12 +217,7 @@ impl Emit for RunItems<'_> {
 pub(crate) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
     let (source, count, scale, offset) = match source {
         RunSource::Constant(source) => (source, count | IS_CONSTANT, 0.0, 0.0),
-        RunSource::Segment {
-            index,
-            scale,
-            offset,
-            ..
-        } => (index, count, scale, offset),
+        RunSource::Segment(index, _, affine) => (index, count, affine.scale, affine.offset),
         RunSource::Exact { .. } => (0, IS_CONSTANT, 0.0, 0.0),
     };
     Item {

@@ -3,7 +3,7 @@
 
 use glam::{DQuat, Quat};
 
-use crate::math::quaternion::Quaternion;
+use crate::math::quaternion::{Quaternion, dot};
 use crate::shader::TINY_BITS;
 
 /// Replaces a magnitude below 2^-64 by +0, in inputs and outputs of kernels. Drivers may flush
@@ -45,18 +45,9 @@ pub(crate) fn round_quat(q: Quaternion) -> [f32; 4] {
 
 /// The unit quaternion nearest to `q`, in f32.
 pub(crate) fn unit_f32(q: DQuat) -> Quat {
+    let q = q.to_array();
     let norm = dot(q, q).sqrt();
-    Quat::from_array(q.to_array().map(|component| round_f32(component / norm)))
-}
-
-/// `q` in f64, not normalised.
-pub(crate) fn to_f64(q: Quat) -> DQuat {
-    DQuat::from_array(q.to_array().map(f64::from))
-}
-
-/// The inner product in R⁴.
-pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {
-    crate::math::quaternion::dot(a.to_array(), b.to_array())
+    Quat::from_array(q.map(|component| round_f32(component / norm)))
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 //! polynomials in the principal range, or dual numbers, which carry two derivatives. Each formula
 //! is written once, for all of them.
 
-use std::ops::{Add, Mul, Sub};
-
+use crate::math::operators::operators;
 use crate::math::quaternion::{Arithmetic, Real, arc_tangent, full_waves};
 use crate::math::ranges::{near_arc_square, near_waves};
 
@@ -70,31 +69,11 @@ fn reciprocal_root<R: Real>(x: R) -> R {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Near<R>(pub(crate) R);
 
-impl<R: Real> Add for Near<R> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0)
-    }
-}
-
-impl<R: Real> Sub for Near<R> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0)
-    }
-}
-
-impl<R: Real> Mul for Near<R> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(self.0 * other.0)
-    }
+operators! {
+    [R: Real] Near<R>, a, b:
+    Add add => Self(a.0 + b.0);
+    Sub sub => Self(a.0 - b.0);
+    Mul mul => Self(a.0 * b.0);
 }
 
 impl<R: Real> Scalar for Near<R> {
@@ -150,38 +129,23 @@ impl Dual {
     }
 }
 
-impl Add for Dual {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self {
-            value: self.value + other.value,
-            first: self.first + other.first,
-            second: self.second + other.second,
-        }
-    }
-}
-
-impl Sub for Dual {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        Self {
-            value: self.value - other.value,
-            first: self.first - other.first,
-            second: self.second - other.second,
-        }
-    }
-}
-
-impl Mul for Dual {
-    type Output = Self;
-    fn mul(self, other: Self) -> Self {
-        let both = self.first * other.first;
-        Self {
-            value: self.value * other.value,
-            first: self.first * other.value + self.value * other.first,
-            second: self.second * other.value + 2.0 * both + self.value * other.second,
-        }
-    }
+operators! {
+    [] Dual, a, b:
+    Add add => Self {
+        value: a.value + b.value,
+        first: a.first + b.first,
+        second: a.second + b.second,
+    };
+    Sub sub => Self {
+        value: a.value - b.value,
+        first: a.first - b.first,
+        second: a.second - b.second,
+    };
+    Mul mul => Self {
+        value: a.value * b.value,
+        first: a.first * b.value + a.value * b.first,
+        second: a.second * b.value + 2.0 * (a.first * b.first) + a.value * b.second,
+    };
 }
 
 /// A power series and its first two derivatives at `x`.

@@ -3,5 +3,6 @@
 
 pub(crate) mod canonical;
 pub(crate) mod dual;
+pub(crate) mod operators;
 pub(crate) mod quaternion;
 pub(crate) mod ranges;

@@ -8,9 +8,8 @@ use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
 use crate::method::ends::End;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
 use crate::reference;
-use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
@@ -27,16 +26,10 @@ pub const B_SPLINE: Method = Method {
     keeps_constant_velocity: Keys::Even,
     interpolates: false,
     symmetric: false,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 220.0,
-        rotation: 3.0,
-    },
+    cost: Cost::new(220.0, 3.0),
     reference: reference::b_spline::B_SPLINE,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves =

@@ -1,15 +1,13 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
 /// equal to [`CATMULL_ROM`](crate::method::catmull_rom::CATMULL_ROM) for even ones.
@@ -21,18 +19,11 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     continuity: Continuity::C1,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
-    interpolates: true,
     symmetric: false,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 210.0,
-        rotation: 2.8,
-    },
+    cost: Cost::new(210.0, 2.8),
     reference: reference::handles::BESSEL_OVERHAUSER,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(
@@ -45,11 +36,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        algebra: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let both = before.duration + after.duration;
         // The slope on each side is weighted by the other side's duration. The left factor comes
         // first: otherwise the curve would not equal Catmull-Rom on uniform keys.

@@ -1,14 +1,12 @@
 //! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
 //! through three keys, computed with logarithms.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles, Interval};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
 /// curve is the same forwards and backwards in time.
@@ -22,18 +20,10 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     continuity: Continuity::C1,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 840.0,
-        rotation: 3.2,
-    },
+    cost: Cost::new(840.0, 3.2),
     reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves =
@@ -43,11 +33,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         Handles {
             incoming: handle(before, after, before.duration, [A::Number::all(1.0); 2]),
             outgoing: handle(before, after, after.duration, [A::Number::all(1.0); 2]),

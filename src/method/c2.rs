@@ -10,9 +10,8 @@ use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::End;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
 use crate::reference;
-use crate::shader::Form;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
@@ -33,18 +32,12 @@ pub const C2: Method = Method {
     continuity: Continuity::C2,
     continuity_on_even_keys: Continuity::C2,
     keeps_constant_velocity: Keys::Any,
-    interpolates: true,
     symmetric: false,
-    uses_neighbours: true,
-    form: Form::Polynomial,
     ends: Ends::Secant,
-    path: None,
-    cost: Cost {
-        key: 1100.0,
-        rotation: 3.2,
-    },
+    cost: Cost::new(1100.0, 3.2),
     reference: reference::c2::C2,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves =

@@ -1,14 +1,12 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;
@@ -21,18 +19,11 @@ pub const CATMULL_ROM: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
-    interpolates: true,
     symmetric: false,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 150.0,
-        rotation: 2.6,
-    },
+    cost: Cost::new(150.0, 2.6),
     reference: reference::handles::CATMULL_ROM,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(
@@ -45,11 +36,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        algebra: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         // The half-angle of both steps together may approach pi, so its sign is not changed to the
         // nearer one.
         let two_step = product(before.step, after.step);

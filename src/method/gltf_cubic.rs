@@ -5,9 +5,8 @@ use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
 use crate::reference;
-use crate::shader::Form;
 use crate::tracks::set::Track;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
@@ -22,18 +21,12 @@ pub const GLTF_CUBIC: Method = Method {
     continuity: Continuity::C1,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
     uses_neighbours: false,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
     path: Some(Path::AsAuthored),
-    cost: Cost {
-        key: 350.0,
-        rotation: 3.8,
-    },
+    cost: Cost::new(350.0, 3.8),
     reference: reference::given::GLTF_CUBIC,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves =

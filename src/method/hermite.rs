@@ -6,9 +6,8 @@ use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
 use crate::reference;
-use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
@@ -23,18 +22,12 @@ pub const HERMITE: Method = Method {
     continuity: Continuity::C1,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
     symmetric: false,
     uses_neighbours: false,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 160.0,
-        rotation: 2.8,
-    },
+    cost: Cost::new(160.0, 2.8),
     reference: reference::given::HERMITE,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves =

@@ -2,7 +2,7 @@
 
 use crate::curve::options::{Ends, Path, Quantity, Speed};
 use crate::fit::tangent_weights::WeightRule;
-use crate::method::{Curves, Method};
+use crate::method::{Curves, Method, Smooth};
 use crate::reference::curve::Curve;
 use crate::shader::Form;
 use crate::time::wrap::{Wrap, WrapMode};
@@ -43,27 +43,29 @@ impl Interpolation {
         }
     }
 
+    /// The smooth curves as keyed on the shortest path, if these are what is asked for.
+    fn plain(&self) -> Option<Smooth> {
+        match *self.method.curves {
+            Curves::Smooth(smooth)
+                if self.path == Path::Shortest
+                    && self.quantity == Quantity::Rotation
+                    && self.speed == Speed::AsKeyed =>
+            {
+                Some(smooth)
+            }
+            _ => None,
+        }
+    }
+
     /// Whether tracks of two keys turn about one axis at constant speed.
     pub(crate) fn is_steady_alone(&self) -> bool {
-        let Curves::Smooth(smooth) = self.method.curves else {
-            return false;
-        };
-        smooth.steady_alone
-            && self.path == Path::Shortest
-            && self.quantity == Quantity::Rotation
-            && self.speed == Speed::AsKeyed
+        self.plain().is_some_and(|smooth| smooth.steady_alone)
     }
 
     /// The rule for the tangent weights of small-angle curves straight from keys, if method and
     /// options allow such curves.
     pub(crate) fn small_angle_weights(&self) -> Option<WeightRule> {
-        let Curves::Smooth(smooth) = self.method.curves else {
-            return None;
-        };
-        let suits = self.path == Path::Shortest
-            && self.quantity == Quantity::Rotation
-            && self.speed == Speed::AsKeyed;
-        smooth.direct.filter(|_| suits).map(|direct| direct.weights)
+        Some(self.plain()?.direct?.weights)
     }
 
     /// Whether arcs are prepared by their formula, as other curves are: velocities, accelerations,

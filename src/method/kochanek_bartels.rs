@@ -1,15 +1,13 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 use crate::tracks::set::Track;
 
 /// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
@@ -24,18 +22,10 @@ pub const KOCHANEK_BARTELS: Method = Method {
     continuity: Continuity::C1,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 860.0,
-        rotation: 3.2,
-    },
+    cost: Cost::new(860.0, 3.2),
     reference: reference::handles::KOCHANEK_BARTELS,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(
@@ -56,11 +46,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let [tension, continuity, bias, _] = after.key;
         let one = A::Number::all(1.0);
         let tight = one - tension;

@@ -41,7 +41,6 @@ pub use crate::method::slerp::SLERP;
 pub use crate::method::squad::SQUAD;
 pub use crate::method::step::STEP;
 
-use crate::tracks::signs::Signs;
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
@@ -52,9 +51,11 @@ use crate::fit::double::shape::Shape;
 use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
+use crate::reference;
 use crate::reference::curve::Definition;
 use crate::shader::Form;
 use crate::tracks::set::Track;
+use crate::tracks::signs::Signs;
 
 /// Every method, in the order in which help and reports list them.
 pub static METHODS: [Method; 15] = [
@@ -121,6 +122,26 @@ pub struct Method {
     /// vector width.
     pub(crate) curves: &'static Curves,
 }
+
+/// What most methods have in common; names, formula and curves are each method's own.
+const USUAL: Method = Method {
+    name: "",
+    summary: "",
+    formula: "",
+    source: "",
+    continuity: Continuity::C0,
+    continuity_on_even_keys: Continuity::C1,
+    keeps_constant_velocity: Keys::Never,
+    interpolates: true,
+    symmetric: true,
+    uses_neighbours: true,
+    form: Form::Polynomial,
+    ends: Ends::Parabolic,
+    path: None,
+    cost: Cost::new(0.0, 0.0),
+    reference: reference::given::STEP,
+    curves: &Curves::Steps,
+};
 
 /// The kind of curve between two keys.
 #[derive(Clone, Copy)]
@@ -232,6 +253,12 @@ pub struct Cost {
     pub key: f64,
     /// Evaluating a rotation.
     pub rotation: f64,
+}
+
+impl Cost {
+    const fn new(key: f64, rotation: f64) -> Self {
+        Self { key, rotation }
+    }
 }
 
 /// The key times for which a property of a method holds.

@@ -1,13 +1,11 @@
 //! Normalised linear interpolation.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
 /// another speed, slower near the keys: it is up to 8° from slerp where keys are 180° apart.
@@ -19,18 +17,11 @@ pub const NLERP: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C0,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
     uses_neighbours: false,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 150.0,
-        rotation: 2.8,
-    },
+    cost: Cost::new(150.0, 2.8),
     reference: reference::given::NLERP,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>));
@@ -40,11 +31,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        _: Interval<A::Number>,
-        _: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, _: BothSides<A>) -> Handles<A::Number> {
         Handles {
             incoming: [A::Number::all(0.0); 3],
             outgoing: [A::Number::all(0.0); 3],

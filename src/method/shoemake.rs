@@ -1,13 +1,11 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
@@ -20,18 +18,10 @@ pub const SHOEMAKE: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 1500.0,
-        rotation: 4.1,
-    },
+    cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
@@ -39,19 +29,15 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
     ends::controls::<Bisector<1>>,
 ));
 
-/// Handles that go 1/`PART` of the way from the key to the bisector.
+/// Handles that go 1/`DIVISOR` of the way from the key to the bisector.
 ///
 /// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Relative to `q_i`,
 /// `Double(q_{i-1}, q_i)` is the step before the key, taken once more.
-pub(crate) struct Bisector<const PART: u8>;
+pub(crate) struct Bisector<const DIVISOR: u8>;
 
-impl<const PART: u8> HandleRule for Bisector<PART> {
+impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        algebra: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let (a, b) = (before.step, after.step);
         let both = [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
         let norm = dot(both, both).root();
@@ -67,7 +53,7 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
         let toward = sum(before.log, after.log);
         let handle = scaled(
             algebra.log_toward(bisector, toward),
-            A::Number::all(1.0 / f64::from(PART)),
+            A::Number::all(1.0 / f64::from(DIVISOR)),
         );
         Handles {
             incoming: handle,
@@ -78,9 +64,9 @@ impl<const PART: u8> HandleRule for Bisector<PART> {
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // These handles are 3/PART times as long as the parabola's, at inner keys too.
+            // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
             EndHandle::Parabolic => {
-                let whole = scaled(log, 2.0 / f64::from(PART));
+                let whole = scaled(log, 2.0 / f64::from(DIVISOR));
                 sum(whole, scaled(other, -1.0))
             }
             EndHandle::Natural(rest) => scaled(rest, 0.5),

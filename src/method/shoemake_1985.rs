@@ -1,11 +1,9 @@
 //! Shoemake's construction, as published.
 
-use crate::curve::options::Ends;
 use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
 /// time steps, so its velocity jumps on uneven keys.
@@ -17,18 +15,10 @@ pub const SHOEMAKE_1985: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 530.0,
-        rotation: 2.8,
-    },
+    cost: Cost::new(530.0, 2.8),
     reference: reference::handles::SHOEMAKE_1985,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(

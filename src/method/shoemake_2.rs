@@ -1,11 +1,9 @@
 //! Shoemake's second approach, as lectured.
 
-use crate::curve::options::Ends;
 use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
 /// one and a half times too fast;
@@ -18,18 +16,10 @@ pub const SHOEMAKE_2: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 700.0,
-        rotation: 3.1,
-    },
+    cost: Cost::new(700.0, 3.1),
     reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(

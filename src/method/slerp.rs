@@ -3,7 +3,7 @@
 use crate::curve::options::Ends;
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
 use crate::reference;
 use crate::shader::Form;
 
@@ -16,18 +16,12 @@ pub const SLERP: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C0,
     keeps_constant_velocity: Keys::Any,
-    interpolates: true,
-    symmetric: true,
     uses_neighbours: false,
     form: Form::Arc,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 10.0,
-        rotation: 1.7,
-    },
+    cost: Cost::new(10.0, 1.7),
     reference: reference::given::SLERP,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves));

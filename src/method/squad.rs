@@ -1,13 +1,11 @@
 //! Spherical quadrangle interpolation.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::{EndHandle, EndInterval, HandleRule, Handles, Interval};
+use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
-use crate::shader::Form;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
 pub const SQUAD: Method = Method {
@@ -18,18 +16,10 @@ pub const SQUAD: Method = Method {
     continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 300.0,
-        rotation: 2.9,
-    },
+    cost: Cost::new(300.0, 2.9),
     reference: reference::handles::SQUAD,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>));
@@ -39,11 +29,7 @@ struct Rule;
 
 impl HandleRule for Rule {
     #[inline(always)]
-    fn handles<A: Algebra>(
-        _: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let bend = sum(after.log, scaled(before.log, A::Number::all(-1.0)));
         Handles {
             incoming: scaled(bend, A::Number::all(0.25)),

@@ -1,9 +1,7 @@
 //! The step method: each key is held until the next.
 
-use crate::curve::options::Ends;
-use crate::method::{Continuity, Cost, Curves, Keys, Method};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, USUAL};
 use crate::reference;
-use crate::shader::Form;
 
 /// Holds each key until the next: for things that switch and do not move.
 pub const STEP: Method = Method {
@@ -14,18 +12,12 @@ pub const STEP: Method = Method {
     continuity: Continuity::Jumps,
     continuity_on_even_keys: Continuity::Jumps,
     keeps_constant_velocity: Keys::Never,
-    interpolates: true,
     symmetric: false,
     uses_neighbours: false,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost {
-        key: 3.4,
-        rotation: 0.87,
-    },
+    cost: Cost::new(3.4, 0.87),
     reference: reference::given::STEP,
     curves: &CURVES,
+    ..USUAL
 };
 
 static CURVES: Curves = Curves::Steps;

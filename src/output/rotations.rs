@@ -1,8 +1,9 @@
-//! The result of an evaluation: the rotation of every track at every sample.
+//! The result of an evaluation: a value of every track at every sample.
 
 use std::fmt;
+use std::marker::PhantomData;
 
-use glam::Quat;
+use glam::{Quat, Vec3, Vec4};
 
 /// The order of a result in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -36,16 +37,23 @@ pub(crate) trait Storage: Send + Sync {
     fn quats(&self) -> &[Quat];
 }
 
-/// The result of an evaluation: unit quaternions, `x y z w` in memory, of shape
+/// The result of an evaluation: a value of every track at every sample, 16 bytes each, of shape
 /// `(tracks, samples)` or `(samples, tracks)`, as the [`Layout`] says.
-pub struct Rotations {
+pub struct Samples<T> {
     storage: Box<dyn Storage>,
     tracks: usize,
     samples: usize,
     layout: Layout,
+    value: PhantomData<T>,
 }
 
-impl Rotations {
+/// Unit quaternions, `x y z w` in memory.
+pub type Rotations = Samples<Quat>;
+
+/// Vectors, `x y z 0` in memory: velocities, accelerations, translations or scales.
+pub type Vectors = Samples<Vec3>;
+
+impl<T> Samples<T> {
     pub(crate) fn new(
         storage: Box<dyn Storage>,
         tracks: usize,
@@ -58,6 +66,7 @@ impl Rotations {
             tracks,
             samples,
             layout,
+            value: PhantomData,
         }
     }
 
@@ -79,6 +88,14 @@ impl Rotations {
         self.layout
     }
 
+    /// Where the value of one track at one sample lies; `None` out of range.
+    fn place(&self, track: usize, sample: usize) -> Option<usize> {
+        let inside = track < self.tracks && sample < self.samples;
+        inside.then(|| (self.layout).index(track, sample, self.tracks, self.samples))
+    }
+}
+
+impl Rotations {
     /// All rotations, without a copy: where a device maps its memory, these are the
     /// values that the device wrote.
     #[must_use]
@@ -89,14 +106,27 @@ impl Rotations {
     /// The rotation of one track at one sample; `None` out of range.
     #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Quat> {
-        let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| self.as_quats()[self.layout.index(track, sample, self.tracks, self.samples)])
+        Some(self.as_quats()[self.place(track, sample)?])
     }
 }
 
-impl fmt::Debug for Rotations {
+impl Vectors {
+    /// All of them, without a copy, each followed by 0.
+    #[must_use]
+    pub fn as_slice(&self) -> &[Vec4] {
+        bytemuck::cast_slice(self.storage.quats())
+    }
+
+    /// The vector of one track at one sample; `None` out of range.
+    #[must_use]
+    pub fn get(&self, track: usize, sample: usize) -> Option<Vec3> {
+        Some(self.as_slice()[self.place(track, sample)?].truncate())
+    }
+}
+
+impl<T> fmt::Debug for Samples<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Rotations")
+        f.debug_struct("Samples")
             .field("tracks", &self.tracks)
             .field("samples", &self.samples)
             .field("layout", &self.layout)

@@ -11,8 +11,7 @@ use crate::gpu::engine::VulkanEngine;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
-use crate::shader::Kernel;
-use crate::shader::PoseDispatch;
+use crate::shader::{Kernel, PoseDispatch};
 
 impl Engine {
     /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
@@ -30,26 +29,19 @@ impl Engine {
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
         finite(&weights)?;
-        self.on_device(|device| {
-            let mut blended = empty(first);
-            let mut gathered: Vec<Quat> = Vec::new();
-            for (start, output) in chunks(&mut blended, limit(device) / layers.len()) {
-                gathered.clear();
-                for &(layer, _) in layers {
-                    gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
-                }
-                let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
-                match device {
-                    None => on_cpu::blend(values, &weights, output),
-                    Some(device) => device.pass(
-                        Kernel::PosesBlend,
-                        &[bytes(values), bytes(&weights)],
-                        pass(output.len(), layers.len()),
-                        bytemuck::cast_slice_mut(output),
-                    )?,
-                }
+        let mut gathered: Vec<Quat> = Vec::new();
+        self.each_rotation(first, layers.len(), |device, start, output| {
+            gathered.clear();
+            for &(layer, _) in layers {
+                gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
             }
-            Ok(like(first, blended))
+            let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
+            let Some(device) = device else {
+                on_cpu::blend(values, &weights, output);
+                return Ok(());
+            };
+            let inputs = [bytes(values), bytes(&weights)];
+            pass(device, Kernel::PosesBlend, &inputs, layers.len(), output)
         })
     }
 
@@ -60,22 +52,16 @@ impl Engine {
     /// When their shapes differ, the weight lies outside, or the device fails.
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to)?;
-        part(weight)?;
-        self.on_device(|device| {
-            let mut mixed = empty(from);
-            for (start, output) in chunks(&mut mixed, limit(device)) {
-                let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
-                match device {
-                    None => on_cpu::mix(a, b, weight, output),
-                    Some(device) => device.pass(
-                        Kernel::PosesMix,
-                        &[bytes(a), bytes(b), bytes(&[weight])],
-                        pass(output.len(), 0),
-                        bytemuck::cast_slice_mut(output),
-                    )?,
-                }
-            }
-            Ok(like(from, mixed))
+        fraction(weight)?;
+        self.each_rotation(from, 1, |device, start, output| {
+            let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
+            let Some(device) = device else {
+                on_cpu::mix(a, b, weight, output);
+                return Ok(());
+            };
+            let weight = [weight];
+            let inputs = [bytes(a), bytes(b), bytes(&weight)];
+            pass(device, Kernel::PosesMix, &inputs, 0, output)
         })
     }
 
@@ -93,39 +79,30 @@ impl Engine {
         weight: f32,
     ) -> Result<Rotations, Error> {
         same_shape(base, layer)?;
-        part(weight)?;
+        fraction(weight)?;
         if reference.len() != base.tracks() {
             return Err(Error::Poses(
                 "give one reference rotation for each track of the layer",
             ));
         }
-        self.on_device(|device| {
-            let mut added = empty(base);
-            let mut own: Vec<[f32; 4]> = Vec::new();
-            for (start, output) in chunks(&mut added, limit(device)) {
-                let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
-                own.clear();
-                own.extend((start..start + output.len()).map(|place| {
-                    let track = match base.layout() {
-                        Layout::TrackMajor => place / base.samples(),
-                        Layout::FrameMajor => place % base.tracks(),
-                    };
-                    reference[track].to_array()
-                }));
-                match device {
-                    None => on_cpu::add(a, b, &own, weight, output),
-                    Some(device) => {
-                        own.push([weight, 0.0, 0.0, 0.0]);
-                        device.pass(
-                            Kernel::PosesAdd,
-                            &[bytes(a), bytes(b), bytes(&own)],
-                            pass(output.len(), 0),
-                            bytemuck::cast_slice_mut(output),
-                        )?;
-                    }
-                }
-            }
-            Ok(like(base, added))
+        let mut own: Vec<[f32; 4]> = Vec::new();
+        self.each_rotation(base, 1, |device, start, output| {
+            let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
+            own.clear();
+            own.extend((start..start + output.len()).map(|place| {
+                let track = match base.layout() {
+                    Layout::TrackMajor => place / base.samples(),
+                    Layout::FrameMajor => place % base.tracks(),
+                };
+                reference[track].to_array()
+            }));
+            let Some(device) = device else {
+                on_cpu::add(a, b, &own, weight, output);
+                return Ok(());
+            };
+            own.push([weight, 0.0, 0.0, 0.0]);
+            let inputs = [bytes(a), bytes(b), bytes(&own)];
+            pass(device, Kernel::PosesAdd, &inputs, 0, output)
         })
     }
 
@@ -174,7 +151,7 @@ impl Engine {
                     Some(device) => device.pass(
                         Kernel::PosesWorld,
                         &[bytes(&frame_major), bytes(&links)],
-                        pass(count, tracks),
+                        dispatch(count, tracks),
                         bytemuck::cast_slice_mut(output),
                     )?,
                 }
@@ -184,6 +161,30 @@ impl Engine {
                 tracks,
                 samples,
             })
+        })
+    }
+
+    /// Makes a result shaped like another, some rotations at a time: `work` gets the device, where
+    /// they start and their memory. It reads `layers` values for each of them.
+    fn each_rotation(
+        &self,
+        like: &Rotations,
+        layers: usize,
+        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), Error>,
+    ) -> Result<Rotations, Error> {
+        self.on_device(|device| {
+            let mut made = OutputBuffer::new(like.as_quats().len());
+            let most = (limit(device) / layers).clamp(1, 1 << 40);
+            for (start, output) in (0..).step_by(most).zip(made.chunks_mut(most)) {
+                work(device, start, bytemuck::cast_slice_mut(output))?;
+            }
+            let (tracks, samples) = (like.tracks(), like.samples());
+            Ok(Rotations::new(
+                Box::new(made),
+                tracks,
+                samples,
+                like.layout(),
+            ))
         })
     }
 
@@ -271,28 +272,12 @@ fn finite(weights: &[f32]) -> Result<(), Error> {
     }
 }
 
-fn part(weight: f32) -> Result<(), Error> {
+fn fraction(weight: f32) -> Result<(), Error> {
     if (0.0..=1.0).contains(&weight) {
         Ok(())
     } else {
         Err(Error::Poses("a weight of slerp lies between 0 and 1"))
     }
-}
-
-fn empty(layer: &Rotations) -> OutputBuffer {
-    OutputBuffer::new(layer.as_quats().len())
-}
-
-fn like(layer: &Rotations, quats: OutputBuffer) -> Rotations {
-    let (tracks, samples) = (layer.tracks(), layer.samples());
-    Rotations::new(Box::new(quats), tracks, samples, layer.layout())
-}
-
-/// Slices of at most `limit` values, and where they start.
-fn chunks(quats: &mut [Quat], limit: usize) -> impl Iterator<Item = (usize, &mut [[f32; 4]])> {
-    let limit = limit.clamp(1, 1 << 40);
-    let chunks = quats.chunks_mut(limit).map(bytemuck::cast_slice_mut);
-    (0..).step_by(limit).zip(chunks)
 }
 
 fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
@@ -303,7 +288,19 @@ fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
-fn pass(count: usize, detail: usize) -> PoseDispatch {
+/// Runs a kernel that makes one value in each invocation.
+fn pass(
+    device: &VulkanEngine,
+    kernel: Kernel,
+    inputs: &[&[u8]],
+    detail: usize,
+    output: &mut [[f32; 4]],
+) -> Result<(), Error> {
+    let dispatch = dispatch(output.len(), detail);
+    Ok(device.pass(kernel, inputs, dispatch, bytemuck::cast_slice_mut(output))?)
+}
+
+fn dispatch(count: usize, detail: usize) -> PoseDispatch {
     PoseDispatch {
         count: count as u32,
         detail: detail as u32,

@@ -3,8 +3,7 @@
 use glam::Vec3;
 
 use crate::math::canonical::canonical;
-use crate::shader::Link;
-use crate::shader::ROOT;
+use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,14 +1,12 @@
 //! Rotations with the translations and the scales beside them.
 
-use glam::{Vec3, Vec4};
-
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::output::rotations::{Layout, Rotations};
+use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::prepare::clip_data::ClipData;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -23,25 +21,6 @@ pub struct Transforms {
     pub rotations: Rotations,
     /// Scales; 1 for tracks that have no keys of them.
     pub scales: Vectors,
-}
-
-/// A vector of every track at every sample, `x y z 0` in memory.
-#[derive(Debug)]
-pub struct Vectors(Rotations);
-
-impl Vectors {
-    /// The vector of one track at one sample; `None` out of range.
-    #[must_use]
-    pub fn get(&self, track: usize, sample: usize) -> Option<Vec3> {
-        let [x, y, z, _] = self.0.get(track, sample)?.to_array();
-        Some(Vec3::new(x, y, z))
-    }
-
-    /// All of them, in the order of the rotations beside them.
-    #[must_use]
-    pub fn as_slice(&self) -> &[Vec4] {
-        bytemuck::cast_slice(self.0.as_quats())
-    }
 }
 
 impl Engine {
@@ -100,6 +79,6 @@ impl Engine {
         let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes);
         let uploaded = Uploaded::of_data(&self.backend, data, None)?;
         let clip = Clip::new(self.clone(), uploaded);
-        clip.evaluate_as(frames, layout).map(Vectors)
+        clip.samples(frames, layout)
     }
 }

@@ -92,44 +92,34 @@ impl Prepare for ArcPreparation {
         prepared.constants.extend_from_slice(&keys[start..=end]);
         // Every interval has one span and one segment; a long arc has two of each.
         let segments = (prepared.segments.len() + self.block.count) as u32;
-        let spans = &mut prepared.spans;
         if long.is_empty() {
             let own = &track.times[intervals.clone()];
-            spans.starts.extend_from_slice(own);
-            spans.keys.extend(first_key..last_key);
+            prepared.spans.starts.extend_from_slice(own);
+            prepared.spans.keys.extend(first_key..last_key);
+            let signs = self.path.signs(set, index);
+            self.push(prepared, keys, signs, intervals.clone());
         } else {
             let mut halves = long.iter().peekable();
             for (key, constant) in intervals.clone().zip(first_key..) {
                 let [from, to] = [track.times[key], track.times[key + 1]];
-                spans.starts.push(from);
-                spans.keys.push(constant);
-                if halves.next_if(|half| half.key == key).is_some() {
-                    spans.starts.push(from + (to - from) * 0.5);
-                    spans.keys.push(NONE);
+                prepared.spans.starts.push(from);
+                prepared.spans.keys.push(constant);
+                let mut start = keys[key];
+                if let Some(half) = halves.next_if(|half| half.key == key) {
+                    prepared.spans.starts.push(from + (to - from) * 0.5);
+                    prepared.spans.keys.push(NONE);
+                    self.push_arc(prepared, start, half.middle);
+                    start = half.middle;
                 }
+                self.push_arc(prepared, start, keys[key + 1]);
             }
         }
+        let spans = &mut prepared.spans;
         let count = spans.starts.len() - first_span;
         let sources = (segments..segments + count as u32).map(Source::Segment);
         spans.sources.extend(sources);
         let spans = first_span..first_span + count;
         prepared.push_part((index, track), &intervals, spans, [first_key, last_key]);
-        if long.is_empty() {
-            self.push(prepared, keys, self.path.signs(set, index), intervals);
-            return Ok(());
-        }
-        let mut halves = long.iter().peekable();
-        for key in intervals {
-            let middle = halves.next_if(|half| half.key == key);
-            if let Some(half) = middle {
-                let lane = self.lane(prepared);
-                self.block.from[lane] = keys[key];
-                self.block.to[lane] = half.middle;
-            }
-            let lane = self.lane(prepared);
-            self.block.from[lane] = middle.map_or(keys[key], |half| half.middle);
-            self.block.to[lane] = keys[key + 1];
-        }
         Ok(())
     }
 
@@ -188,14 +178,15 @@ impl ArcPreparation {
         }
     }
 
-    /// The next lane that is free.
-    #[inline(always)]
-    fn lane(&mut self, prepared: &mut Prepared) -> usize {
+    fn push_arc(&mut self, prepared: &mut Prepared, from: [f32; 4], to: [f32; 4]) {
         if self.block.count == LANES {
             self.flush(prepared);
         }
+        (
+            self.block.from[self.block.count],
+            self.block.to[self.block.count],
+        ) = (from, to);
         self.block.count += 1;
-        self.block.count - 1
     }
 
     fn flush(&mut self, prepared: &mut Prepared) {
@@ -212,13 +203,13 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::simd::dispatch::tests::at_every_width;
+    use crate::simd::dispatch::tests::same_at_every_width;
 
     /// Catches an instruction set whose code fuses, reorders or divides otherwise:
     /// segments must not depend on the machine that prepared them.
     #[test]
     fn every_vector_width_prepares_the_same_bits() {
-        let filled = || {
+        same_at_every_width(|| {
             let mut block = ArcBlock::new();
             for lane in 0..LANES - 3 {
                 let step = 10.0f32.powi(-(lane as i32 % 8)) * 3.0;
@@ -235,11 +226,6 @@ mod tests {
                 let components: &[f32] = all.as_flattened();
                 components.iter().map(|c| c.to_bits()).collect::<Vec<_>>()
             })
-        };
-        let results = at_every_width(filled);
-        let (_, expected) = &results[0];
-        for (width, found) in &results {
-            assert!(found == expected, "{width:?}");
-        }
+        });
     }
 }

@@ -3,14 +3,12 @@
 
 use std::ops::Range;
 
-use glam::Quat;
-
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
 /// Key intervals of a long track that are prepared as one part.
-pub(crate) const PART: usize = 4096;
+pub(crate) const PART_INTERVALS: usize = 4096;
 
 /// What is prepared together.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,17 +40,6 @@ impl Batch {
         self.tracks().map(move |track| {
             let all = || 0..set.times_and_keys(track).1.len() - 1;
             (track, own.clone().unwrap_or_else(all))
-        })
-    }
-
-    /// The times and keys of its intervals, one pair of slices for each track.
-    pub(crate) fn times_and_keys<'a>(
-        &self,
-        set: &'a TrackSet,
-    ) -> impl Iterator<Item = (&'a [f64], &'a [Quat])> {
-        self.intervals(set).map(|(track, own)| {
-            let (times, keys) = set.times_and_keys(track);
-            (&times[own.start..=own.end], &keys[own.start..=own.end])
         })
     }
 
@@ -98,67 +85,39 @@ pub(crate) struct BatchSize {
 }
 
 /// The batches of a set's tracks, or of a batch, in order.
-pub(crate) struct Batches<'a> {
-    set: &'a TrackSet,
-    size: BatchSize,
-    tracks: Range<usize>,
-    /// The track that is being cut, and its remaining intervals.
-    long: Option<(usize, Range<usize>)>,
-}
-
-impl<'a> Batches<'a> {
-    pub(crate) fn new(set: &'a TrackSet, whole: Batch, size: BatchSize) -> Self {
-        let (tracks, long) = match whole {
-            Batch::Tracks(tracks) => (tracks, None),
-            Batch::Intervals { track, intervals } => (0..0, Some((track, intervals))),
-        };
-        Self {
-            set,
-            size,
-            tracks,
-            long,
+pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batch> {
+    let each = size.cut.unwrap_or(usize::MAX);
+    let parts = |track: usize, own: Range<usize>| {
+        own.clone()
+            .step_by(each)
+            .map(move |start| Batch::Intervals {
+                track,
+                intervals: start..own.end.min(start.saturating_add(each)),
+            })
+    };
+    let tracks = match whole {
+        Batch::Tracks(tracks) => tracks,
+        Batch::Intervals { track, intervals } => return parts(track, intervals).collect(),
+    };
+    let (mut all, mut start) = (Vec::new(), tracks.start);
+    while start < tracks.end {
+        let most = (tracks.end).min(start.saturating_add(size.tracks.max(1)));
+        let next = set.tracks_within(start..most, size.keys);
+        let intervals = 0..set.times_and_keys(start).1.len() - 1;
+        if next == start && each < intervals.len() {
+            all.extend(parts(start, intervals));
+        } else {
+            all.push(Batch::Tracks(start..next.max(start + 1)));
         }
+        start = next.max(start + 1);
     }
-}
-
-impl Iterator for Batches<'_> {
-    type Item = Batch;
-
-    fn next(&mut self) -> Option<Batch> {
-        if let Some((track, left)) = &mut self.long {
-            let own = self.size.cut.unwrap_or(usize::MAX).min(left.len());
-            let batch = Batch::Intervals {
-                track: *track,
-                intervals: left.start..left.start + own,
-            };
-            left.start += own;
-            if left.start == left.end {
-                self.long = None;
-            }
-            return Some(batch);
-        }
-        let Range { start, end } = self.tracks;
-        if start == end {
-            return None;
-        }
-        let most = end.min(start.saturating_add(self.size.tracks.max(1)));
-        let next = self.set.tracks_within(start..most, self.size.keys);
-        if next > start {
-            self.tracks.start = next;
-            return Some(Batch::Tracks(start..next));
-        }
-        self.tracks.start = start + 1;
-        let intervals = 0..self.set.times_and_keys(start).1.len() - 1;
-        if self.size.cut.is_some_and(|cut| cut < intervals.len()) {
-            self.long = Some((start, intervals));
-            return self.next();
-        }
-        Some(Batch::Tracks(start..start + 1))
-    }
+    all
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
     use crate::time::frames::Frames;
 
@@ -181,7 +140,7 @@ mod tests {
             cut: Some(12),
         };
         let intervals = |track, intervals| Batch::Intervals { track, intervals };
-        let found: Vec<Batch> = Batches::new(&set, Batch::Tracks(0..8), size).collect();
+        let found: Vec<Batch> = batches(&set, Batch::Tracks(0..8), size);
         let expected = [
             Batch::Tracks(0..2),
             Batch::Tracks(2..4),
@@ -195,18 +154,15 @@ mod tests {
         assert_eq!(found, expected);
         let timeline = Frames::fps(2).resolve(8, set.time_span()).unwrap();
         let samples: Vec<_> = (found[2..5].iter())
-            .map(|batch| batch.samples(&set, &timeline, PART))
+            .map(|batch| batch.samples(&set, &timeline, PART_INTERVALS))
             .collect();
         assert_eq!(samples, [0..24, 24..48, 48..59]);
-        assert_eq!(found[0].samples(&set, &timeline, PART), 0..59);
+        assert_eq!(found[0].samples(&set, &timeline, PART_INTERVALS), 0..59);
 
         let whole = BatchSize { cut: None, ..size };
-        let long = Batches::new(&set, Batch::Tracks(4..5), whole).collect::<Vec<_>>();
+        let long = batches(&set, Batch::Tracks(4..5), whole);
         assert_eq!(long, [Batch::Tracks(4..5)]);
-        let of_batch = Batches::new(&set, intervals(4, 3..20), size);
-        assert_eq!(
-            of_batch.collect::<Vec<_>>(),
-            [intervals(4, 3..15), intervals(4, 15..20)]
-        );
+        let of_batch = batches(&set, intervals(4, 3..20), size);
+        assert_eq!(of_batch, [intervals(4, 3..15), intervals(4, 15..20)]);
     }
 }

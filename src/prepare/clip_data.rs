@@ -11,7 +11,7 @@ use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
 use crate::curve::segment::segment_size;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::prepare::batch::{Batch, BatchSize, Batches, PART};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
@@ -74,11 +74,11 @@ impl Wanted<'_> {
     /// each thread, within the limit of bytes.
     fn group_keys(&self, set: &TrackSet, form: Form) -> usize {
         let (Some(limit), true) = (self.group_bytes, self.few_groups) else {
-            return PART;
+            return PART_INTERVALS;
         };
         let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
         let each = set.keys_of(self.batch.tracks()) / (4 * rayon::current_num_threads());
-        each.min(most).max(PART)
+        each.min(most).max(PART_INTERVALS)
     }
 }
 
@@ -91,7 +91,7 @@ fn prepare(
     let size = BatchSize {
         keys: wanted.group_keys(set, interpolation.form()),
         tracks: usize::MAX,
-        cut: (interpolation.speed == Speed::AsKeyed).then_some(PART),
+        cut: (interpolation.speed == Speed::AsKeyed).then_some(PART_INTERVALS),
     };
     let only_for = (wanted.only_for).filter(|_| interpolation.wrap().are_held());
     let first_track = wanted.batch.tracks().start as u32;
@@ -114,7 +114,7 @@ fn prepare(
         }
         Ok(prepared)
     };
-    let batches: Vec<Batch> = Batches::new(set, wanted.batch, size).collect();
+    let batches: Vec<Batch> = batches(set, wanted.batch, size);
     batches.into_par_iter().map(group).collect()
 }
 

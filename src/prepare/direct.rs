@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::curve::options::Ends;
 use crate::fit::double::handles::Steps;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, Part, WHOLE};
+use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
 use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
 use crate::fit::single::hermite_fit::Halves;
 use crate::fit::single::key_steps::{FindSteps, KeySteps};
@@ -16,8 +16,8 @@ use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
+use crate::prepare::lane_lists::{List, fit};
 use crate::prepare::prepared::Prepared;
-use crate::prepare::waiting_curves::{List, WaitingCurves, fit};
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::NONE;
 
@@ -39,13 +39,9 @@ pub(crate) struct Direct {
     places: [u32; ROOM],
     /// Lanes that are fitted whole by degree 10.
     usual: List,
-    /// Curves that are fitted with degree 8, and curves that are split at their middle. A block has
-    /// few of each, so they wait until they fill a block.
-    few_powers: WaitingCurves<Part<1, 4>, 4>,
-    halves: WaitingCurves<Halves, 5>,
-    /// Lanes with a squared extent above [`LONGEST_WHOLE`], before they are divided into `halves`
-    /// and `left_over`.
-    long: List,
+    /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
+    few_powers: List,
+    halves: List,
     /// 1 if a lane becomes two spans, else 0.
     cut: [u32; ROOM],
     /// The start times of new spans, in seconds, and the constants there.
@@ -71,9 +67,8 @@ impl Direct {
             spans: [0; ROOM],
             places: [0; ROOM],
             usual: List::new(),
-            few_powers: WaitingCurves::new(&FEW_POWERS),
-            halves: WaitingCurves::new(&Halves),
-            long: List::new(),
+            few_powers: List::new(),
+            halves: List::new(),
             cut: [0; ROOM],
             starts: [0.0; SPANS],
             keys: [NONE; SPANS],
@@ -146,22 +141,14 @@ impl Direct {
         let is_usual = |squared_extent: f32| squared_extent > few && squared_extent <= whole;
         (self.usual).push_where(lanes.clone(), energies, is_usual);
         let takes_few = |squared_extent: f32| squared_extent >= 0.0 && squared_extent <= few;
-        (self.few_powers.lanes).push_where(lanes.clone(), energies, takes_few);
+        (self.few_powers).push_where(lanes.clone(), energies, takes_few);
         let is_cut = |squared_extent: f32| squared_extent > whole && squared_extent <= direct;
         for (cut, &squared_extent) in self.cut[lanes.clone()].iter_mut().zip(energies) {
             *cut = u32::from(is_cut(squared_extent));
         }
-        let is_long = |squared_extent: f32| squared_extent > whole || squared_extent.is_nan();
-        (self.long).push_where(lanes.clone(), energies, is_long);
-        for lane in self.long.iter() {
-            let squared_extent = self.whole.energies[lane];
-            if squared_extent <= direct {
-                self.halves.lanes.push(lane);
-            } else {
-                self.left_over.push(lane);
-            }
-        }
-        self.long.clear();
+        (self.halves).push_where(lanes.clone(), energies, is_cut);
+        let is_left = |squared_extent: f32| squared_extent > direct || squared_extent.is_nan();
+        (self.left_over).push_where(lanes, energies, is_left);
     }
 
     /// Adds the spans and the segments that lanes become.
@@ -203,11 +190,10 @@ impl Direct {
         fitting: &mut Fitting,
     ) {
         let (numbers, places) = (&self.whole.numbers, &self.places);
-        fit(&WHOLE, &self.usual, numbers, places, prepared);
-        self.usual.clear();
-        self.few_powers.take(numbers, places, prepared);
-        self.halves.take(numbers, places, prepared);
-        let are_many = MOST_ALONE * self.left_over.count() > intervals.count;
+        fit(&WHOLE, &mut self.usual, numbers, places, prepared);
+        fit(&FEW_POWERS, &mut self.few_powers, numbers, places, prepared);
+        fit(&Halves, &mut self.halves, numbers, places, prepared);
+        let are_many = MOST_ALONE * self.left_over.count > intervals.count;
         if are_many && !is_exact {
             in_lanes(&mut Steps(intervals));
             (self.smooth.curves)(intervals, stretches, self.ends);
@@ -250,8 +236,6 @@ impl Direct {
 
     /// Fits the curves that still wait, and hands those left over to `fitting`.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        self.few_powers.finish(prepared);
-        self.halves.finish(prepared);
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use crate::curve::options::Quantity;
 use crate::fit::constant_velocity::SteadyBlock;
 use crate::fit::double::curve::Curve;
-use crate::fit::double::cut::{Cutter, Part as CurvePart};
+use crate::fit::double::cut::{Cutter, Subcurve};
 use crate::fit::double::fit::{FitBlock, Tier, tier};
 use crate::fit::double::intervals::{Intervals, LANES};
 use crate::fit::double::shape::Shape;
@@ -159,14 +159,14 @@ impl Fitting {
             block.write(&mut prepared.segments.polynomials);
         }
         self.cutter.cut(&mut prepared.segments.polynomials);
-        prepared.put_parts(&self.cutter, &mut self.uncut);
+        prepared.put_subcurves(&self.cutter, &mut self.uncut);
         self.cutter.clear();
     }
 }
 
 /// Fits the curves of a block, which belong to the first of the `spans`.
 fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
-    let own = &spans[..block.count()];
+    let own = &spans[..block.count];
     let sources = &prepared.spans.sources;
     let places = own.iter().filter_map(|&span| match sources[span] {
         Source::Segment(place) => Some(place as usize),
@@ -177,11 +177,11 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     if !block.is_trusted() {
         for (lane, &span) in own.iter().enumerate() {
             if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), block.place(lane));
+                cutter.push(span, block.curve(lane), block.places[lane]);
             }
         }
     }
-    spans.drain(..block.count());
+    spans.drain(..block.count);
     block.clear();
 }
 
@@ -217,8 +217,8 @@ impl Prepared {
     }
 
     /// Replaces the spans of curves that were cut by those of their parts.
-    fn put_parts(&mut self, cutter: &Cutter, uncut: &mut Spans) {
-        let mut cut = cutter.parts();
+    fn put_subcurves(&mut self, cutter: &Cutter, uncut: &mut Spans) {
+        let mut cut = cutter.subcurves();
         let Some(first) = cut.first().map(|part| part.span) else {
             return;
         };
@@ -259,11 +259,11 @@ impl Prepared {
     fn put_first<'c>(
         &mut self,
         cutter: &Cutter,
-        parts: &'c [CurvePart],
+        parts: &'c [Subcurve],
         uncut: &Spans,
         span: usize,
         end: f64,
-    ) -> &'c [CurvePart] {
+    ) -> &'c [Subcurve] {
         let (start, key) = (uncut.starts[span], uncut.keys[span]);
         let count = (parts.iter())
             .take_while(|part| part.span == parts[0].span)

@@ -12,17 +12,7 @@ use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks whose keys are held.
-pub(crate) struct StepPreparation {
-    interpolation: Interpolation,
-}
-
-impl StepPreparation {
-    pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        Self {
-            interpolation: *interpolation,
-        }
-    }
-}
+pub(crate) struct StepPreparation(pub(crate) Interpolation);
 
 impl Prepare for StepPreparation {
     fn add(
@@ -33,10 +23,10 @@ impl Prepare for StepPreparation {
         intervals: Range<usize>,
     ) -> Result<(), InterpolationError> {
         let track = set.track(index);
-        self.interpolation.ends.check(track.keys, index)?;
+        self.0.ends.check(track.keys, index)?;
         let first = prepared.constants.len() as u32;
         let last = first + intervals.len() as u32;
-        let stands_still = self.interpolation.quantity != Quantity::Rotation;
+        let stands_still = self.0.quantity != Quantity::Rotation;
         let value = |key: &Quat| {
             if stands_still {
                 [0.0; 4]

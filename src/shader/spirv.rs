@@ -41,17 +41,20 @@ mod op {
 const DECORATION_NO_CONTRACTION: u32 = 42;
 
 /// Why a module was refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpirvError {
     /// Too short, or not starting with the magic number.
+    #[error("not a SPIR-V module")]
     NotSpirv,
     /// An instruction runs past the end of the module, or has no length.
+    #[error("instruction at word {word} is cut short")]
     Truncated {
         /// Offset of the instruction in words.
         word: usize,
     },
     /// An instruction whose result Vulkan does not define to the last bit.
+    #[error("opcode {opcode} at word {word} does not round exactly; use only + - * and integers")]
     Inexact {
         /// Offset of the instruction in words.
         word: usize,
@@ -59,36 +62,16 @@ pub enum SpirvError {
         opcode: u16,
     },
     /// A floating-point type other than 32 bits wide.
+    #[error("a float type of {bits} bits; only 32 are exact everywhere")]
     FloatWidth {
         /// Its width in bits.
         bits: u32,
     },
     /// The module has no types, memory model or entry point, so there is no place for the
     /// additions.
+    #[error("the module has no memory model, entry point or types")]
     Incomplete,
 }
-
-impl std::fmt::Display for SpirvError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NotSpirv => write!(f, "not a SPIR-V module"),
-            Self::Truncated { word } => write!(f, "instruction at word {word} is cut short"),
-            Self::Inexact { word, opcode } => write!(
-                f,
-                "opcode {opcode} at word {word} does not round exactly; use only + - * and integers"
-            ),
-            Self::FloatWidth { bits } => {
-                write!(
-                    f,
-                    "a float type of {bits} bits; only 32 are exact everywhere"
-                )
-            }
-            Self::Incomplete => write!(f, "the module has no memory model, entry point or types"),
-        }
-    }
-}
-
-impl std::error::Error for SpirvError {}
 
 /// One instruction: where it starts, its opcode and its words.
 struct Instruction<'a> {
@@ -130,28 +113,16 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
-        let Instruction {
-            start,
-            opcode,
-            words,
-        } = *instruction;
+        let (start, opcode, words) = (instruction.start, instruction.opcode, instruction.words);
         match opcode {
             op::TYPE_FLOAT if words.len() > 2 && words[2] != 32 => {
                 return Err(SpirvError::FloatWidth { bits: words[2] });
             }
             // Every built-in function of GLSL.std.450 that naga would emit for our
             // shaders is one of those that round freely.
-            op::EXT_INST => {
-                return Err(SpirvError::Inexact {
-                    word: start,
-                    opcode,
-                });
-            }
-            _ if op::INEXACT.contains(&opcode) => {
-                return Err(SpirvError::Inexact {
-                    word: start,
-                    opcode,
-                });
+            _ if opcode == op::EXT_INST || op::INEXACT.contains(&opcode) => {
+                let word = start;
+                return Err(SpirvError::Inexact { word, opcode });
             }
             _ if op::EXACT.contains(&opcode) => {
                 results.insert(*words.get(2).ok_or(SpirvError::Truncated { word: start })?);

@@ -125,15 +125,17 @@ pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
 /// Does work over lanes with vectors of a width, or of the next narrower one that the processor
 /// has.
 pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
-    match width.narrowed() {
-        #[cfg(wide_vectors)]
-        // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
-        VectorWidth::Avx512 => unsafe { avx512(work) },
-        #[cfg(wide_vectors)]
-        // SAFETY: the processor has AVX2, likewise.
-        VectorWidth::Avx2 => unsafe { avx2(work) },
-        _ => baseline(work),
+    struct InPlace;
+
+    impl<W: InLanes> InLanesInto<W> for InPlace {
+        type Outcome = ();
+
+        #[inline(always)]
+        fn run<L: Lanes>(&self, work: &mut W) {
+            work.run::<L>();
+        }
     }
+    in_lanes_into(width, &InPlace, work);
 }
 
 /// As [`InLanes`], with the output as an argument of its own. Behind the one `&mut self` of
@@ -156,45 +158,28 @@ pub(crate) fn in_lanes_into<W: InLanesInto<O>, O: ?Sized>(
     match width.narrowed() {
         #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
-        VectorWidth::Avx512 => unsafe { avx512_into(work, output) },
+        VectorWidth::Avx512 => unsafe { avx512(work, output) },
         #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX2, likewise.
-        VectorWidth::Avx2 => unsafe { avx2_into(work, output) },
-        _ => baseline_into(work, output),
+        VectorWidth::Avx2 => unsafe { avx2(work, output) },
+        _ => baseline(work, output),
     }
 }
 
 #[inline(never)]
-fn baseline<W: InLanes>(work: &mut W) {
-    work.run::<Vec4>();
-}
-
-#[inline(never)]
-fn baseline_into<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
+fn baseline<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
     work.run::<Vec4>(output)
 }
 
 #[cfg(wide_vectors)]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-fn avx512<W: InLanes>(work: &mut W) {
-    work.run::<Sixteen>();
-}
-
-#[cfg(wide_vectors)]
-#[target_feature(enable = "avx2")]
-fn avx2<W: InLanes>(work: &mut W) {
-    work.run::<Eight>();
-}
-
-#[cfg(wide_vectors)]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-fn avx512_into<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
+fn avx512<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
     work.run::<Sixteen>(output)
 }
 
 #[cfg(wide_vectors)]
 #[target_feature(enable = "avx2")]
-fn avx2_into<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
+fn avx2<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
     work.run::<Eight>(output)
 }
 
@@ -227,21 +212,6 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     None
 }
 
-/// Bytes of a cache line on most processors.
-pub(crate) const CACHE_LINE: usize = 64;
-
-/// Prefetches memory into the second-level cache, while other work goes on.
-pub(crate) fn bring_near(memory: &[u8]) {
-    #[cfg(target_arch = "x86_64")]
-    for line in memory.chunks(CACHE_LINE) {
-        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        // SAFETY: SSE is part of x86-64, and a prefetch gives no value.
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = memory;
-}
-
 /// Orders this thread's streaming stores: others see them before anything it stores from here on.
 pub(crate) fn fence() {
     #[cfg(target_arch = "x86_64")]
@@ -270,6 +240,16 @@ pub(crate) mod tests {
         let results = VectorWidth::available().into_iter().map(at).collect();
         WIDTH.set(None);
         results
+    }
+
+    /// What `work` gives on this thread, which must be the same at every width.
+    pub(crate) fn same_at_every_width<R: PartialEq>(work: impl Fn() -> R) -> R {
+        let mut results = at_every_width(work).into_iter();
+        let (_, expected) = results.next().expect("the baseline");
+        for (width, found) in results {
+            assert!(found == expected, "{width:?}");
+        }
+        expected
     }
 
     #[test]

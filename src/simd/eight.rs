@@ -14,12 +14,10 @@ use std::cell::Cell;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::shader::POWERS;
-use crate::shader::PolynomialSegment;
-use crate::shader::TINY_BITS;
+use crate::math::operators::operators;
+use crate::shader::{POWERS, PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::doubles;
 use crate::simd::lanes::{Lanes, Number};
-use crate::simd::operators::operators;
 
 /// Calls instructions of AVX2.
 macro_rules! avx2 {
@@ -39,7 +37,21 @@ pub(crate) struct Eight(__m256);
 #[repr(C, align(32))]
 pub(crate) struct HalfLine([[f32; 4]; 2]);
 
-operators!(Eight: avx2, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_xor_ps);
+operators! {
+    [] Eight, a, b:
+    Add add => Self(avx2!(_mm256_add_ps(a.0, b.0)));
+    Sub sub => Self(avx2!(_mm256_sub_ps(a.0, b.0)));
+    Mul mul => Self(avx2!(_mm256_mul_ps(a.0, b.0)));
+}
+
+impl std::ops::Neg for Eight {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(avx2!(_mm256_xor_ps(self.0, Self::all(-0.0).0)))
+    }
+}
 
 impl Number for Eight {
     #[inline(always)]
@@ -144,10 +156,9 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
-        let rotations: [[f32; 4]; 8] = *rotations.first_chunk().expect("eight rotations");
-        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(rotations);
-        Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
+        let rotations: [[f32; 4]; 2] = *rotations.first_chunk().expect("two rotations");
+        Self(bytemuck::cast(rotations))
     }
 
     #[inline(always)]
@@ -160,22 +171,6 @@ impl Lanes for Eight {
             Self::of_two(rotations[e as usize], rotations[f as usize]),
             Self::of_two(rotations[g as usize], rotations[h as usize]),
         ])
-    }
-
-    #[inline(always)]
-    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
-        let from: [[f32; 4]; 8] = *from.first_chunk().expect("eight rotations");
-        let to: [[f32; 4]; 8] = *to.first_chunk().expect("eight rotations");
-        let [a, b, c, d] = bytemuck::cast::<_, [__m256; 4]>(from);
-        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(to);
-        // Multiplied before the transposition, so that only the products are transposed.
-        let [x, y, z, w] = Self::transposed([
-            Self(a) * Self(e),
-            Self(b) * Self(f),
-            Self(c) * Self(g),
-            Self(d) * Self(h),
-        ]);
-        x + y + z + w
     }
 
     #[inline(always)]
@@ -293,24 +288,6 @@ impl Lanes for Eight {
         avx2! {
             let within = _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0);
             _mm256_movemask_ps(within) != 0
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cpu::evaluate::tests::runs_are_samples;
-    use crate::simd::dispatch::VectorWidth;
-    use crate::simd::doubles::tests::doubles_are_samples;
-    use crate::simd::lanes::tests::lanes_are_samples;
-
-    #[test]
-    fn eight_lanes_are_samples() {
-        if VectorWidth::available().contains(&VectorWidth::Avx2) {
-            lanes_are_samples::<Eight>();
-            doubles_are_samples::<Eight>();
-            runs_are_samples::<Eight>();
         }
     }
 }

@@ -7,8 +7,7 @@ use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
 use crate::math::quaternion::{Arithmetic, Real};
-use crate::shader::PolynomialSegment;
-use crate::shader::TINY_BITS;
+use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::Four;
 
 /// The number of one sample, or a vector with the numbers of several samples. An operation rounds
@@ -70,13 +69,38 @@ pub(crate) trait Lanes: Number {
     fn store(self, samples: &mut [f32]);
 
     /// Loads the first [`Lanes::COUNT`] rotations, a vector for each of `x y z w`.
-    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4];
+    #[inline(always)]
+    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
+        let (all, each) = (&rotations[..Self::COUNT], Self::COUNT / 4);
+        // Written out: closures are not always inlined.
+        Self::transposed([
+            Self::load_side_by_side(all),
+            Self::load_side_by_side(&all[each..]),
+            Self::load_side_by_side(&all[2 * each..]),
+            Self::load_side_by_side(&all[3 * each..]),
+        ])
+    }
 
     /// The same for rotations that lie at the first [`Lanes::COUNT`] of the `places`.
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
 
     /// The inner products of the first [`Lanes::COUNT`] pairs of rotations.
-    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self;
+    #[inline(always)]
+    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
+        let (from, to) = (&from[..Self::COUNT], &to[..Self::COUNT]);
+        let each = Self::COUNT / 4;
+        // Multiplied before the transposition, so that only the products are transposed.
+        let [x, y, z, w] = Self::transposed([
+            Self::load_side_by_side(from) * Self::load_side_by_side(to),
+            Self::load_side_by_side(&from[each..]) * Self::load_side_by_side(&to[each..]),
+            Self::load_side_by_side(&from[2 * each..]) * Self::load_side_by_side(&to[2 * each..]),
+            Self::load_side_by_side(&from[3 * each..]) * Self::load_side_by_side(&to[3 * each..]),
+        ]);
+        x + y + z + w
+    }
+
+    /// Loads the first of some rotations, a quarter of [`Lanes::COUNT`]: `x y z w x y z w …`.
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self;
 
     /// One rotation, repeated: `x y z w x y z w …`.
     fn repeated(rotation: [f32; 4]) -> Self;
@@ -196,9 +220,8 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
-        let columns: &[[f32; 4]; 4] = rotations.first_chunk().expect("four rotations");
-        rows(Mat4::from_cols_array_2d(columns))
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
+        Self::from_array(rotations[0])
     }
 
     #[inline(always)]
@@ -211,20 +234,6 @@ impl Lanes for Vec4 {
             rotations[d as usize],
         ];
         rows(Mat4::from_cols_array_2d(&columns))
-    }
-
-    #[inline(always)]
-    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
-        let from: &[[f32; 4]; 4] = from.first_chunk().expect("four rotations");
-        let to: &[[f32; 4]; 4] = to.first_chunk().expect("four rotations");
-        // Multiplied before the transposition, so that only the products are transposed.
-        let [x, y, z, w] = rows(Mat4::from_cols(
-            Self::from(from[0]) * Self::from(to[0]),
-            Self::from(from[1]) * Self::from(to[1]),
-            Self::from(from[2]) * Self::from(to[2]),
-            Self::from(from[3]) * Self::from(to[3]),
-        ));
-        x + y + z + w
     }
 
     #[inline(always)]
@@ -304,11 +313,13 @@ fn rows(columns: Mat4) -> [Vec4; 4] {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
     use crate::cpu::evaluate::tests::runs_are_samples;
+    use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+    use crate::simd::doubles::tests::doubles_are_samples;
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
@@ -341,7 +352,7 @@ pub(crate) mod tests {
 
     /// Catches lanes that are stored in another order than they were loaded in, and a comparison
     /// that is off by one bit.
-    pub(crate) fn lanes_are_samples<L: Lanes>() {
+    fn lanes_are_samples<L: Lanes>() {
         let tiny = f32::from_bits(TINY_BITS);
         let below = f32::from_bits(TINY_BITS - 1);
         let samples = |c: usize| -> Vec<f32> {
@@ -397,9 +408,20 @@ pub(crate) mod tests {
         }
     }
 
+    struct EveryVector;
+
+    impl InLanes for EveryVector {
+        fn run<L: Lanes>(&mut self) {
+            lanes_are_samples::<L>();
+            doubles_are_samples::<L>();
+            runs_are_samples::<L>();
+        }
+    }
+
     #[test]
-    fn four_lanes_are_samples() {
-        lanes_are_samples::<Vec4>();
-        runs_are_samples::<Vec4>();
+    fn vectors_of_every_width_are_samples() {
+        for width in VectorWidth::available() {
+            in_lanes_of(width, &mut EveryVector);
+        }
     }
 }

@@ -9,6 +9,4 @@ pub(crate) mod eight;
 pub(crate) mod lanes;
 pub(crate) mod line;
 #[cfg(wide_vectors)]
-pub(crate) mod operators;
-#[cfg(wide_vectors)]
 pub(crate) mod sixteen;

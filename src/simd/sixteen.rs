@@ -12,13 +12,12 @@ use std::arch::x86_64::{
     _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
 };
 
-use crate::shader::PolynomialSegment;
-use crate::shader::TINY_BITS;
+use crate::math::operators::operators;
+use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::doubles;
 use crate::simd::eight::Eight;
 use crate::simd::lanes::{Lanes, Number};
 use crate::simd::line::Line;
-use crate::simd::operators::operators;
 
 /// Calls instructions of AVX-512.
 macro_rules! avx512 {
@@ -33,7 +32,21 @@ macro_rules! avx512 {
 #[derive(Clone, Copy)]
 pub(crate) struct Sixteen(__m512);
 
-operators!(Sixteen: avx512, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_xor_ps);
+operators! {
+    [] Sixteen, a, b:
+    Add add => Self(avx512!(_mm512_add_ps(a.0, b.0)));
+    Sub sub => Self(avx512!(_mm512_sub_ps(a.0, b.0)));
+    Mul mul => Self(avx512!(_mm512_mul_ps(a.0, b.0)));
+}
+
+impl std::ops::Neg for Sixteen {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(avx512!(_mm512_xor_ps(self.0, Self::all(-0.0).0)))
+    }
+}
 
 impl Number for Sixteen {
     #[inline(always)]
@@ -155,10 +168,9 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
-        let rotations: [[f32; 4]; 16] = *rotations.first_chunk().expect("sixteen rotations");
-        let [a, b, c, d] = bytemuck::cast::<_, [__m512; 4]>(rotations);
-        Self::transposed([Self(a), Self(b), Self(c), Self(d)])
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
+        let rotations: [[f32; 4]; 4] = *rotations.first_chunk().expect("four rotations");
+        Self(bytemuck::cast(rotations))
     }
 
     #[inline(always)]
@@ -181,22 +193,6 @@ impl Lanes for Sixteen {
             four!(8 9 10 11),
             four!(12 13 14 15),
         ])
-    }
-
-    #[inline(always)]
-    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
-        let from: [[f32; 4]; 16] = *from.first_chunk().expect("sixteen rotations");
-        let to: [[f32; 4]; 16] = *to.first_chunk().expect("sixteen rotations");
-        let [a, b, c, d] = bytemuck::cast::<_, [__m512; 4]>(from);
-        let [e, f, g, h] = bytemuck::cast::<_, [__m512; 4]>(to);
-        // Multiplied before the transposition, so that only the products are transposed.
-        let [x, y, z, w] = Self::transposed([
-            Self(a) * Self(e),
-            Self(b) * Self(f),
-            Self(c) * Self(g),
-            Self(d) * Self(h),
-        ]);
-        x + y + z + w
     }
 
     #[inline(always)]
@@ -313,23 +309,5 @@ impl Lanes for Sixteen {
     fn any_at_most(self, limit: f32) -> bool {
         let limit = Self::all(limit);
         avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, limit.0) != 0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cpu::evaluate::tests::runs_are_samples;
-    use crate::simd::dispatch::VectorWidth;
-    use crate::simd::doubles::tests::doubles_are_samples;
-    use crate::simd::lanes::tests::lanes_are_samples;
-
-    #[test]
-    fn sixteen_lanes_are_samples() {
-        if VectorWidth::available().contains(&VectorWidth::Avx512) {
-            lanes_are_samples::<Sixteen>();
-            doubles_are_samples::<Sixteen>();
-            runs_are_samples::<Sixteen>();
-        }
     }
 }

@@ -197,13 +197,9 @@ impl Frames {
             Request::Shared(times) => {
                 finite(times)?;
                 check_size(tracks, times.len() as f64)?;
-                (
-                    Ticks::Times {
-                        times: Arc::clone(times),
-                        stride: 0,
-                    },
-                    times.len(),
-                )
+                let (times, stride) = (Arc::clone(times), 0);
+                let count = times.len();
+                (Ticks::Times { times, stride }, count)
             }
             Request::PerTrack(times) => {
                 finite(times)?;
@@ -213,14 +209,8 @@ impl Frames {
                         tracks,
                     });
                 }
-                let stride = times.len() / tracks;
-                (
-                    Ticks::Times {
-                        times: Arc::clone(times),
-                        stride,
-                    },
-                    stride,
-                )
+                let (times, stride) = (Arc::clone(times), times.len() / tracks);
+                (Ticks::Times { times, stride }, stride)
             }
         };
         Ok(Timeline { ticks, count })

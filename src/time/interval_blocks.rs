@@ -7,7 +7,7 @@ use crate::math::canonical::whole_number;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::{Clock, in_frames};
-use crate::time::runs::{COUNTABLE, Parameter};
+use crate::time::runs::{Affine, COUNTABLE, Parameter};
 
 /// The frame coordinates of consecutive intervals, and the constants from which the parameters of
 /// their samples follow.
@@ -57,6 +57,15 @@ impl IntervalBlock {
         }
         let frames = end - start;
         Parameter::Frames { start, frames }
+    }
+
+    /// How the parameters in the `j`th interval follow from distances.
+    #[inline(always)]
+    pub(crate) fn affine(&self, j: usize) -> Affine {
+        Affine {
+            scale: self.scale[j],
+            offset: self.offset[j],
+        }
     }
 
     /// The length of the `j`th interval in frames.

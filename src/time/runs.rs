@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use crate::math::canonical::round_f32;
 use crate::time::frame_clock::{Clock, CopyClock, FrameClock};
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
@@ -20,19 +21,33 @@ pub(crate) struct Run {
     pub(crate) source: RunSource,
 }
 
+impl Run {
+    #[inline(always)]
+    pub(crate) fn new(sample: usize, count: usize, source: RunSource) -> Self {
+        Self {
+            sample,
+            count,
+            source,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum RunSource {
     /// Store a constant.
     Constant(u32),
-    /// Evaluate a segment at `distance × scale + offset`.
-    Segment {
-        index: u32,
-        distance: Distance,
-        scale: f32,
-        offset: f32,
-    },
+    /// Evaluate a segment.
+    Segment(u32, Distance, Affine),
     /// Evaluate a curve in f64 on the host.
     Exact { index: u32, parameter: Parameter },
+}
+
+/// How a run's parameter follows from the distance to the segment's middle:
+/// `distance × scale + offset`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Affine {
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
 }
 
 /// A sample's distance from the middle of its segment.
@@ -46,6 +61,19 @@ pub(crate) enum Distance {
     Frames { first: i32 },
     /// Seconds from the middle: a sample's explicit time minus `middle`.
     Seconds { middle: f64 },
+}
+
+impl Distance {
+    /// The distance of a run's `j`th sample, in frames or seconds; `time` gives that sample's time.
+    #[inline(always)]
+    pub(crate) fn of(self, j: usize, time: impl FnOnce() -> f64) -> f32 {
+        match self {
+            Self::Near { first } => first + j as f32,
+            // An integer converts with one rounding, like the shader's sum of two exact halves.
+            Self::Frames { first } => first.wrapping_add(j as i32) as f32,
+            Self::Seconds { middle } => round_f32(time() - middle),
+        }
+    }
 }
 
 /// Where the interval of a cubic that is evaluated in f64 starts, and its length.
@@ -143,21 +171,13 @@ impl Spans {
                 };
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
                 if key != NONE && block.is_held[j] == 1 {
-                    emit.run(Run {
-                        sample: first,
-                        count: 1,
-                        source: RunSource::Constant(key),
-                    });
+                    emit.run(Run::new(first, 1, RunSource::Constant(key)));
                     first += 1;
                     if first == last {
                         continue;
                     }
                 }
-                let run = |source| Run {
-                    sample: first,
-                    count: last - first,
-                    source,
-                };
+                let run = |source| Run::new(first, last - first, source);
                 // One call for each source, so that inlined code does not match on it again.
                 match self.sources[span] {
                     Source::Segment(index) => {
@@ -173,12 +193,7 @@ impl Spans {
                         } else {
                             return Err(self.gap_too_long(part, span, clock.rate()));
                         };
-                        emit.run(run(RunSource::Segment {
-                            index,
-                            distance,
-                            scale: block.scale[j],
-                            offset: block.offset[j],
-                        }));
+                        emit.run(run(RunSource::Segment(index, distance, block.affine(j))));
                     }
                     Source::Constant(constant) => emit.run(run(RunSource::Constant(constant))),
                     Source::Exact(index) => {
@@ -264,17 +279,10 @@ fn extrapolate(
         outside.end.min(samples.end),
     );
     if first < last {
-        emit.run(Run {
-            sample: first,
-            count: last - first,
-            source: RunSource::Exact {
-                index,
-                parameter: Parameter::Frames {
-                    start: end,
-                    frames: clock.rate(),
-                },
-            },
-        });
+        let (start, frames) = (end, clock.rate());
+        let parameter = Parameter::Frames { start, frames };
+        let source = RunSource::Exact { index, parameter };
+        emit.run(Run::new(first, last - first, source));
     }
 }
 
@@ -289,11 +297,7 @@ fn emit_constant(
 ) {
     let (sample, to) = (from.max(samples.start), to.min(samples.end));
     if sample < to && constant != NONE {
-        emit.run(Run {
-            sample,
-            count: to - sample,
-            source: RunSource::Constant(constant),
-        });
+        emit.run(Run::new(sample, to - sample, RunSource::Constant(constant)));
     }
 }
 

@@ -117,16 +117,12 @@ impl Spans {
     /// The error for a part's span with too many frames to count, with the keys around it.
     #[cold]
     pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {
-        let Self {
-            starts,
-            sources,
-            keys,
-        } = self;
+        let (starts, keys) = (&self.starts, &self.keys);
         // An interval may be cut into several spans, and only the first of them starts at a key.
         // Curves that do not meet their keys do not show it: there each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
-            let stands = matches!(sources[span], Source::Constant(_));
+            let stands = matches!(self.sources[span], Source::Constant(_));
             keys[span] != NONE || stands || !meets_keys
         };
         let until = part.spans.start..=span;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
-use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
+use crate::time::runs::{Affine, Distance, Emit, Parameter, Run, RunSource};
 use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
 
 impl Spans {
@@ -49,11 +49,7 @@ impl Spans {
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
             if let Some(source) = source {
-                emit.run(Run {
-                    sample,
-                    count,
-                    source,
-                });
+                emit.run(Run::new(sample, count, source));
             }
             sample += count;
         }
@@ -93,14 +89,12 @@ impl Spans {
                 index,
                 parameter: Parameter::Seconds { start, seconds },
             },
-            Source::Segment(index) => RunSource::Segment {
-                index,
-                distance: Distance::Seconds {
-                    middle: start + seconds * 0.5,
-                },
-                scale: finite_scale(1.0 / seconds),
-                offset: 0.0,
-            },
+            Source::Segment(index) => {
+                let middle = start + seconds * 0.5;
+                let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
+                let distance = Distance::Seconds { middle };
+                RunSource::Segment(index, distance, Affine { scale, offset })
+            }
         }
     }
 }
@@ -130,11 +124,7 @@ fn outside(
         .take_while(|time| covered.contains(time))
         .count();
     if let Some(source) = source {
-        emit.run(Run {
-            sample,
-            count,
-            source,
-        });
+        emit.run(Run::new(sample, count, source));
     }
     count
 }

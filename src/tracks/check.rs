@@ -2,7 +2,7 @@
 
 use glam::{DQuat, Quat};
 
-use crate::math::canonical::{canonical, to_f64, unit_f32};
+use crate::math::canonical::{canonical, unit_f32};
 use crate::tracks::error::TrackError;
 
 /// A key whose norm differs from 1 by more than this is refused by
@@ -56,7 +56,7 @@ pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
 pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
 pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
-    let exact: DQuat = to_f64(quat);
+    let exact: DQuat = quat.as_dquat();
     let norm = exact.length();
     if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
         return Err(TrackError::NotUnit { track, key, norm });

@@ -27,21 +27,11 @@ impl Tcb {
 }
 
 /// One kind of data for a set: a track has a value for each of its keys, or none at all.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct KeyData<T> {
     values: Vec<T>,
     /// For each track, where its values start; `None` if it has none.
     starts: Vec<Option<usize>>,
-}
-
-// A derived `Default` would require `T: Default`.
-impl<T> Default for KeyData<T> {
-    fn default() -> Self {
-        Self {
-            values: Vec::new(),
-            starts: Vec::new(),
-        }
-    }
 }
 
 impl<T: Clone> KeyData<T> {

@@ -215,22 +215,18 @@ impl TrackSet {
     /// # Panics
     /// When `index` is not below [`TrackSet::track_count`].
     pub fn track(&self, index: usize) -> Track<'_> {
-        let TrackRange {
-            first_key,
-            first_time,
-            len,
-        } = self.tracks[index];
+        let (times, keys) = self.times_and_keys(index);
         Track {
             name: self
                 .names
                 .get(index)
                 .map(String::as_str)
                 .filter(|name| !name.is_empty()),
-            times: &self.times[first_time..first_time + len],
-            keys: &self.keys[first_key..first_key + len],
-            velocities: self.velocities.of(index, len),
-            tangents: self.tangents.of(index, len),
-            tcb: self.tcb.of(index, len),
+            times,
+            keys,
+            velocities: self.velocities.of(index, keys.len()),
+            tangents: self.tangents.of(index, keys.len()),
+            tcb: self.tcb.of(index, keys.len()),
         }
     }
 
@@ -238,13 +234,9 @@ impl TrackSet {
     /// [`Track`] would take longer than to evaluate it.
     #[inline]
     pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
-        let TrackRange {
-            first_key,
-            first_time,
-            len,
-        } = self.tracks[index];
-        let times = &self.times[first_time..first_time + len];
-        (times, &self.keys[first_key..first_key + len])
+        let own = self.tracks[index];
+        let times = &self.times[own.first_time..own.first_time + own.len];
+        (times, &self.keys[own.first_key..own.first_key + own.len])
     }
 
     /// The keys of all tracks, one track after another.

@@ -2,8 +2,7 @@
 
 use crate::math::canonical::canonical;
 use crate::math::quaternion::product;
-use crate::shader::Link;
-use crate::shader::ROOT;
+use crate::shader::{Link, ROOT};
 use crate::twin::quaternion::{normalised, rotated};
 
 /// One frame: from each track's rotation in its parent's frame to its rotation and its position in

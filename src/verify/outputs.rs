@@ -1,7 +1,7 @@
 //! Verifies what follows from rotations: velocities, accelerations, poses in the world, and every
 //! encoding.
 
-use glam::{DQuat, DVec3, Quat};
+use glam::{DQuat, Quat, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity, Speed};
@@ -10,7 +10,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
-use crate::output::rotations::{Layout, Rotations};
+use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::pose::skeleton::Skeleton;
 use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
@@ -70,13 +70,15 @@ pub(crate) fn verify(
             quantity,
             ..interpolation
         };
-        let found = engine.evaluate(set, interpolation, frames)?;
-        let expected = cpu.evaluate(set, interpolation, frames)?;
-        let (differing, _) = crate::verify::differences(&found, &expected);
+        let found = engine.rates(set, interpolation, frames, Layout::TrackMajor)?;
+        let expected = cpu.rates(set, interpolation, frames, Layout::TrackMajor)?;
+        let pairs = found.as_slice().iter().zip(expected.as_slice());
+        let bits = |vector: &Vec4| vector.to_array().map(f32::to_bits);
+        let differing = pairs.filter(|(found, expected)| bits(found) != bits(expected));
         outputs.push(OutputVerification {
             output: name.to_owned(),
-            values: found.as_quats().len() as u64,
-            differing,
+            values: found.as_slice().len() as u64,
+            differing: differing.count() as u64,
             max_error: rate_error(set, interpolation, timeline, &found),
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => 1e-6,
@@ -165,7 +167,7 @@ fn rate_error(
     set: &TrackSet,
     interpolation: Interpolation,
     timeline: &Timeline,
-    found: &Rotations,
+    found: &Vectors,
 ) -> f64 {
     let samples = timeline.len();
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
@@ -186,8 +188,7 @@ fn rate_error(
         let (mut error, mut largest) = (0.0f64, rate_floor(track.times, interpolation.quantity));
         for sample in (0..samples).step_by(each) {
             let time = timeline.time(index, sample);
-            let [x, y, z, _] = found.get(index, sample).unwrap_or(Quat::NAN).to_array();
-            let found = DVec3::new(x.into(), y.into(), z.into());
+            let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
             let errors_at =
                 moments(track.times, time).map(|time| (found - expected(time)).length());
             error = error.max(worse(errors_at[0]).min(worse(errors_at[1])));

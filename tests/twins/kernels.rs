@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use crate::cpu::evaluate::{Affine, distances, frames, one};
+use crate::cpu::evaluate::{distances, frames, one};
 use crate::from_keys::arcs::TwoKeyBlock;
 use crate::from_keys::cubics::CubicBlock;
 use crate::math::canonical::canonical;
@@ -10,6 +10,7 @@ use crate::shader::{
     ArcSegment, Form, IS_CONSTANT, IS_KEY, KEY_INNER, PolynomialSegment, ROWS_PER_INVOCATION,
 };
 use crate::simd::dispatch::in_lanes;
+use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
 use super::random::Random;

@@ -1,4 +1,4 @@
-//! Cuts curves that one polynomial does not fit in two, until every part fits.
+//! Cuts curves that one polynomial does not fit in two, until every subcurve fits.
 
 use bytemuck::Zeroable;
 
@@ -17,13 +17,13 @@ pub(crate) struct Cutter {
     block: Option<Box<FitBlock>>,
     /// The curves added since the last [`Cutter::clear`].
     curves: Vec<Curve>,
-    waiting: Vec<Part>,
-    parts: Vec<Part>,
+    waiting: Vec<Subcurve>,
+    subcurves: Vec<Subcurve>,
 }
 
-/// A part of a curve.
+/// A subcurve of a curve.
 #[derive(Clone, Copy)]
-pub(crate) struct Part {
+pub(crate) struct Subcurve {
     /// The span to which the curve belongs.
     pub(crate) span: usize,
     /// The curve's place in [`Cutter::curves`].
@@ -34,7 +34,7 @@ pub(crate) struct Part {
     pub(crate) segment: Option<usize>,
 }
 
-impl Part {
+impl Subcurve {
     /// Both halves. The first keeps the segment of the whole, so that segments lie nearly in the
     /// order in which they are evaluated.
     fn halves(self) -> [Self; 2] {
@@ -62,26 +62,26 @@ impl Cutter {
             block: None,
             curves: Vec::new(),
             waiting: Vec::new(),
-            parts: Vec::new(),
+            subcurves: Vec::new(),
         }
     }
 
-    /// Adds the curve of a span that has a segment. It is cut into at least two parts.
+    /// Adds the curve of a span that has a segment. It is cut into at least two subcurves.
     pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: usize) {
-        let whole = self.part(span, &curve, Some(segment));
+        let whole = self.subcurve(span, &curve, Some(segment));
         self.waiting.extend(whole.halves());
         self.curves.push(curve);
     }
 
     /// Adds the curve of a span, which is cut only if it does not fit as a whole.
     pub(crate) fn push_whole(&mut self, span: usize, curve: Curve) {
-        self.waiting.push(self.part(span, &curve, None));
+        self.waiting.push(self.subcurve(span, &curve, None));
         self.curves.push(curve);
     }
 
-    /// The part that is the whole of the curve added next.
-    fn part(&self, span: usize, curve: &Curve, segment: Option<usize>) -> Part {
-        Part {
+    /// The subcurve that is the whole of the curve added next.
+    fn subcurve(&self, span: usize, curve: &Curve, segment: Option<usize>) -> Subcurve {
+        Subcurve {
             span,
             curve: self.curves.len(),
             piece: curve.piece,
@@ -97,52 +97,53 @@ impl Cutter {
             let block = self.block.get_or_insert_with(new);
             block.clear();
             let some = done..self.waiting.len().min(done + LANES);
-            for part in &mut self.waiting[some.clone()] {
-                block.push(&self.curves[part.curve], part.piece);
-                if part.segment.is_none() {
-                    part.segment = Some(segments.len());
+            for subcurve in &mut self.waiting[some.clone()] {
+                block.push(&self.curves[subcurve.curve], subcurve.piece);
+                if subcurve.segment.is_none() {
+                    subcurve.segment = Some(segments.len());
                     segments.push(PolynomialSegment::zeroed());
                 }
             }
             let places = self.waiting[some.clone()].iter();
-            block.run(segments, places.filter_map(|part| part.segment));
-            for (lane, part) in some.clone().enumerate() {
-                let part = self.waiting[part];
+            block.run(segments, places.filter_map(|subcurve| subcurve.segment));
+            for (lane, subcurve) in some.clone().enumerate() {
+                let subcurve = self.waiting[subcurve];
                 if block.fits(lane, segments) {
-                    self.parts.push(part);
-                } else if part.piece.is_finest() {
-                    segments[block.place(lane)] = PolynomialSegment::zeroed();
-                    self.parts.push(Part {
+                    self.subcurves.push(subcurve);
+                } else if subcurve.piece.is_finest() {
+                    segments[block.places[lane]] = PolynomialSegment::zeroed();
+                    self.subcurves.push(Subcurve {
                         segment: None,
-                        ..part
+                        ..subcurve
                     });
                 } else {
-                    self.waiting.extend(part.halves());
+                    self.waiting.extend(subcurve.halves());
                 }
             }
             done = some.end;
         }
         self.waiting.clear();
-        // Most parts are in order already.
-        self.parts.sort_by_key(|part| (part.span, part.piece.from));
+        // Most subcurves are in order already.
+        self.subcurves
+            .sort_by_key(|subcurve| (subcurve.span, subcurve.piece.from));
     }
 
-    /// The parts of every curve, in order of spans and time.
-    pub(crate) fn parts(&self) -> &[Part] {
-        &self.parts
+    /// The subcurves of every curve, in order of spans and time.
+    pub(crate) fn subcurves(&self) -> &[Subcurve] {
+        &self.subcurves
     }
 
-    /// The part as a curve of its own.
-    pub(crate) fn curve(&self, part: &Part) -> Curve {
+    /// The subcurve as a curve of its own.
+    pub(crate) fn curve(&self, subcurve: &Subcurve) -> Curve {
         Curve {
-            piece: part.piece,
-            ..self.curves[part.curve].clone()
+            piece: subcurve.piece,
+            ..self.curves[subcurve.curve].clone()
         }
     }
 
-    /// Forgets the curves and their parts.
+    /// Forgets the curves and their subcurves.
     pub(crate) fn clear(&mut self) {
         self.curves.clear();
-        self.parts.clear();
+        self.subcurves.clear();
     }
 }

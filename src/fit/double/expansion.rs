@@ -2,7 +2,6 @@
 
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
-use crate::fit::both_sides::Sides;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use crate::fit::double::intervals::{LANES, load, load3, load4, rounded};
 use crate::fit::double::shape::Sampling;
@@ -27,7 +26,7 @@ impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        match block.tier() {
+        match block.tier {
             Tier::SmallAngle | Tier::Full => {
                 fit::<L, PAIRS, OWN_BASIS, true>(block, nodes, segments);
             }
@@ -212,27 +211,19 @@ impl<L: Lanes> AboutMiddle<L> {
         }
     }
 
-    /// The differences of the rotations before and after the middle from the one at the middle.
+    /// The differences of the rotations at these angles from the one at the middle.
     #[inline(always)]
-    pub(crate) fn differences(
-        &self,
-        [(s1, f1), (s2, f2), (s3, f3)]: [SineCosm1<Sides<L>>; 3],
-    ) -> [Sides<L>; 4] {
-        let [m, first, both] = [
-            on_both_sides(self.middle),
-            on_both_sides(self.first),
-            on_both_sides(self.both),
-        ];
-        let [second, third] = [self.second, self.third];
-        let same = Sides::same;
+    pub(crate) fn differences(&self, [(s1, f1), (s2, f2), (s3, f3)]: [SineCosm1<L>; 3]) -> [L; 4] {
+        let (m, first, both) = (self.middle, self.first, self.both);
+        let (second, third) = (self.second, self.third);
         // With cosines minus one, no digits cancel where the angles are small.
         let cs = s3 + f2 * s3;
         let sc = s2 + s2 * f3;
         let ss = s2 * s3;
         let behind = [
-            same(second[0]) * sc + same(third[0]) * cs + both[0] * ss,
-            same(second[1]) * sc + same(third[1]) * cs + both[1] * ss,
-            same(second[2]) * sc + same(third[2]) * cs + both[2] * ss,
+            second[0] * sc + third[0] * cs + both[0] * ss,
+            second[1] * sc + third[1] * cs + both[1] * ss,
+            second[2] * sc + third[2] * cs + both[2] * ss,
             f2 + f3 + f2 * f3 + both[3] * ss,
         ];
         let own = [
@@ -245,16 +236,6 @@ impl<L: Lanes> AboutMiddle<L> {
         let [x, y, z, w] = product(start, behind);
         [x + own[0], y + own[1], z + own[2], w + own[3]]
     }
-}
-
-#[inline(always)]
-fn on_both_sides<L: Lanes>([x, y, z, w]: [L; 4]) -> [Sides<L>; 4] {
-    [
-        Sides::same(x),
-        Sides::same(y),
-        Sides::same(z),
-        Sides::same(w),
-    ]
 }
 
 /// [`AboutMiddle`] with the polynomials of its three angles.
@@ -287,28 +268,30 @@ impl<L: Lanes> Expanded<L> {
         let mut samples = Samples::all(L::all(0.0));
         samples.middle = self.curve.middle;
         for k in 0..PAIRS {
-            let s = L::all(nodes.at[k]);
-            let turns = [
-                self.turns::<SHORT>(0, s),
-                self.turns::<SHORT>(1, s),
-                self.turns::<SHORT>(2, s),
-            ];
-            samples.set_differences(k, self.curve.differences(turns));
+            let (before, after) = (L::all(-nodes.at[k]), L::all(nodes.at[k]));
+            let before = self.differences::<SHORT>(before);
+            samples.set_differences(k, before, self.differences::<SHORT>(after));
         }
         samples
     }
 
-    /// The sine and cosine of the `j`th angle, at `-s` and at `s`.
+    /// The differences of the rotations at `s` from those at the middle.
     #[inline(always)]
-    fn turns<const SHORT: bool>(&self, j: usize, s: L) -> SineCosm1<Sides<L>> {
+    fn differences<const SHORT: bool>(&self, s: L) -> [L; 4] {
+        // Written out: closures are not always inlined.
+        self.curve.differences([
+            self.turn::<SHORT>(0, s),
+            self.turn::<SHORT>(1, s),
+            self.turn::<SHORT>(2, s),
+        ])
+    }
+
+    /// The sine and cosine of the `j`th angle at `s`.
+    #[inline(always)]
+    fn turn<const SHORT: bool>(&self, j: usize, s: L) -> SineCosm1<L> {
         let [linear, quadratic, cubic] = self.powers[j];
-        let rise = cubic * s;
-        let angle = Sides {
-            // This gives the same bits as the formula below does for -s.
-            before: -((linear - (quadratic - rise) * s) * s),
-            after: ((rise + quadratic) * s + linear) * s,
-        };
-        let square = Sides::same(self.squares[j]) * (angle * angle);
+        let angle = ((cubic * s + quadratic) * s + linear) * s;
+        let square = self.squares[j] * (angle * angle);
         if SHORT {
             sine_cosm1_quarter(angle, square)
         } else {

@@ -13,15 +13,13 @@ use bytemuck::Zeroable;
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
 use crate::curve::options::Quantity;
-use crate::fit::both_sides::Sides;
 use crate::fit::double::curve::{Curve, Piece};
 use crate::fit::double::intervals::{Intervals, LANES, Lane};
 use crate::fit::double::shape::Shape;
 use crate::fit::motion::arc_length::Pace;
 use crate::fit::motion::derivatives as motion;
 use crate::fit::nodes::{Nodes, tail};
-use crate::shader::POWERS;
-use crate::shader::PolynomialSegment;
+use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::lanes::{Lanes, canonical};
 
 /// The number of lanes in the widest vector.
@@ -73,7 +71,7 @@ pub(crate) fn tier(squared_extent: f64) -> Tier {
 /// Up to [`LANES`] curves that wait to be fitted, all of one shape and tier.
 pub(crate) struct FitBlock {
     pub(crate) shape: &'static Shape,
-    tier: Tier,
+    pub(crate) tier: Tier,
     /// Each curve's own numbers.
     pub(crate) numbers: Vec<Lane64>,
     /// The middle of the piece to fit and its width, as fractions of the interval.
@@ -85,9 +83,10 @@ pub(crate) struct FitBlock {
     /// them or none.
     paces: Vec<Option<Arc<Pace>>>,
     pub(crate) quantity: Quantity,
-    count: usize,
+    /// How many curves it has.
+    pub(crate) count: usize,
     /// The segments that they become.
-    places: [usize; LANES],
+    pub(crate) places: [usize; LANES],
     /// Estimates of twice the truncation error, the largest of each curve's components.
     tails: Lane32,
     /// The squares of the farthest angles from the middle.
@@ -134,10 +133,10 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
     /// and after the middle from the one at the middle.
     #[inline(always)]
-    pub(crate) fn set_differences(&mut self, k: usize, differences: [Sides<L>; 4]) {
-        for (c, &Sides { before, after }) in differences.iter().enumerate() {
-            self.even[k][c] = after + before;
-            self.odd[k][c] = after - before;
+    pub(crate) fn set_differences(&mut self, k: usize, before: [L; 4], after: [L; 4]) {
+        for c in 0..4 {
+            self.even[k][c] = after[c] + before[c];
+            self.odd[k][c] = after[c] - before[c];
         }
     }
 
@@ -161,13 +160,13 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Each is stored as a second sample, whose difference from the first is the derivative by s²
     /// that the divided differences of [`Nodes::powers`] need there.
     #[inline(always)]
-    pub(crate) fn set_slopes(&mut self, slopes: [Sides<L>; 4]) {
+    pub(crate) fn set_slopes(&mut self, before: [L; 4], after: [L; 4]) {
         // At s = 1/2 the polynomials even / 2s² and odd / 2s have the values 2 even and odd, and
         // the derivatives by s² 2 (after - before) - 8 even and after + before - 2 odd.
-        for (c, &Sides { before, after }) in slopes.iter().enumerate() {
+        for c in 0..4 {
             let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
-            self.even[PAIRS - 1][c] = (after - before) - L::all(3.0) * even;
-            self.odd[PAIRS - 1][c] = (after + before) - odd;
+            self.even[PAIRS - 1][c] = (after[c] - before[c]) - L::all(3.0) * even;
+            self.odd[PAIRS - 1][c] = (after[c] + before[c]) - odd;
         }
     }
 
@@ -203,20 +202,6 @@ impl FitBlock {
             tails: [0.0; LANES],
             reaches: lane,
         }
-    }
-
-    pub(crate) fn tier(&self) -> Tier {
-        self.tier
-    }
-
-    /// The place of the segment for the curve in a lane.
-    pub(crate) fn place(&self, lane: usize) -> usize {
-        self.places[lane]
-    }
-
-    /// How many curves it has.
-    pub(crate) fn count(&self) -> usize {
-        self.count
     }
 
     /// How many more it takes.

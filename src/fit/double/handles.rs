@@ -94,6 +94,9 @@ pub(crate) struct Interval<R> {
     pub(crate) key: [R; 4],
 }
 
+/// The intervals before and after a key.
+pub(crate) type BothSides<A> = [Interval<<A as Algebra>::Number>; 2];
+
 /// The handles of a key: half-rotation vectors from the key to its control
 /// rotations, `b_i = q_i exp(-incoming)` and `a_i = q_i exp(outgoing)`.
 #[derive(Clone, Copy)]
@@ -106,11 +109,7 @@ pub(crate) struct Handles<R> {
 pub(crate) trait HandleRule {
     /// The handles of the key between two intervals. Implementations are `#[inline(always)]` and
     /// have no branches, so that they run in vector lanes.
-    fn handles<A: Algebra>(
-        algebra: &mut A,
-        before: Interval<A::Number>,
-        after: Interval<A::Number>,
-    ) -> Handles<A::Number>;
+    fn handles<A: Algebra>(algebra: &mut A, sides: BothSides<A>) -> Handles<A::Number>;
 
     /// The handle of the first or of the last key of a track.
     fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
@@ -158,7 +157,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
         for lane in (0..own.whole()).step_by(L::COUNT) {
             let mut near = PrincipalRange::new();
             let (before, after) = (own.intervals::<L>(lane), own.intervals::<L>(lane + 1));
-            let handles = R::handles(&mut near, before, after);
+            let handles = R::handles(&mut near, [before, after]);
             store(&mut own.incoming, lane + 1, handles.incoming);
             store(&mut own.outgoing, lane + 1, handles.outgoing);
             if near.is_in_doubt() {
@@ -195,7 +194,7 @@ impl Intervals {
             log: self.log(lane),
             key: self.outward(lane),
         };
-        let handles = R::handles(&mut FullRange, interval(lane - 1), interval(lane));
+        let handles = R::handles(&mut FullRange, [lane - 1, lane].map(interval));
         self.set_incoming(lane, handles.incoming);
         self.set_outgoing(lane, handles.outgoing);
     }

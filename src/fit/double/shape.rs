@@ -117,7 +117,7 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let Self(block, segments, _) = self;
-        match block.tier() {
+        match block.tier {
             Tier::SmallAngle => S::fit::<L, _>(block, &SMALL_ANGLE_NODES, segments),
             Tier::Full | Tier::Piece => S::fit::<L, _>(block, &FULL_NODES, segments),
         }

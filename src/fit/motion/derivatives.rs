@@ -48,7 +48,7 @@ struct Fit<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
 impl InLanes for Fit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        match self.0.tier() {
+        match self.0.tier {
             Tier::SmallAngle => self.fit::<L, _>(&SMALL_ANGLE_NODES),
             Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
         }

@@ -2,18 +2,17 @@
 //! slopes at the keys and the value and two derivatives at the middle are given in closed form, so
 //! that only one or two pairs of nodes are sampled.
 
-use crate::fit::both_sides::Sides;
 use crate::fit::double::expansion::{AboutMiddle, SineCosm1};
 use crate::fit::double::fit::{MOST, Samples, interpolate};
 use crate::fit::double::intervals::rounded;
 use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp, widened};
-use crate::fit::single::fit_part::{Gain, HALF, LAST_HALF, Part, Place, SEAM};
+use crate::fit::single::fit_range::{FitRange, Gain, HALF, LAST_HALF, Place, SEAM};
 use crate::math::quaternion::{
     cross3, normalised, product, product_with_vector, scaled, square, sum,
 };
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::small_angle::{composed, inverse_rotated};
+use crate::twin::small_angle::{chord_of, composed, inverse_rotated};
 
 /// Curves `q₀ exp(w₁ b₁) exp(w₂ b₂) exp(w₃ b₃)`, a lane to each.
 #[derive(Clone, Copy)]
@@ -37,7 +36,7 @@ pub(crate) trait KeyFit<const PAIRS: usize> {
 }
 
 /// Fits the whole curve by one polynomial.
-impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for FitRange<SAMPLED, PAIRS> {
     #[inline(always)]
     fn fit<L: Lanes>(
         &self,
@@ -46,18 +45,13 @@ impl<const SAMPLED: usize, const PAIRS: usize> KeyFit<PAIRS> for Part<SAMPLED, P
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
-        let BetweenKeys {
-            start,
-            vectors,
-            end,
-        } = *curves;
-        let [w1, _, w3] = vectors;
+        let [w1, _, w3] = curves.vectors;
         let ends = [
-            End::new(start, w1, self.slope),
-            End::new(end, w3, self.slope),
+            End::new(curves.start, w1, self.slope),
+            End::new(curves.end, w3, self.slope),
         ];
-        let middle = Moment::new::<false>(start, vectors, &self.middle);
-        sample::<L, SAMPLED, PAIRS, true>(samples, self, middle, ends);
+        let middle = Moment::new::<false>(curves.start, curves.vectors, &self.middle);
+        sample(samples, self, middle, ends);
         interpolate(true, self.nodes, samples, places, segments);
     }
 }
@@ -74,30 +68,26 @@ impl KeyFit<5> for Halves {
         places: &[usize; MOST],
         segments: &mut [PolynomialSegment],
     ) {
-        let BetweenKeys {
-            start,
-            vectors,
-            end,
-        } = *curves;
+        let (start, vectors, end) = (curves.start, curves.vectors, curves.end);
         let [w1, ..] = vectors;
         let seam = Moment::new::<true>(start, vectors, &SEAM);
         let [u1, u2, u3] = seam.rates(&SEAM);
         let seam = End::new(seam.rotation, sum(sum(u1, u3), u2), 1.0);
         let middle = Moment::new::<false>(start, vectors, &HALF.middle);
         let ends = [End::new(start, w1, HALF.slope), seam];
-        sample::<L, _, _, false>(samples, &HALF, middle, ends);
+        sample(samples, &HALF, middle, ends);
         interpolate(true, HALF.nodes, samples, places, segments);
         let backward = backward(vectors);
         let middle = Moment::new::<false>(end, backward, &LAST_HALF.middle);
         let ends = [End::new(end, backward[2], HALF.slope), seam.negated()];
-        sample::<L, _, _, false>(samples, &LAST_HALF, middle, ends);
+        sample(samples, &LAST_HALF, middle, ends);
         samples.turn_round();
         let behind = places.map(|place| place + 1);
         interpolate(true, LAST_HALF.nodes, samples, &behind, segments);
     }
 }
 
-/// The end of a part: the rotation there, and its derivative by the part's parameter.
+/// The end of a range: the rotation there, and its derivative by the range's parameter.
 #[derive(Clone, Copy)]
 struct End<L> {
     rotation: [L; 4],
@@ -157,7 +147,7 @@ impl<L: Lanes> Moment<L> {
         }
     }
 
-    /// The contribution of each vector to the rotation's rate, per unit of a part's parameter.
+    /// The contribution of each vector to the rotation's rate, per unit of a range's parameter.
     #[inline(always)]
     fn rates(&self, place: &Place) -> [[L; 3]; 3] {
         let ([v1, v2, v3], [r1, r2, r3]) = (self.vectors, place.rates);
@@ -188,49 +178,26 @@ fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     ]
 }
 
-/// Samples a part of curves about its middle.
+/// Samples a range of curves about its middle.
 #[inline(always)]
-fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bool>(
+fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     samples: &mut Samples<L, PAIRS>,
-    part: &Part<SAMPLED, PAIRS>,
+    range: &FitRange<SAMPLED, PAIRS>,
     middle: Moment<L>,
-    ends: [End<L>; 2],
+    [start, end]: [End<L>; 2],
 ) {
     samples.middle = middle.rotation;
-    set_middle(samples, part, &middle);
+    set_middle(samples, range, &middle);
     let curve = AboutMiddle::new(middle.rotation, middle.vectors);
     let [v1, v2, v3] = middle.vectors;
     let squares = [square(v1), square(v2), square(v3)];
-    for (k, gains) in (1..).zip(&part.gains) {
-        let second = if IS_WHOLE {
-            // About the middle of the whole curve the second basis function is odd.
-            let [_, after] = gains[1];
-            let (sine, cosine_minus_one) =
-                turned(L::all(after.gain), L::all(after.squared), squares[1]);
-            let sine = Sides {
-                before: -sine,
-                after: sine,
-            };
-            (sine, Sides::same(cosine_minus_one))
-        } else {
-            on_both_sides(gains[1], squares[1])
-        };
-        let first = on_both_sides(gains[0], squares[0]);
-        let third = on_both_sides(gains[2], squares[2]);
-        samples.set_differences(k, curve.differences([first, second, third]));
+    for (k, [before, after]) in (1..).zip(&range.gains) {
+        let before = curve.differences(turns(before, squares));
+        samples.set_differences(k, before, curve.differences(turns(after, squares)));
     }
-    let [before, after] = ends;
-    // Written out: closures are not always inlined.
-    let mut differences = [Sides::same(squares[0]); 4];
-    let mut slopes = differences;
-    for c in 0..4 {
-        differences[c].before = before.rotation[c] - samples.middle[c];
-        differences[c].after = after.rotation[c] - samples.middle[c];
-        slopes[c].before = before.slope[c];
-        slopes[c].after = after.slope[c];
-    }
-    samples.set_differences(PAIRS - 2, differences);
-    samples.set_slopes(slopes);
+    let before = chord_of(samples.middle, start.rotation);
+    samples.set_differences(PAIRS - 2, before, chord_of(samples.middle, end.rotation));
+    samples.set_slopes(start.slope, end.slope);
 }
 
 /// Sets the derivative at the middle, `m a` with `a = Σ vᵢ bᵢ'`, and half of the second,
@@ -238,13 +205,13 @@ fn sample<L: Lanes, const SAMPLED: usize, const PAIRS: usize, const IS_WHOLE: bo
 #[inline(always)]
 fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     samples: &mut Samples<L, PAIRS>,
-    part: &Part<SAMPLED, PAIRS>,
+    range: &FitRange<SAMPLED, PAIRS>,
     middle: &Moment<L>,
 ) {
     let m = middle.rotation;
-    let [u1, u2, u3] = middle.rates(&part.middle);
+    let [u1, u2, u3] = middle.rates(&range.middle);
     let rate = sum(sum(u1, u3), u2);
-    let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, part.bends);
+    let ([v1, v2, v3], [b1, b2, b3]) = (middle.vectors, range.bends);
     let ends = sum(scaled(v1, L::all(b1)), scaled(v3, L::all(b3)));
     let bend = sum(ends, scaled(v2, L::all(b2)));
     // u₁ × rate is u₁ × u₂ + u₁ × u₃, as u₁ × u₁ is 0.
@@ -260,29 +227,26 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     samples.set_middle(product_with_vector(m, rate), half_second);
 }
 
-#[inline(always)]
-fn on_both_sides<L: Lanes>([before, after]: [Gain; 2], square: L) -> SineCosm1<Sides<L>> {
-    let gain = Sides {
-        before: L::all(before.gain),
-        after: L::all(after.gain),
-    };
-    let squared = Sides {
-        before: L::all(before.squared),
-        after: L::all(after.squared),
-    };
-    turned(gain, squared, Sides::same(square))
-}
-
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
 /// up to 0.201; from Chebyshev nodes, within 3e-9.
 const SINC: [f32; 3] = [-0.166_666_67, 0.008_333_27, -0.000_197_583_55];
 const COSINE_MINUS_ONE: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 
-/// The sine over the length and the cosine minus one for `gain` times a vector; `squared` is the
-/// square of `gain`, `square` that of the vector.
+/// For each of three vectors with these squares, the sine over the length and the cosine minus one
+/// of its angle, by its gain.
 #[inline(always)]
-fn turned<N: Number>(gain: N, squared: N, square: N) -> SineCosm1<N> {
-    let z = square * squared;
+fn turns<L: Lanes>(gains: &[Gain; 3], [first, second, third]: [L; 3]) -> [SineCosm1<L>; 3] {
+    // Written out: closures are not always inlined.
+    [
+        turned(gains[0], first),
+        turned(gains[1], second),
+        turned(gains[2], third),
+    ]
+}
+
+#[inline(always)]
+fn turned<N: Number>(Gain { gain, squared }: Gain, square: N) -> (N, N) {
+    let (gain, z) = (N::all(gain), square * N::all(squared));
     let sinc = ((N::all(SINC[2]) * z + N::all(SINC[1])) * z + N::all(SINC[0])) * z;
     let cosine_minus_one = ((N::all(COSINE_MINUS_ONE[2]) * z + N::all(COSINE_MINUS_ONE[1])) * z
         + N::all(COSINE_MINUS_ONE[0]))
@@ -298,7 +262,7 @@ mod tests {
 
     use super::*;
     use crate::fit::single::exp_log::tests::assert_near;
-    use crate::fit::single::fit_part::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
+    use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
     use crate::fit::single::handles::LONGEST_DIRECT;
 
     /// Catches a wrong digit in a coefficient, and a range that is too short.

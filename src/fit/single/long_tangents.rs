@@ -123,7 +123,7 @@ impl<R: HandleRule> InLanes for Find<'_, R> {
             outgoing,
         } = &mut *self.keys;
         for i in 0..AT_ONCE {
-            let found = R::handles(&mut FullRange, before.interval(i), after.interval(i));
+            let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
             let Handles {
                 incoming: [x0, y0, z0],
                 outgoing: [x1, y1, z1],

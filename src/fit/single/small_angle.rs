@@ -6,12 +6,10 @@
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::key_steps::KeySteps;
 use crate::fit::single::key_weights::KeyWeights;
-use crate::shader::PolynomialSegment;
-use crate::shader::{KEY_INNER, LONGEST_STEP};
+use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::twin::small_angle::SmallAngleCubic;
-use crate::twin::small_angle::small_angle_cubic;
+use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
 /// The lanes of the widest vectors.
 const VECTOR: usize = 16;

@@ -1,6 +1,6 @@
 //! The page: what `web/` was built into, and the results in it.
 
-use glam::{DVec3, Quat};
+use glam::{DVec3, Quat, Vec4};
 use serde::Serialize;
 use tumble::Encoding;
 use tumble_formats::world::WorldPose;
@@ -89,9 +89,13 @@ impl StoredResult {
         method: Wanted,
         boxes: usize,
         rotations: &[Quat],
-        velocities: &[Quat],
+        velocities: &[Vec4],
     ) -> Self {
-        let speeds = || velocities.iter().map(|velocity| velocity.xyz().length());
+        let speeds = || {
+            velocities
+                .iter()
+                .map(|velocity| velocity.truncate().length())
+        };
         let fastest = speeds().fold(0.0, f32::max);
         let share = |speed: f32| match fastest {
             0.0 => 0,

@@ -152,7 +152,7 @@ impl Shown {
                     let layout = Layout::FrameMajor;
                     Ok::<_, Error>((
                         rotations.sample(engine, clip, &frames)?,
-                        velocities.rotations(engine, clip, &frames, layout)?,
+                        velocities.rates(engine, clip, &frames, layout)?,
                     ))
                 })
             })

@@ -1,4 +1,4 @@
-//! The parts of a curve that one polynomial fits, and constants of the basis functions there:
+//! The ranges of a curve that one polynomial fits, and constants of the basis functions there:
 //! values and derivatives at the middle, and their gains from the middle to each node.
 
 use crate::fit::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
@@ -9,39 +9,39 @@ use crate::fit::nodes::{END_NODES, FEW_END_NODES, HALF_END_NODES, Nodes};
 pub(crate) const LONGEST_OF_FEW: f64 = 0.01;
 pub(crate) const LONGEST_WHOLE: f64 = 0.16;
 
-/// A part of the parameter's range, counted from the start of the curve or back from its end, and
-/// the nodes at which curves are sampled there. Values and derivatives at the part's ends and at
+/// A range of the parameter's range, counted from the start of the curve or back from its end, and
+/// the nodes at which curves are sampled there. Values and derivatives at the range's ends and at
 /// its middle need no sampling.
-pub(crate) struct Part<const SAMPLED: usize, const PAIRS: usize> {
+pub(crate) struct FitRange<const SAMPLED: usize, const PAIRS: usize> {
     pub(crate) nodes: &'static Nodes<PAIRS>,
     pub(crate) middle: Place,
     /// Half of the basis functions' second derivatives at the middle.
     pub(crate) bends: [f32; 3],
     /// The differences of the basis functions at `-s` and at `s` from the middle, for each node
     /// `s` that is sampled.
-    pub(crate) gains: [[[Gain; 2]; 3]; SAMPLED],
-    /// The factor from a half-rotation vector at a key to the derivative there, by the part's
+    pub(crate) gains: [[[Gain; 3]; 2]; SAMPLED],
+    /// The factor from a half-rotation vector at a key to the derivative there, by the range's
     /// parameter.
     pub(crate) slope: f32,
 }
 
 /// The whole curve by degree 8; the others use degree 10.
-pub(crate) const FEW_POWERS: Part<1, 4> = Part::new(&FEW_END_NODES, 0.5, 1.0);
-pub(crate) const WHOLE: Part<2, 5> = Part::new(&END_NODES, 0.5, 1.0);
-pub(crate) const HALF: Part<2, 5> = Part::new(&HALF_END_NODES, 0.25, 0.5);
+pub(crate) const FEW_POWERS: FitRange<1, 4> = FitRange::new(&FEW_END_NODES, 0.5, 1.0);
+pub(crate) const WHOLE: FitRange<2, 5> = FitRange::new(&END_NODES, 0.5, 1.0);
+pub(crate) const HALF: FitRange<2, 5> = FitRange::new(&HALF_END_NODES, 0.25, 0.5);
 /// The second half, sampled backwards from the end of the curve.
-pub(crate) const LAST_HALF: Part<2, 5> = HALF.backward();
+pub(crate) const LAST_HALF: FitRange<2, 5> = HALF.backward();
 /// The place where both halves meet.
 pub(crate) const SEAM: Place = Place::new(0.5, 0.5);
 
-/// The basis functions at one value of the parameter, and their derivatives by a part's parameter.
+/// The basis functions at one value of the parameter, and their derivatives by a range's parameter.
 pub(crate) struct Place {
     pub(crate) weights: [f32; 3],
     pub(crate) rates: [f32; 3],
 }
 
 impl Place {
-    /// The place `m` of the whole parameter, for a part that is `width` of the whole.
+    /// The place `m` of the whole parameter, for a range that is `width` of the whole.
     const fn new(m: f64, width: f64) -> Self {
         let n = 1.0 - m;
         Self {
@@ -59,10 +59,10 @@ impl Place {
     }
 }
 
-impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
+impl<const SAMPLED: usize, const PAIRS: usize> FitRange<SAMPLED, PAIRS> {
     const fn new(nodes: &'static Nodes<PAIRS>, middle: f64, width: f64) -> Self {
         let (m, square) = (middle, width * width);
-        let mut part = Self {
+        let mut range = Self {
             nodes,
             middle: Place::new(middle, width),
             bends: [
@@ -70,34 +70,29 @@ impl<const SAMPLED: usize, const PAIRS: usize> Part<SAMPLED, PAIRS> {
                 ((3.0 - 6.0 * m) * square) as f32,
                 (3.0 * m * square) as f32,
             ],
-            gains: [[[Gain::new(0.0); 2]; 3]; SAMPLED],
+            gains: [[[Gain::new(0.0); 3]; 2]; SAMPLED],
             slope: (3.0 * width) as f32,
         };
         let mut k = 0;
         while k < SAMPLED {
             // The first node is the middle, which is not sampled.
             let s = nodes.at[k + 1] as f64 * width;
-            let (before, after) = (gains(m, -s), gains(m, s));
-            let mut j = 0;
-            while j < 3 {
-                part.gains[k][j] = [before[j], after[j]];
-                j += 1;
-            }
+            range.gains[k] = [gains(m, -s), gains(m, s)];
             k += 1;
         }
-        part
+        range
     }
 }
 
-impl Part<2, 5> {
-    /// The part for a parameter that runs backwards. The three basis functions change places, as
+impl FitRange<2, 5> {
+    /// The range for a parameter that runs backwards. The three basis functions change places, as
     /// `1 - Bᵢ(1 - t) = B₄₋ᵢ(t)`.
     const fn backward(mut self) -> Self {
         self.middle.weights = backward(self.middle.weights);
         self.middle.rates = backward(self.middle.rates);
         self.bends = backward(self.bends);
-        let [first, second] = self.gains;
-        self.gains = [backward(first), backward(second)];
+        let [[a, b], [c, d]] = self.gains;
+        self.gains = [[backward(a), backward(b)], [backward(c), backward(d)]];
         self
     }
 }

@@ -1,4 +1,4 @@
-//! Sets with fewer samples than keys, cut into pieces for a Vulkan device: some tracks at a time,
+//! Sets with fewer samples than keys, cut into dispatches for a Vulkan device: some tracks at a time,
 //! with their keys as they are stored and the places of the samples among them.
 
 use std::ops::Range;
@@ -8,13 +8,12 @@ use glam::Quat;
 use crate::curve::options::{Ends, InterpolationError};
 use crate::fit::tangent_weights::WeightRule;
 use crate::from_keys::KeyCurve;
-use crate::method::interpolation::Interpolation;
+use crate::prepare::request::Request;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{Ticks, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::time::frames::Ticks;
 use crate::tracks::track_keys::TrackKeys;
 
-/// The most rows of one piece; every Vulkan device allows as many workgroups along y.
+/// The most rows of one dispatch; every Vulkan device allows as many workgroups along y.
 const ROWS: usize = 65_535;
 
 /// Keys that one task writes.
@@ -22,10 +21,7 @@ const TASK_KEYS: usize = 16 * 1024;
 
 /// What is to be evaluated.
 pub(crate) struct KeyJob<'a> {
-    pub(crate) set: &'a TrackSet,
-    pub(crate) tracks: Range<usize>,
-    pub(crate) interpolation: &'a Interpolation,
-    pub(crate) timeline: &'a Timeline,
+    pub(crate) request: &'a Request<'a>,
     /// The curves that its samples lie on.
     pub(crate) curve: KeyCurve,
 }
@@ -40,29 +36,29 @@ impl<'a> KeyJob<'a> {
     }
 
     /// All keys of the set, where kernels can read them as they are stored. For cubics they
-    /// cannot, because weights are indexed like the keys of a piece.
+    /// cannot, because weights are indexed like the keys of a dispatch.
     pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
-        self.weights().is_none().then_some(self.set.keys())
+        self.weights().is_none().then_some(self.request.set.keys())
     }
 
-    /// Its pieces, which are consecutive in the result.
-    pub(crate) fn pieces(&self) -> KeyPieces<'a, '_> {
-        KeyPieces {
+    /// Its dispatches, which are consecutive in the result.
+    pub(crate) fn dispatches(&self) -> KeyDispatches<'a, '_> {
+        KeyDispatches {
             job: self,
-            next: self.tracks.start,
+            next: self.request.tracks.start,
             long: None,
         }
     }
 }
 
 /// Some samples of a track, and the keys that they lie among.
-pub(crate) struct Part<'a> {
+pub(crate) struct KeyWindow<'a> {
     pub(crate) keys: TrackKeys<'a>,
-    pub(crate) window: Range<usize>,
+    pub(crate) samples: Range<usize>,
 }
 
 /// What one dispatch evaluates.
-pub(crate) struct KeyPiece<'a, 'j> {
+pub(crate) struct KeyDispatch<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     pub(crate) tasks: Vec<Task<'a>>,
     /// Number of rows. Tracks that share their key times are a row each, because their samples lie
@@ -73,7 +69,7 @@ pub(crate) struct KeyPiece<'a, 'j> {
     pub(crate) samples: usize,
 }
 
-/// The part of a piece that one thread writes.
+/// What one thread writes of a dispatch.
 pub(crate) struct Task<'a> {
     pub(crate) what: What<'a>,
     pub(crate) keys: usize,
@@ -83,15 +79,15 @@ pub(crate) struct Task<'a> {
 pub(crate) enum What<'a> {
     /// All of some tracks.
     Tracks(Range<usize>),
-    Part(Part<'a>),
+    Window(KeyWindow<'a>),
 }
 
-/// Cuts a job into pieces.
-pub(crate) struct KeyPieces<'a, 'j> {
+/// Cuts a job into dispatches.
+pub(crate) struct KeyDispatches<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     /// The next track.
     next: usize,
-    /// What is left of a track that is larger than a piece.
+    /// What is left of a track that is larger than a dispatch.
     long: Option<Long>,
 }
 
@@ -102,23 +98,23 @@ struct Long {
     sample: usize,
 }
 
-impl<'a, 'j> KeyPieces<'a, 'j> {
-    /// The next piece, of about `most` keys and at most `most` samples.
+impl<'a, 'j> KeyDispatches<'a, 'j> {
+    /// The next dispatch, of about `most` keys and at most `most` samples.
     pub(crate) fn next(
         &mut self,
         most: usize,
-    ) -> Result<Option<KeyPiece<'a, 'j>>, InterpolationError> {
+    ) -> Result<Option<KeyDispatch<'a, 'j>>, InterpolationError> {
         let job = self.job;
-        if let Some(piece) = self.next_of_long(most) {
-            return Ok(Some(piece));
+        if let Some(dispatch) = self.next_of_long(most) {
+            return Ok(Some(dispatch));
         }
-        let (set, samples, first) = (job.set, job.timeline.len(), self.next);
-        let in_frames = matches!(job.timeline.ticks, Ticks::Frames { .. });
+        let (set, samples, first) = (job.request.set, job.request.timeline.len(), self.next);
+        let in_frames = matches!(job.request.timeline.ticks, Ticks::Frames { .. });
         let within = |tracks: Range<usize>, most| set.tracks_within(tracks, most);
         let rows = most / samples.max(1);
-        let end = within(first..job.tracks.end, most).min(first.saturating_add(rows));
+        let end = within(first..job.request.tracks.end, most).min(first.saturating_add(rows));
         let is_long = end == first;
-        self.next = job.tracks.end.min(end.max(first + 1));
+        self.next = job.request.tracks.end.min(end.max(first + 1));
         job.check(first..self.next)?;
         if first == self.next {
             return Ok(None);
@@ -148,7 +144,7 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
             && tracks <= ROWS
             && (first..self.next).all(|track| std::ptr::eq(times(first), times(track)));
         let rows = if alike { tracks } else { 1 };
-        Ok(Some(KeyPiece {
+        Ok(Some(KeyDispatch {
             job,
             tasks,
             rows,
@@ -157,9 +153,9 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         }))
     }
 
-    /// The next piece of a track that is larger than a piece: several parts, a task each.
-    fn next_of_long(&mut self, most: usize) -> Option<KeyPiece<'a, 'j>> {
-        let mut piece = KeyPiece {
+    /// The next dispatch of a track that is larger than a dispatch: several windows, a task each.
+    fn next_of_long(&mut self, most: usize) -> Option<KeyDispatch<'a, 'j>> {
+        let mut dispatch = KeyDispatch {
             job: self.job,
             tasks: Vec::new(),
             rows: 1,
@@ -168,28 +164,28 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         };
         let each = most.min(TASK_KEYS);
         while let Some(long) = self.long {
-            let is_full = piece.keys.max(piece.samples) + each > most;
-            if is_full && !piece.tasks.is_empty() {
+            let is_full = dispatch.keys.max(dispatch.samples) + each > most;
+            if is_full && !dispatch.tasks.is_empty() {
                 break;
             }
-            let part = self.part_of(long, each);
-            let (keys, samples) = (part.keys.keys.len(), part.window.len());
-            piece.keys += keys;
-            piece.samples += samples;
-            piece.tasks.push(Task {
-                what: What::Part(part),
+            let window = self.window_of(long, each);
+            let (keys, samples) = (window.keys.keys.len(), window.samples.len());
+            dispatch.keys += keys;
+            dispatch.samples += samples;
+            dispatch.tasks.push(Task {
+                what: What::Window(window),
                 keys,
                 samples,
             });
         }
-        (!piece.tasks.is_empty()).then_some(piece)
+        (!dispatch.tasks.is_empty()).then_some(dispatch)
     }
 
-    /// Takes the next part of a track that is larger than a piece, and notes what is left.
-    fn part_of(&mut self, long: Long, most: usize) -> Part<'a> {
-        let whole = TrackKeys::whole(self.job.set, long.track);
+    /// Takes the next window of a track that is larger than a dispatch, and notes what is left.
+    fn window_of(&mut self, long: Long, most: usize) -> KeyWindow<'a> {
+        let whole = TrackKeys::whole(self.job.request.set, long.track);
         let times = whole.times;
-        let samples = self.job.timeline.len();
+        let samples = self.job.request.timeline.len();
         let last = whole.all - 1;
         let last_key = (long.key + most - 1).min(last);
         let end = match self.job.clock(times) {
@@ -212,9 +208,9 @@ impl<'a, 'j> KeyPieces<'a, 'j> {
         // A cubic needs the keys before and after its own two as well.
         let beside = usize::from(self.job.weights().is_some());
         let first = long.key.saturating_sub(beside);
-        Part {
+        KeyWindow {
             keys: whole.between(first, (last_key + beside).min(last)),
-            window: long.sample..sample,
+            samples: long.sample..sample,
         }
     }
 }
@@ -223,25 +219,25 @@ impl<'a> KeyJob<'a> {
     /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
     /// velocity that is too large.
     fn check(&self, tracks: Range<usize>) -> Result<(), InterpolationError> {
-        let ends = self.interpolation.ends;
+        let ends = self.request.interpolation.ends;
         if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
             for track in tracks {
-                ends.check(self.set.times_and_keys(track).1, track)?;
+                ends.check(self.request.set.times_and_keys(track).1, track)?;
             }
         }
         Ok(())
     }
 
     /// All of a track.
-    pub(crate) fn track(&self, index: usize) -> Part<'a> {
-        Part {
-            keys: TrackKeys::whole(self.set, index),
-            window: 0..self.timeline.len(),
+    pub(crate) fn track(&self, index: usize) -> KeyWindow<'a> {
+        KeyWindow {
+            keys: TrackKeys::whole(self.request.set, index),
+            samples: 0..self.request.timeline.len(),
         }
     }
 
     fn clock(&self, times: &[f64]) -> Option<FrameClock> {
-        match self.timeline.ticks {
+        match self.request.timeline.ticks {
             Ticks::Frames { rate, start } => {
                 Some(FrameClock::new(rate, start, times[times.len() - 1]))
             }

@@ -1,5 +1,4 @@
-//! Lists of a block's lanes, and curves straight from keys that wait until they fill a block for
-//! the Hermite fit.
+//! Lists of a block's lanes, and the Hermite fit of the curves in them.
 
 use std::ops::Range;
 
@@ -16,7 +15,7 @@ use crate::simd::lanes::Lanes;
 
 /// A list of lanes.
 pub(crate) struct List {
-    count: usize,
+    pub(crate) count: usize,
     lanes: [u32; ROOM_FOR],
 }
 
@@ -30,12 +29,6 @@ impl List {
             count: 0,
             lanes: [0; ROOM_FOR],
         }
-    }
-
-    /// Adds a lane.
-    pub(crate) fn push(&mut self, lane: usize) {
-        self.lanes[self.count % ROOM_FOR] = lane as u32;
-        self.count += 1;
     }
 
     /// Adds each of some lanes whose squared extent is wanted, without a branch, as its outcome
@@ -55,16 +48,6 @@ impl List {
         self.count = count;
     }
 
-    /// The number of lanes.
-    pub(crate) fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Whether the list has as many lanes as a block.
-    fn is_full(&self) -> bool {
-        self.count == LANES
-    }
-
     /// The lanes.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
         self.lanes[..self.count].iter().map(|&lane| lane as usize)
@@ -76,83 +59,10 @@ impl List {
     }
 }
 
-/// Curves that wait to be fitted in one way.
-pub(crate) struct WaitingCurves<F: 'static, const PAIRS: usize> {
-    how: &'static F,
-    /// The lanes whose curves [`WaitingCurves::take`] takes.
-    pub(crate) lanes: List,
-    /// Made for the first curve.
-    block: Option<Box<Block>>,
-}
-
-struct Block {
-    numbers: CurveNumbers,
-    places: [u32; ROOM],
-    own: List,
-}
-
-impl<F: KeyFit<PAIRS>, const PAIRS: usize> WaitingCurves<F, PAIRS> {
-    pub(crate) fn new(how: &'static F) -> Self {
-        Self {
-            how,
-            lanes: List::new(),
-            block: None,
-        }
-    }
-
-    /// Takes the curves in the listed lanes, which become the segments at these places, and fits
-    /// them whenever they fill a block.
-    pub(crate) fn take(
-        &mut self,
-        numbers: &CurveNumbers,
-        places: &[u32; ROOM],
-        prepared: &mut Prepared,
-    ) {
-        for lane in self.lanes.iter() {
-            let new = || {
-                Box::new(Block {
-                    numbers: [[[0.0; 4]; ROOM]; 5],
-                    places: [0; ROOM],
-                    own: List::new(),
-                })
-            };
-            let block = self.block.get_or_insert_with(new);
-            block.push(numbers, places, lane);
-            if block.own.is_full() {
-                block.fit(self.how, prepared);
-            }
-        }
-        self.lanes.clear();
-    }
-
-    /// Fits the curves that still wait.
-    pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
-        if let Some(block) = &mut self.block {
-            block.fit(self.how, prepared);
-        }
-    }
-}
-
-impl Block {
-    fn push(&mut self, numbers: &CurveNumbers, places: &[u32; ROOM], lane: usize) {
-        let own = self.own.count;
-        for (waiting, numbers) in self.numbers.iter_mut().zip(numbers) {
-            waiting[own] = numbers[lane];
-        }
-        self.places[own] = places[lane];
-        self.own.push(own);
-    }
-
-    fn fit<const PAIRS: usize>(&mut self, how: &impl KeyFit<PAIRS>, prepared: &mut Prepared) {
-        fit(how, &self.own, &self.numbers, &self.places, prepared);
-        self.own.clear();
-    }
-}
-
-/// Fits the curves in the listed lanes into the segments at their places.
+/// Fits the curves in the listed lanes into the segments at their places, and empties the list.
 pub(crate) fn fit<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
-    list: &List,
+    list: &mut List,
     curves: &CurveNumbers,
     places: &[u32; ROOM],
     prepared: &mut Prepared,
@@ -172,6 +82,7 @@ pub(crate) fn fit<const PAIRS: usize>(
         segments,
     });
     segments.truncate(count);
+    list.clear();
 }
 
 struct Fit<'a, F, const PAIRS: usize> {

@@ -32,7 +32,7 @@ impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: boo
     }
 }
 
-pub(crate) trait Destination {
+pub(crate) trait Sink {
     /// Stores the first `count` samples.
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
         self,
@@ -42,7 +42,7 @@ pub(crate) trait Destination {
 }
 
 /// Ordinary stores. Elements after `count` may be overwritten, up to the end of a turn.
-impl Destination for &mut [[f32; 4]] {
+impl Sink for &mut [[f32; 4]] {
     #[inline(always)]
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
         self,
@@ -86,7 +86,7 @@ pub(crate) struct Places<'a> {
     pub(crate) rest: &'a mut Line,
 }
 
-impl Destination for Places<'_> {
+impl Sink for Places<'_> {
     #[inline(always)]
     fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
         self,
@@ -151,8 +151,9 @@ pub(crate) mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
-    use crate::cpu::evaluate::{Affine, frames_past_caches};
+    use crate::cpu::evaluate::frames_past_caches;
     use crate::simd::line::EACH;
+    use crate::time::runs::Affine;
 
     /// Evaluates frames with streaming stores, after `filled` rotations of their first line.
     pub(crate) fn in_lines<L: Lanes, S: Evaluate>(

@@ -1,0 +1,21 @@
+//! Arithmetic operators for types that wrap numbers.
+
+/// Implements binary operators of a type, generic over what stands in brackets: each operator's
+/// result is an expression of the operands, which the caller names.
+macro_rules! operators {
+    (@one [$($generics:tt)*] $name:ty, $a:ident, $b:ident, $operator:ident, $apply:ident, $result:expr) => {
+        impl<$($generics)*> std::ops::$operator for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $apply(self, other: Self) -> Self {
+                let ($a, $b) = (self, other);
+                $result
+            }
+        }
+    };
+    ($generics:tt $name:ty, $a:ident, $b:ident: $($operator:ident $apply:ident => $result:expr;)+) => {
+        $(crate::math::operators::operators!(@one $generics $name, $a, $b, $operator, $apply, $result);)+
+    };
+}
+pub(crate) use operators;
