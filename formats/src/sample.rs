@@ -107,6 +107,17 @@ impl ChannelMethods<'_> {
         Ok(samples)
     }
 
+    /// The tracks of a clip by the methods of their rotations.
+    #[must_use]
+    pub fn groups_of(&self, clip: &Motion) -> Vec<(Method, Vec<usize>)> {
+        let resting = self.resting_method(clip);
+        let method = |track: usize| self.rotation_method(clip.channel(track), resting);
+        groups(clip.set.track_count(), |track| method(track).name)
+            .into_iter()
+            .map(|group| (method(group[0]), group))
+            .collect()
+    }
+
     /// Evaluates the rotations of a clip, each track by its own sampler.
     ///
     /// # Errors
@@ -119,13 +130,9 @@ impl ChannelMethods<'_> {
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let tracks = clip.set.track_count();
-        let resting = self.resting_method(clip);
-        let methods: Vec<Method> = (0..tracks)
-            .map(|track| self.rotation_method(clip.channel(track), resting))
-            .collect();
         let mut all = Vec::new();
-        for group in groups(tracks, |track| methods[track].name) {
-            let interpolation = (self.with)(methods[group[0]]);
+        for (method, group) in self.groups_of(clip) {
+            let interpolation = (self.with)(method);
             let set = clip.tracks(&group);
             let found = engine.evaluate_as(&set, interpolation, frames, layout)?;
             all.resize(tracks * found.samples(), Quat::IDENTITY);
