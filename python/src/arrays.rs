@@ -145,15 +145,20 @@ pub(crate) fn is_aligned(start: usize, strides: &[isize], to: usize) -> bool {
             .all(|stride| stride.unsigned_abs().is_multiple_of(to))
 }
 
+/// The numbers as they lie in memory, where that is C order. (`as_slice` takes Fortran's too.)
+fn in_order<'a, T: numpy::Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Option<&'a [T]> {
+    array.as_slice().ok().filter(|_| array.is_c_contiguous())
+}
+
 /// Numbers of any shape, in f64.
 pub(crate) fn doubles(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Numbers<f64>> {
     let array = array(value, what)?;
     let shape = array.shape().to_vec();
     let values = match &array {
         Array::Single(array) => array.as_array().iter().map(|&it| f64::from(it)).collect(),
-        Array::Double(array) => match array.as_slice() {
-            Ok(slice) => slice.to_vec(),
-            Err(_) => array.as_array().iter().copied().collect(),
+        Array::Double(array) => match in_order(array) {
+            Some(slice) => slice.to_vec(),
+            None => array.as_array().iter().copied().collect(),
         },
     };
     Ok(Numbers { shape, values })
@@ -197,9 +202,9 @@ fn components(value: &Bound<'_, PyAny>, order: Order, what: &str) -> PyResult<Nu
     let single = |of: [f32; 4]| Quat::from_array(order.xyzw(of));
     let double = |of: [f64; 4]| unit(DQuat::from_array(order.xyzw(of)));
     let values = match &array {
-        Array::Single(array) => match array.as_slice() {
-            Ok(slice) => slice.as_chunks().0.iter().copied().map(single).collect(),
-            Err(_) => fours(array.as_array().iter().copied(), single),
+        Array::Single(array) => match in_order(array) {
+            Some(slice) => slice.as_chunks().0.iter().copied().map(single).collect(),
+            None => fours(array.as_array().iter().copied(), single),
         },
         Array::Double(array) => fours(array.as_array().iter().copied(), double),
     };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PySlice};
+use pyo3::types::{PyList, PySlice};
 use tumble::method::SLERP;
 use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Method, Quantity, TrackSet};
 use tumble_formats::motion::Motion;
@@ -315,9 +315,4 @@ pub(crate) fn sets(
             }
         })
         .collect()
-}
-
-/// The keywords of a call.
-pub(crate) fn request(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Request> {
-    Request::new(keywords)
 }

@@ -49,7 +49,7 @@ pub(crate) fn devices(py: Python<'_>) -> PyResult<Vec<String>> {
 ///
 /// >>> import tumble
 /// >>> tumble.methods()["slerp"]
-/// 'constant angular velocity between keys'
+/// 'constant angular velocity between keys; velocity jumps at each key'
 #[pyfunction]
 pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let found = PyDict::new(py);

@@ -55,7 +55,7 @@ const CHUNK: usize = 1 << 20;
 /// (1, 31, 4)
 #[pyfunction]
 #[pyo3(signature = (
-    path, clips, *, format=None, sequence=None, linear=vec![], order="xyzw", layout="track",
+    path, clips, /, *, format=None, sequence=None, linear=vec![], order="xyzw", layout="track",
     overwrite=true, engine=None, **options
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -205,7 +205,10 @@ impl Save<'_> {
         let keys: Result<Vec<Samples>, _> = keys.collect();
         let keys = keys.map_err(|error| input(error.to_string()))?;
         let sampled: Vec<Sampled<'_>> = (self.clips.iter().zip(&keys))
-            .map(|(clip, keys)| keys.of(&clip.motion, clip.motion.rate, &[]))
+            .map(|(clip, keys)| {
+                let rate = clip.motion.rate.or_else(|| clip.motion.rate_of_keys());
+                keys.of(&clip.motion, rate, &[])
+            })
             .collect();
         write(&sampled, &self.motion, out).map_err(|error| of_write(&error))
     }

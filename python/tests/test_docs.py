@@ -87,7 +87,7 @@ def mypy(*arguments, cwd):
 
 
 def test_types_are_those_of_the_stubs(tmp_path):
-    mypy("mypy.stubtest", "tumble._tumble", "tumble", cwd=tmp_path)
+    mypy("mypy.stubtest", "tumble", cwd=tmp_path)
 
 
 def test_the_package_and_its_users_pass_strict_checks(tmp_path):

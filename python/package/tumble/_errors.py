@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class _Place:
+class _Place(Exception):
     """What the program says beside its message; None where it does not apply."""
 
     code: str | None
@@ -30,7 +30,7 @@ class _Place:
         self.pointer = pointer
 
 
-class Error(_Place, Exception):
+class Error(_Place):
     """Anything that Tumble refuses.
 
     `code` is that of docs/codes.md (`tumble explain E026`), or None; `file`, `line` and `column`

@@ -34,7 +34,6 @@ _Single: TypeAlias = NDArray[np.float32]
 class _Options(TypedDict, total=False):
     fps: _Rate | None
     at: _Arrays | None
-    times: _Arrays | None
     start: float | None
     end: float | None
     method: str | None
@@ -50,6 +49,9 @@ class _Options(TypedDict, total=False):
     tension: float | None
     continuity: float | None
     bias: float | None
+
+class _OptionsOrTimes(_Options, total=False):
+    times: _Arrays | None
 
 @final
 class Clip:
@@ -110,7 +112,7 @@ class Clip:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     @overload
     def evaluate(
@@ -120,7 +122,7 @@ class Clip:
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> Any: ...
     def plot(
         self,
@@ -153,7 +155,7 @@ class Engine:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     @overload
     def evaluate(
@@ -164,7 +166,7 @@ class Engine:
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> Any: ...
     def velocity(
         self,
@@ -173,7 +175,7 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     def acceleration(
         self,
@@ -182,7 +184,7 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     def matrices(
         self,
@@ -190,7 +192,7 @@ class Engine:
         *,
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     def euler(
         self,
@@ -200,13 +202,13 @@ class Engine:
         degrees: bool = True,
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> _Single: ...
     def poses(
-        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_Options]
+        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
     ) -> tuple[_Single, _Single, _Single]: ...
     def world(
-        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_Options]
+        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
     ) -> tuple[_Single, _Single]: ...
     def stream(
         self,
@@ -215,9 +217,9 @@ class Engine:
         chunk: int = 1048576,
         order: _Order = "xyzw",
         layout: _Layout = "track",
-        **options: Unpack[_Options],
+        **options: Unpack[_OptionsOrTimes],
     ) -> Chunks: ...
-    def verify(self, clip: Clip, **options: Unpack[_Options]) -> Verification: ...
+    def verify(self, clip: Clip, **options: Unpack[_OptionsOrTimes]) -> Verification: ...
 
 @final
 class Chunks:
@@ -308,6 +310,7 @@ def load(
 def save(
     path: _Path,
     clips: Clip | File | Sequence[Clip],
+    /,
     *,
     format: str | None = None,
     sequence: str | None = None,
@@ -316,7 +319,7 @@ def save(
     layout: _Layout = "track",
     overwrite: bool = True,
     engine: Engine | None = None,
-    **options: Unpack[_Options],
+    **options: Unpack[_OptionsOrTimes],
 ) -> None: ...
 def devices() -> list[str]: ...
 def methods() -> dict[str, str]: ...
