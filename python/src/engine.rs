@@ -2,21 +2,18 @@
 
 use std::sync::OnceLock;
 
-use glam::Vec3;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::{Axes, Device, Encoding, EngineOptions, EulerSequence, Layout, MatrixOrder, Quantity};
 use tumble_cli::host;
-use tumble_formats::sample::{ChannelMethods, Samples};
-use tumble_formats::world::world;
 
 use crate::arrays::Order;
-use crate::build::clip_of;
 use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
-use crate::evaluate::{Result, shaped};
-use crate::options::{Request, Samples as Wanted};
+use crate::evaluate::Result;
+use crate::options::Request;
+use crate::poses;
 use crate::stream::Chunks;
 use crate::verify::Verification;
 
@@ -298,31 +295,7 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, layout) = (clip.py(), layout_named(layout)?);
-        let (samples, tracks) = self.samples(clip, options)?;
-        let count = samples.times.len();
-        let all = |own: &[Vec3], rest: Vec3| -> Vec<f32> {
-            match own.is_empty() {
-                true => std::iter::repeat_n(rest.to_array(), tracks * count)
-                    .flatten()
-                    .collect(),
-                false => own.iter().flat_map(|vector| vector.to_array()).collect(),
-            }
-        };
-        let rotations = samples
-            .rotations
-            .iter()
-            .flat_map(|it| it.to_array())
-            .collect();
-        let three = (tracks, count, 3);
-        PyTuple::new(
-            py,
-            [
-                shaped(py, all(&samples.translations, Vec3::ZERO), three, layout)?,
-                shaped(py, rotations, (tracks, count, 4), layout)?,
-                shaped(py, all(&samples.scales, Vec3::ONE), three, layout)?,
-            ],
-        )
+        poses::local(self, clip, layout_named(layout)?, options)
     }
 
     /// Where the joints of a skeleton are in the world: positions (tracks, frames, 3) and rotations
@@ -342,22 +315,7 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, layout) = (clip.py(), layout_named(layout)?);
-        let (samples, tracks) = self.samples(clip, options)?;
-        let motion = &clip.get().motion;
-        let poses = py.detach(|| {
-            guarded(|| world(motion, &samples).map_err(|error| input(error.to_string())))
-        })?;
-        let count = samples.times.len();
-        let positions = poses.iter().flat_map(|it| it.position.to_array()).collect();
-        let rotations = poses.iter().flat_map(|it| it.rotation.to_array()).collect();
-        PyTuple::new(
-            py,
-            [
-                shaped(py, positions, (tracks, count, 3), layout)?,
-                shaped(py, rotations, (tracks, count, 4), layout)?,
-            ],
-        )
+        poses::in_world(self, clip, layout_named(layout)?, options)
     }
 
     /// The rotations in pieces of about `chunk` rotations, for results larger than memory: an
@@ -371,7 +329,7 @@ impl Engine {
     /// slice(0, 1, None) slice(0, 4, None) (1, 4, 4)
     /// slice(0, 1, None) slice(4, 8, None) (1, 4, 4)
     /// slice(0, 1, None) slice(8, 10, None) (1, 2, 4)
-    #[pyo3(signature = (clip, *, chunk=1 << 20, order="xyzw", layout="track", **options))]
+    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options))]
     fn stream(
         &self,
         clip: &Bound<'_, Clip>,
@@ -381,19 +339,11 @@ impl Engine {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Chunks> {
         let request = Request::new(options)?;
-        let (order, layout) = (Order::named(order)?, layout_named(layout)?);
+        let form = (Order::named(order)?, layout_named(layout)?);
         let motion = &clip.get().motion;
-        let (frames, samples) = request.samples()?.resolved(&motion.set)?;
         let engine = self.engine(chunk)?;
-        Chunks::new(
-            engine,
-            motion,
-            &request,
-            frames,
-            samples,
-            chunk,
-            (order, layout),
-        )
+        clip.py()
+            .detach(|| guarded(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
 
     /// Compares the device with the CPU, bit by bit, and both with a reference in float64 that
@@ -462,39 +412,12 @@ impl Engine {
             )
         })
     }
-
-    /// All channels of a clip, `[sample][track]`.
-    pub(crate) fn samples(
-        &self,
-        clip: &Bound<'_, Clip>,
-        options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<(Samples, usize)> {
-        let request = Request::new(options)?;
-        let motion = &clip.get().motion;
-        let wanted = request.samples()?;
-        if !matches!(wanted, Wanted::Rate(..) | Wanted::Shared { .. }) {
-            return Err(input("at: poses are of all tracks at the same times"));
-        }
-        let (frames, count) = wanted.resolved(&motion.set)?;
-        let tracks = motion.set.track_count();
-        let engine = self.engine(tracks * count)?;
-        let samples = clip.py().detach(|| {
-            guarded(|| {
-                let methods = ChannelMethods {
-                    method: request.method,
-                    with: &request.with(Quantity::Rotation),
-                };
-                methods
-                    .sample(&engine, motion, &frames)
-                    .map_err(|error| of_engine(&error))
-            })
-        })?;
-        Ok((samples, tracks))
-    }
 }
 
 /// The arrays among the keywords.
-fn request_arrays<'py>(options: Option<&Bound<'py, PyDict>>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+pub(crate) fn request_arrays<'py>(
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let Some(options) = options else {
         return Ok(Vec::new());
     };
@@ -511,51 +434,4 @@ fn of_host(failure: &host::Refused) -> PyErr {
         true => input(&failure.message),
         false => device(&failure.message),
     }
-}
-
-/// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
-///
-/// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
-/// as_rotation=False, **options)`
-///
-/// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
-/// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
-/// and the other keywords are as those of `Engine.evaluate`.
-///
-/// >>> import numpy as np, tumble
-/// >>> half = np.sqrt(0.5)
-/// >>> tumble.evaluate([0.0, 2.0], [[1, 0, 0, 0], [0, 0, 0, 1]], at=[0.0, 1.0], order="wxyz",
-/// ...                 method="slerp").round(4)
-/// array([[1.    , 0.    , 0.    , 0.    ],
-///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
-#[pyfunction]
-#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
-#[allow(clippy::too_many_arguments, reason = "keywords")]
-pub(crate) fn evaluate<'py>(
-    times: &Bound<'py, PyAny>,
-    keys: &Bound<'py, PyAny>,
-    out: Option<&Bound<'py, PyAny>>,
-    order: &str,
-    layout: &str,
-    as_rotation: bool,
-    options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    guarded(|| {
-        let py = times.py();
-        let request = Request::new(options)?;
-        let order = Order::named(order)?;
-        let (motion, is_one_track) = clip_of(times, keys, order, None)?;
-        let result = Result {
-            // Rotations of SciPy's have an order of their own.
-            order: if as_rotation { Order::Xyzw } else { order },
-            layout: layout_named(layout)?,
-            as_rotation,
-            is_one_track,
-            ..Result::default()
-        };
-        let engine = |rotations| default_engine(py)?.get().engine(rotations);
-        let arrays = request_arrays(options)?;
-        let inputs: Vec<_> = [times, keys].into_iter().chain(&arrays).collect();
-        result.of(py, engine, &motion.into(), &request, out, &inputs)
-    })
 }

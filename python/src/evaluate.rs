@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
@@ -272,23 +271,6 @@ fn track_of(clip: &Motion, track: usize) -> Motion {
         channels: clip.channels.get(track).copied().into_iter().collect(),
         skeleton: Vec::new(),
         ..Motion::default()
-    }
-}
-
-/// Sampled numbers as an array, without a copy; `[sample][track]` is shown as `[track][sample]` if
-/// that is the layout.
-pub(crate) fn shaped<'py>(
-    py: Python<'py>,
-    numbers: Vec<f32>,
-    (tracks, samples, components): (usize, usize, usize),
-    layout: Layout,
-) -> PyResult<Bound<'py, PyAny>> {
-    let flat = PyArray1::from_vec(py, numbers);
-    debug_assert_eq!(flat.len(), tracks * samples * components);
-    let array = flat.reshape([samples, tracks, components])?;
-    match layout {
-        Layout::FrameMajor => Ok(array.into_any()),
-        Layout::TrackMajor => array.call_method1(intern!(py, "swapaxes"), (0, 1)),
     }
 }
 

@@ -13,8 +13,10 @@ mod engine;
 mod errors;
 mod evaluate;
 mod file;
+mod function;
 mod options;
 mod output;
+mod poses;
 mod program;
 mod run;
 mod save;
@@ -29,9 +31,11 @@ mod _tumble {
     #[pymodule_export]
     use crate::clip::Clip;
     #[pymodule_export]
-    use crate::engine::{Engine, evaluate};
+    use crate::engine::Engine;
     #[pymodule_export]
     use crate::file::{File, load};
+    #[pymodule_export]
+    use crate::function::evaluate;
     #[pymodule_export]
     use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]

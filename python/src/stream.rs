@@ -48,11 +48,10 @@ impl Chunks {
         engine: Engine,
         motion: &Arc<Motion>,
         request: &Request,
-        frames: Frames,
-        samples: usize,
         chunk: usize,
         (order, layout): (Order, Layout),
     ) -> PyResult<Self> {
+        let (frames, samples) = request.samples()?.resolved(&motion.set)?;
         if chunk == 0 {
             return Err(input(
                 "chunk: give the number of rotations of a piece, over 0",

@@ -9,6 +9,7 @@ from typing_extensions import Buffer, Unpack
 
 from tumble._notebook import View
 
+__all__: list[str]
 __version__: str
 
 class _Rotation(Protocol):
