@@ -188,7 +188,7 @@ impl Parts<'_, '_> {
         for (what, value) in [("translations", self.translations), ("scales", self.scales)] {
             for (track, row) in rows(value, what, tracks, &[3])? {
                 let times = set.track(track).times.to_vec();
-                let vectors: Vec<Vec3> = threes(&row).map(|vector| vector.as_vec3()).collect();
+                let vectors: Vec<Vec3> = threes(&row).map(DVec3::as_vec3).collect();
                 match what {
                     "scales" => set.set_scales(track, &times, &vectors, &[]),
                     _ => set.set_translations(track, &times, &vectors, &[]),
@@ -249,7 +249,7 @@ impl Parts<'_, '_> {
             None => vec![Vec3::ZERO; tracks],
             Some(value) => match doubles(value, "offsets")? {
                 Numbers { shape, values } if *shape == [tracks, 3] => {
-                    threes(&values).map(|offset| offset.as_vec3()).collect()
+                    threes(&values).map(DVec3::as_vec3).collect()
                 }
                 Numbers { shape, .. } => {
                     return Err(input(format!(

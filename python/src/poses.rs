@@ -1,6 +1,6 @@
 //! Whole poses: translations, rotations and scales, relative to the parents or in the world.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -27,10 +27,10 @@ pub(crate) fn local<'py>(
     let all = |own: &[Vec3], rest: Vec3| -> Vec<f32> {
         match own.is_empty() {
             true => [rest.to_array()].repeat(tracks * count).into_flattened(),
-            false => own.iter().flat_map(|vector| vector.to_array()).collect(),
+            false => own.iter().flat_map(Vec3::to_array).collect(),
         }
     };
-    let rotations = samples.rotations.iter().flat_map(|it| it.to_array());
+    let rotations = samples.rotations.iter().flat_map(Quat::to_array);
     let three = (tracks, count, 3);
     PyTuple::new(
         py,

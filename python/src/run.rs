@@ -28,7 +28,7 @@ pub(crate) struct Job<'a> {
 
 /// Whether Ctrl-C was pressed.
 pub(crate) fn check_signals() -> PyResult<()> {
-    Python::attach(|py| py.check_signals())
+    Python::attach(Python::check_signals)
 }
 
 impl Job<'_> {
