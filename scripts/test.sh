@@ -113,3 +113,5 @@ CARGO_INCREMENTAL=0 cargo test -p tumble-cli --test cost "${as_release[@]}" |
     tee /dev/stderr | grep -q "^test result: ok. 2 passed"
 # Twenty seconds for each fuzz target, five for motion files; ten minutes each are FUZZ_SECONDS=600.
 FUZZ_SECONDS=${FUZZ_SECONDS:-20} cargo test --workspace
+# The Python package.
+./scripts/python.sh

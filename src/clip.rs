@@ -129,11 +129,7 @@ impl Clip {
     }
 
     pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {
-        let of_rotations = self.uploaded.data.interpolation.quantity == Quantity::Rotation;
-        if !encoding.row().takes_vectors && !of_rotations {
-            return Err(Error::NotRotations { encoding });
-        }
-        Ok(())
+        encoding.check(self.uploaded.data.interpolation.quantity)
     }
 
     /// The rotation of every track at every sample, encoded where it is evaluated. The bytes are
@@ -185,5 +181,15 @@ impl std::fmt::Debug for Clip {
             .field("method", &self.uploaded.data.interpolation.method)
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
+    }
+}
+
+impl Encoding {
+    /// Refuses what cannot be stored in this way.
+    pub(crate) fn check(self, quantity: Quantity) -> Result<(), Error> {
+        match self.row().takes_vectors || quantity == Quantity::Rotation {
+            true => Ok(()),
+            false => Err(Error::NotRotations { encoding: self }),
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Why an evaluation failed.
 
+use std::ops::Range;
+
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::OfDevice;
@@ -36,6 +38,17 @@ pub enum Error {
         given: usize,
         /// Bytes of the result.
         needed: usize,
+    },
+    /// A result has no such part.
+    #[error(
+        "there are no tracks {:?} with samples {:?} in a result of {} tracks with {} samples",
+        part.0, part.1, whole.0, whole.1
+    )]
+    NoSuchPart {
+        /// The tracks and the samples asked for.
+        part: (Range<usize>, Range<usize>),
+        /// How many tracks and samples there are.
+        whole: (usize, usize),
     },
     /// Poses cannot be put together as asked.
     #[error("{0}")]

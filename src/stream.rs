@@ -10,10 +10,13 @@ use glam::Quat;
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
+use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
+use crate::prepare::batch::Batch;
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::request::Request;
 use crate::time::frames::Frames;
@@ -119,6 +122,137 @@ impl Engine {
             Ok((self.backend).evaluate_tracks(&request, layout, output)?)
         };
         run(whole.cut(chunk), fill, sink)
+    }
+}
+
+/// Results in pieces that the caller asks for, each into memory of its own choice: for iterators,
+/// and for those who want to stop in between.
+impl Engine {
+    /// Some tracks of a result, `[track][sample]`, into the caller's memory. Only they are prepared;
+    /// the frames are those of the whole set. The bytes are those of [`Clip::evaluate_encoded`];
+    /// memory that is aligned to 16 bytes is filled without a copy.
+    ///
+    /// ```
+    /// # use glam::Quat;
+    /// # use tumble::{Device, Encoding, Engine, Error, Frames, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+    /// # set.push("", &[0.0, 1.0], &keys).unwrap();
+    /// # set.push("", &[0.0, 1.0], &keys).unwrap();
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let mut second = [[0.0_f32; 4]; 61];
+    /// let bytes = bytemuck::cast_slice_mut(&mut second);
+    /// let frames = Frames::fps(60);
+    /// engine.evaluate_tracks_into(&set, method::SLERP, &frames, 1..2, Encoding::F32, bytes)?;
+    /// assert_eq!(Quat::from_array(second[60]), keys[1]);
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`]; also when there are no such tracks, `output` has not exactly the
+    /// bytes of the result, or the encoding is for rotations and these are none.
+    pub fn evaluate_tracks_into(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        tracks: Range<usize>,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        let interpolation = interpolation.into();
+        encoding.check(interpolation.quantity)?;
+        let timeline = frames.resolve(set.track_count(), set.time_span())?;
+        let part = Window {
+            start: 0,
+            tracks: tracks.clone(),
+            samples: 0..timeline.len(),
+            layout: Layout::TrackMajor,
+        };
+        part.check(set.track_count(), timeline.len(), encoding, output)?;
+        if output.is_empty() {
+            return Ok(());
+        }
+        if encoding == Encoding::F32
+            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
+        {
+            let (timeline, layout) = (&timeline, Layout::TrackMajor);
+            (self.backend).evaluate_tracks(set, tracks, interpolation, timeline, layout, quats)?;
+            return Ok(());
+        }
+        let timeline = timeline.of_tracks(tracks.clone());
+        let wanted = Wanted {
+            batch: Batch::Tracks(tracks.clone()),
+            only_for: Some(&timeline),
+            ..Wanted::all(set)
+        };
+        let uploaded = Uploaded::new(&self.backend, set, interpolation, wanted, None)?;
+        let whole = Window::whole(tracks.len(), timeline.len(), Layout::TrackMajor);
+        let timeline = uploaded.data.folded(&timeline);
+        uploaded.evaluate_encoded(&self.backend, &timeline, &whole, encoding, output)?;
+        Ok(())
+    }
+}
+
+impl Clip {
+    /// Some samples of some tracks, encoded, `[track][sample]` or `[sample][track]`, into the
+    /// caller's memory. The bytes are those of [`Clip::evaluate_encoded`].
+    ///
+    /// # Errors
+    /// As there; also when there are no such tracks or samples, or `output` has not exactly the
+    /// bytes of the result.
+    pub fn evaluate_part_into(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        (tracks, samples): (Range<usize>, Range<usize>),
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        self.check_encoding(encoding)?;
+        let timeline = self.timeline(frames)?;
+        let part = Window {
+            start: 0,
+            tracks,
+            samples,
+            layout,
+        };
+        part.check(self.track_count(), timeline.len(), encoding, output)?;
+        if output.is_empty() {
+            return Ok(());
+        }
+        let timeline = self.uploaded.data.folded(&timeline);
+        if encoding == Encoding::F32
+            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
+        {
+            return self.evaluate_window_into(&timeline, &part, quats);
+        }
+        let backend = &self.engine().backend;
+        (self.uploaded).evaluate_encoded(backend, &timeline, &part, encoding, output)?;
+        Ok(())
+    }
+}
+
+impl Window {
+    /// Refuses a window that a result has not, and memory of another size than the window's.
+    fn check(
+        &self,
+        tracks: usize,
+        samples: usize,
+        encoding: Encoding,
+        output: &[u8],
+    ) -> Result<(), Error> {
+        let lies_in = |part: &Range<usize>, whole| part.start <= part.end && part.end <= whole;
+        if !lies_in(&self.tracks, tracks) || !lies_in(&self.samples, samples) {
+            return Err(Error::NoSuchPart {
+                part: (self.tracks.clone(), self.samples.clone()),
+                whole: (tracks, samples),
+            });
+        }
+        match (output.len(), self.len() * encoding.bytes()) {
+            (given, needed) if given == needed => Ok(()),
+            (given, needed) => Err(Error::OutputBytes { given, needed }),
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::support::{first_difference, hostile_set, vulkan_devices};
 use glam::Quat;
-use tumble::{Device, Engine, Error, Frames, Layout, METHODS, method};
+use tumble::{
+    Device, Encoding, Engine, Error, Frames, Interpolation, Layout, METHODS, WrapMode, method,
+};
 
 fn devices() -> Vec<Device> {
     [vec![Device::Cpu], vulkan_devices()].concat()
@@ -122,4 +124,106 @@ fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
         |_| Err(Stop::Enough),
     );
     assert!(matches!(result, Err(Stop::Engine(Error::Frames(_)))));
+}
+
+#[test]
+fn parts_are_those_of_the_whole() {
+    let set = hostile_set(5, 24);
+    let each: Vec<f64> = (0..5 * 90)
+        .map(|i| 0.04 * f64::from((i * 37) % 450))
+        .collect();
+    let shared = each[..300].to_vec();
+    let requests = [Frames::fps(40), Frames::at(shared), Frames::at_each(each)];
+    let sequence = tumble::EulerSequence::XYZ;
+    for device in devices() {
+        let engine = Engine::new(device).unwrap();
+        for (wrap, encoding) in [
+            (WrapMode::Hold, Encoding::F32),
+            (WrapMode::Mirror, Encoding::F32),
+            (WrapMode::Loop, Encoding::Euler(sequence)),
+        ] {
+            let interpolation = Interpolation {
+                after: wrap,
+                ..method::BESSEL_OVERHAUSER.into()
+            };
+            let clip = engine.upload(&set, interpolation).unwrap();
+            for frames in &requests {
+                let samples = clip.timeline(frames).unwrap().len();
+                let track = samples * encoding.bytes();
+                let whole = clip
+                    .evaluate_encoded(frames, Layout::TrackMajor, encoding)
+                    .unwrap();
+                for tracks in [0..5, 1..4, 2..2, 4..5] {
+                    // Aligned to 16 bytes, and not.
+                    for shift in [0, 4] {
+                        let mut store = vec![Quat::IDENTITY; tracks.len() * track / 16 + 2];
+                        let store: &mut [u8] = bytemuck::cast_slice_mut(&mut store);
+                        let part = &mut store[shift..shift + tracks.len() * track];
+                        let own = tracks.clone();
+                        engine
+                            .evaluate_tracks_into(&set, interpolation, frames, own, encoding, part)
+                            .unwrap();
+                        assert!(*part == whole[tracks.start * track..tracks.end * track]);
+                    }
+                }
+                for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                    let whole = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let (tracks, part) = (1..4, 7..samples / 2);
+                    let mut found = vec![0; tracks.len() * part.len() * encoding.bytes()];
+                    let place = (tracks.clone(), part.clone());
+                    clip.evaluate_part_into(frames, layout, place, encoding, &mut found)
+                        .unwrap();
+                    for (own, t) in tracks.clone().enumerate() {
+                        for (sample, s) in part.clone().enumerate() {
+                            let size = encoding.bytes();
+                            let from = layout.index(t, s, 5, samples) * size;
+                            let to = layout.index(own, sample, tracks.len(), part.len()) * size;
+                            assert_eq!(found[to..to + size], whole[from..from + size]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_that_a_result_has_not_are_refused() {
+    let set = hostile_set(3, 4);
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let clip = engine.upload(&set, method::SLERP).unwrap();
+    let frames = Frames::at(vec![0.0; 8]);
+    let mut bytes = vec![0; 8 * 16];
+    let of_tracks = |tracks, encoding, output: &mut [u8]| {
+        engine.evaluate_tracks_into(&set, method::SLERP, &frames, tracks, encoding, output)
+    };
+    let backwards = std::ops::Range { start: 2, end: 1 };
+    for tracks in [3..4, 2..4, backwards.clone()] {
+        let error = of_tracks(tracks, Encoding::F32, &mut bytes).unwrap_err();
+        assert!(
+            matches!(error, Error::NoSuchPart { whole: (3, 8), .. }),
+            "{error}"
+        );
+    }
+    let error = of_tracks(0..1, Encoding::F32, &mut bytes[1..]).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            Error::OutputBytes {
+                given: 127,
+                needed: 128
+            }
+        ),
+        "{error}"
+    );
+    let mut of_clip = |tracks, samples, output: &mut [u8]| {
+        let (layout, encoding) = (Layout::FrameMajor, Encoding::F32);
+        clip.evaluate_part_into(&frames, layout, (tracks, samples), encoding, output)
+    };
+    for (tracks, samples) in [(0..4, 0..2), (0..1, 1..9), (backwards, 0..8)] {
+        let error = of_clip(tracks, samples, &mut bytes).unwrap_err();
+        assert!(matches!(error, Error::NoSuchPart { .. }), "{error}");
+    }
+    assert!(of_clip(0..1, 0..8, &mut bytes).is_ok());
+    assert!(of_clip(3..3, 0..8, &mut []).is_ok());
 }

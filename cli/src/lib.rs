@@ -8,6 +8,7 @@
 mod arguments;
 mod batch;
 mod commands;
+pub mod host;
 mod messages;
 
 use std::process::ExitCode;
@@ -15,7 +16,6 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::commands::Command;
-use crate::messages::{exit, signals, words};
 
 const ABOUT: &str = "Interpolate tracks of rotation keys in bulk, on Vulkan or the CPU, \
                      with the same bits";
@@ -53,18 +53,7 @@ pub struct Arguments {
 /// Runs the program with this process's arguments.
 #[must_use]
 pub fn main() -> ExitCode {
-    words::explain_panics();
-    let arguments = Arguments::parse();
-    let outcome = std::panic::catch_unwind(|| {
-        signals::stop_on_signals();
-        arguments.command.run()
-    });
-    let code = match outcome {
-        Ok(Ok(())) => exit::DONE,
-        Ok(Err(failure)) => failure.report(),
-        Err(_) => exit::BUG, // the hook has told about it
-    };
-    ExitCode::from(code)
+    ExitCode::from(host::run(std::env::args_os()))
 }
 
 #[cfg(test)]

@@ -267,6 +267,15 @@ impl Format {
         as_they_come.chain(FORMATS.into_iter().filter(whole))
     }
 
+    /// Whether these clips, sampled, are written in it as clips, rather than the rotations of one
+    /// alone: of a format that holds nothing else, or of clips that are more than rotations.
+    #[must_use]
+    pub fn takes_motion(&self, clips: &[&Motion]) -> bool {
+        let is_more = |clip: &&Motion| !clip.skeleton.is_empty() || clip.has_vectors();
+        self.write_motion.is_some()
+            && (self.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
+    }
+
     /// Whether results are written in it.
     #[must_use]
     pub fn is_writable(&self) -> bool {

@@ -3,7 +3,9 @@
 //! glTF keeps times in f32, BVH prints its frame time with few digits. A key at frame 17 of 24 fps
 //! is then at 0.70833331 s, and sampling at 120 fps would miss it, and the end, by 2e-9 s.
 
-use tumble::FrameRate;
+use tumble::{Channel, FrameRate};
+
+use crate::motion::Motion;
 
 /// The rates that are tried, frames and seconds, from the lowest.
 const RATES: [(u64, u64); 14] = [
@@ -80,6 +82,22 @@ pub(crate) fn rate_of(
     rates
         .filter(|rate| precision.ulp(largest) * rate.per_second() < 0.01)
         .find(|&rate| fits(times.clone(), rate, precision))
+}
+
+impl Motion {
+    /// The lowest of the usual rates on whose frames all key times lie, if there is one.
+    #[must_use]
+    pub fn rate_of_keys(&self) -> Option<FrameRate> {
+        let channels = [Channel::Translation, Channel::Scale];
+        let times = (0..self.set.track_count()).flat_map(|track| {
+            let vectors = channels
+                .into_iter()
+                .filter_map(move |channel| self.set.vector_keys(channel, track));
+            let rotations = self.set.track(track).times;
+            std::iter::once(rotations).chain(vectors.map(|keys| keys.times))
+        });
+        rate_of(times.flatten().copied(), Precision::F64)
+    }
 }
 
 /// Whether all times are within one ulp of frames of the rate.

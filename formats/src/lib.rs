@@ -26,7 +26,7 @@ pub mod output;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod poses;
-mod quaternion;
+pub mod quaternion;
 pub mod sample;
 mod source;
 mod table;

@@ -1,4 +1,4 @@
-//! Quaternions on the way from text to keys.
+//! Quaternions on the way from numbers in f64 to keys.
 
 use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
@@ -21,7 +21,8 @@ pub(crate) fn unit(q: DQuat) -> Quat {
 
 /// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
 /// writing and reading a set is exact; others are normalised in f64.
-pub(crate) fn nearest_unit(key: DQuat) -> Quat {
+#[must_use]
+pub fn nearest_unit(key: DQuat) -> Quat {
     let near = rounded(key);
     let exact = near.as_dquat();
     if (dot(exact, exact).sqrt() - 1.0).abs() <= UNIT_TOLERANCE {

@@ -107,6 +107,17 @@ impl ChannelMethods<'_> {
         Ok(samples)
     }
 
+    /// The tracks of a clip by the methods of their rotations.
+    #[must_use]
+    pub fn groups_of(&self, clip: &Motion) -> Vec<(Method, Vec<usize>)> {
+        let resting = self.resting_method(clip);
+        let method = |track: usize| self.rotation_method(clip.channel(track), resting);
+        groups(clip.set.track_count(), |track| method(track).name)
+            .into_iter()
+            .map(|group| (method(group[0]), group))
+            .collect()
+    }
+
     /// Evaluates the rotations of a clip, each track by its own sampler.
     ///
     /// # Errors
@@ -147,13 +158,12 @@ impl ChannelMethods<'_> {
         values: fn(&tumble::Samples<S>) -> &[T],
     ) -> Result<Vec<T>, Error> {
         let tracks = clip.set.track_count();
-        let resting = self.resting_method(clip);
-        let methods: Vec<Method> = (0..tracks)
-            .map(|track| self.rotation_method(clip.channel(track), resting))
-            .collect();
+        // Tracks whose keys span another time than those of the clip are sampled at the same times.
+        let span = clip.set.time_span();
+        let frames = &span.map_or_else(|| frames.clone(), |span| frames.clone().spanning(span));
         let mut all = Vec::new();
-        for group in groups(tracks, |track| methods[track].name) {
-            let interpolation = (self.with)(methods[group[0]]);
+        for (method, group) in self.groups_of(clip) {
+            let interpolation = (self.with)(method);
             let set = clip.tracks(&group);
             let found = evaluate(&set, interpolation)?;
             all.resize(tracks * found.samples(), T::default());
@@ -320,5 +330,35 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
         if rotations[next - tracks].dot(rotations[next]) < 0.0 {
             rotations[next] = -rotations[next];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tracks_of_other_methods_and_spans_are_sampled_at_the_same_times() {
+        let mut clip = Motion::default();
+        let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+        for (last, sampler) in [(1.0, Sampler::Linear), (3.0, Sampler::Step)] {
+            clip.set.push("", &[0.0, last], &keys).unwrap();
+            clip.channels.push(Channels {
+                rotation: Some(sampler),
+                ..Channels::default()
+            });
+        }
+        let methods = ChannelMethods {
+            method: None,
+            with: &Interpolation::from,
+        };
+        let engine = Engine::new(tumble::Device::Cpu).unwrap();
+        let (frames, layout) = (Frames::fps(2), Layout::TrackMajor);
+        let found = methods.rotations(&engine, &clip, &frames, layout).unwrap();
+        assert_eq!(found.len(), 2 * 7);
+        assert_eq!(
+            [found[2], found[6], found[12], found[13]],
+            [keys[1], keys[1], keys[0], keys[1]]
+        );
     }
 }

@@ -30,6 +30,9 @@ pub(crate) struct DeviceArguments {
     /// Device memory to use besides results, such as 256MiB
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     memory: Option<u64>,
+    /// Threads of the CPU, for front ends that leave the choice.
+    #[arg(skip)]
+    threads: Option<usize>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +73,17 @@ pub(crate) struct Opened {
 }
 
 impl DeviceArguments {
+    /// The device of that name, as `--device` takes it.
+    pub(crate) fn of(name: &str, options: &EngineOptions) -> Self {
+        let Ok(device) = name.parse();
+        Self {
+            device,
+            allow_inexact: options.allow_inexact,
+            memory: options.memory,
+            threads: options.threads,
+        }
+    }
+
     pub(crate) fn open(&self) -> Result<Opened, Failure> {
         match &self.device {
             Choice::Cpu => self.cpu("CPU".to_owned()),
@@ -100,6 +114,7 @@ impl DeviceArguments {
         let mut options = EngineOptions::default();
         options.memory = self.memory;
         options.allow_inexact = self.allow_inexact;
+        options.threads = self.threads;
         options
     }
 

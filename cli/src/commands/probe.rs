@@ -1,5 +1,6 @@
 //! A driver may end the process that loads it. So a process of its own loads them first.
 
+use std::ffi::OsString;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use tumble::{Device, VulkanError};
 
+use crate::host;
 use crate::messages::exit::Failure;
 
 /// Load the Vulkan drivers, and say nothing
@@ -20,8 +22,7 @@ const COMMAND: &str = "probe-drivers";
 const PATIENCE: Duration = Duration::from_secs(10);
 
 pub(crate) fn run(_: &Arguments) -> Result<(), Failure> {
-    // What goes wrong here goes wrong again where it is told about.
-    let _ = Device::list();
+    host::load_drivers();
     Ok(())
 }
 
@@ -42,10 +43,29 @@ pub(crate) fn drivers() -> Result<(), VulkanError> {
         .clone()
 }
 
+/// The command of a front end whose executable is not this program.
+static OTHER_COMMAND: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Lets that command load the drivers. What is said first counts.
+pub(crate) fn set_command(command: Vec<OsString>) {
+    let _ = OTHER_COMMAND.set(command);
+}
+
+/// The command that loads the drivers.
+fn command() -> Option<Command> {
+    if let Some([program, arguments @ ..]) = OTHER_COMMAND.get().map(Vec::as_slice) {
+        let mut command = Command::new(program);
+        command.args(arguments);
+        return Some(command);
+    }
+    let mut command = Command::new(std::env::current_exe().ok()?);
+    command.arg(COMMAND);
+    Some(command)
+}
+
 /// What became of a process that did not come through.
 fn load_elsewhere() -> Option<String> {
-    let mut child = Command::new(std::env::current_exe().ok()?)
-        .arg(COMMAND)
+    let mut child = command()?
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())

@@ -94,6 +94,11 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
+    /// What it says.
+    pub(crate) fn into_message(self) -> String {
+        self.message
+    }
+
     /// Whether the next input would fail in the same way.
     pub(crate) fn is_final(&self) -> bool {
         !matches!(self.code, USAGE | ALL_INPUTS)

@@ -24,11 +24,7 @@ impl Job<'_> {
     /// Whether the result is a motion file: of a format that holds nothing else, or of a clip that
     /// is more than rotations.
     pub(super) fn is_motion(&self, clips: &[&Motion], target: &Target) -> bool {
-        let format = target.format();
-        let is_more = |clip: &&Motion| !clip.skeleton.is_empty() || clip.has_vectors();
-        self.arguments.what.is_rotations()
-            && format.write_motion.is_some()
-            && (format.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
+        self.arguments.what.is_rotations() && target.format().takes_motion(clips)
     }
 
     /// Clips as a file of their own.

@@ -7,10 +7,11 @@ mod shown;
 mod tests;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::{FrameRate, Method};
+use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
@@ -134,6 +135,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// The page of clips that are read already, of a file of that name.
+    pub(crate) fn html(
+        &self,
+        path: &Path,
+        clips: Vec<Motion>,
+        box_length: Option<f64>,
+    ) -> Result<String, Failure> {
+        let several = clips.len() > 1;
+        let shown: Result<Vec<Shown>, Failure> = clips
+            .into_iter()
+            .map(|clip| Shown::new(path, clip, box_length, several))
+            .filter(|one| !one.clip.set.is_empty())
+            .map(|one| self.sampled(one))
+            .collect();
+        let shown = shown?;
+        let methods = self.methods(&shown)?;
+        self.page(&shown, &methods, "Animation", &mut self.device.open()?)
+    }
+
     fn place(&self, inputs: &[PathBuf]) -> Result<Place, Failure> {
         let Some(out) = &self.out else {
             // Named after this run, and left there for the browser.

@@ -1,0 +1,126 @@
+"""How fast the package is, beside SciPy and beside the engine called from Rust.
+
+    ./scripts/wheel.sh && pip install target/wheels/*.whl scipy && python python/bench.py
+
+Each figure is the shortest of several runs; Rust's is that of `examples/into_memory.rs`.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import pathlib
+import subprocess
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+import tumble
+
+TRACKS, KEYS, FRAMES = 4096, 26, 1200
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+def shortest(work: Callable[[], Any], runs: int) -> float:
+    """Seconds."""
+    work()
+    best = float("inf")
+    for _ in range(runs):
+        started = time.perf_counter()
+        work()
+        best = min(best, time.perf_counter() - started)
+    return best
+
+
+def unit(rng: np.random.Generator, *shape: int) -> np.ndarray[Any, np.dtype[np.float32]]:
+    keys = rng.normal(size=(*shape, 4))
+    return (keys / np.linalg.norm(keys, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def resident() -> int:
+    """Bytes of memory that this process has."""
+    gc.collect()
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def rust() -> float:
+    """Seconds of the same work by the engine, called from Rust, into memory that exists."""
+    command = ["cargo", "run", "--release", "--quiet", "-p", "tumble", "--example", "into_memory"]
+    arguments = ["--", *map(str, (TRACKS, KEYS, FRAMES))]
+    done = subprocess.run(command + arguments, cwd=ROOT, capture_output=True, text=True, check=True)
+    return float(done.stdout)
+
+
+def main() -> None:
+    rng = np.random.default_rng(1)
+    times = np.linspace(0.0, 20.0, KEYS)
+    keys = unit(rng, TRACKS, KEYS)
+    clip, engine = tumble.Clip(times, keys), tumble.Engine("cpu")
+    at = np.linspace(0.0, 20.0, FRAMES)
+    fps = f"{FRAMES - 1}/20"
+    out = np.empty((TRACKS, FRAMES, 4), np.float32)
+    assert clip.frames(fps) == FRAMES
+
+    def into() -> None:
+        engine.evaluate(clip, fps=fps, method="slerp", out=out)
+
+    ours = shortest(into, 20)
+    fresh = shortest(lambda: engine.evaluate(clip, fps=fps, method="slerp"), 10)
+    explicit = shortest(lambda: engine.evaluate(clip, at=at, method="slerp", out=out), 10)
+    arrays = shortest(lambda: tumble.evaluate(times, keys, fps=fps, method="slerp", out=out), 10)
+    some = 64
+
+    def scipy() -> None:
+        for track in range(some):
+            Slerp(times, Rotation.from_quat(keys[track]))(at).as_quat()
+
+    theirs = shortest(scipy, 3) * TRACKS / some
+    native = rust()
+    print(f"{TRACKS} tracks x {KEYS} keys x {FRAMES} frames, slerp")
+    print(f"  into an array that exists   {1e3 * ours:9.2f} ms")
+    print(f"  from Rust, likewise         {1e3 * native:9.2f} ms   {ours / native:.2f} x as long here")
+    print(f"  into a fresh array          {1e3 * fresh:9.2f} ms")
+    print(f"  at explicit times           {1e3 * explicit:9.2f} ms")
+    print(f"  from arrays of keys         {1e3 * arrays:9.2f} ms")
+    print(f"  SciPy, a loop over tracks   {1e3 * theirs:9.2f} ms   {theirs / ours:.0f} x as long")
+
+    small_times, small_keys = np.linspace(0.0, 2.0, 8), unit(rng, 4, 8)
+    small, small_at = tumble.Clip(small_times, small_keys), np.linspace(0.0, 2.0, 500)
+    store = np.empty((4, 500, 4), np.float32)
+
+    def many(work: Callable[[], Any]) -> float:
+        def hundred() -> None:
+            for _ in range(100):
+                work()
+
+        return shortest(hundred, 30) / 100
+
+    by_clip = many(lambda: engine.evaluate(small, at=small_at, method="slerp", out=store))
+    by_rate = many(lambda: engine.evaluate(small, fps=249.5, method="slerp", out=store))
+    by_keys = many(lambda: tumble.evaluate(small_times, small_keys, at=small_at, method="slerp"))
+    print("4 tracks x 500 frames, slerp")
+    print(f"  of a clip, at times         {1e6 * by_clip:9.2f} us")
+    print(f"  of a clip, at a rate        {1e6 * by_rate:9.2f} us")
+    print(f"  from arrays                 {1e6 * by_keys:9.2f} us")
+
+    pose = many(lambda: engine.evaluate(clip, at=7.7, method="slerp"))
+    print(f"one pose of {TRACKS} tracks        {1e6 * pose:9.2f} us")
+    one = many(lambda: engine.evaluate(small, at=0.7, method="slerp"))
+    print(f"one pose of 4 tracks          {1e6 * one:9.2f} us")
+
+    poses = rng.uniform(0.0, 20.0, 10_000)
+    grown = []
+    for _ in range(3):
+        before = resident()
+        for moment in poses:
+            engine.evaluate(small, at=moment, method="slerp")
+        grown.append(resident() - before)
+    print(f"ten thousand poses            {min(grown) / 1024:9.0f} KiB more memory")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""Bulk interpolation of rotations on Vulkan and the CPU, with the same bits from both.
+
+Keys go in as arrays or files, rotations come out as float32 arrays of NumPy's:
+
+>>> import numpy as np, tumble
+>>> half = np.sqrt(0.5)
+>>> keys = [[0, 0, 0, 1], [0, 0, half, half]]                    # x y z w
+>>> tumble.evaluate([0.0, 1.0], keys, fps=2, method="slerp").round(4)
+array([[0.    , 0.    , 0.    , 1.    ],
+       [0.    , 0.    , 0.3827, 0.9239],
+       [0.    , 0.    , 0.7071, 0.7071]], dtype=float32)
+
+`load` and `save` read and write motion files, `Clip` holds tracks of keys, `Engine` is a device
+that is kept open. Quaternions are x y z w unless `order="wxyz"` is said; times are seconds; angular
+velocities are rad/s.
+"""
+
+from __future__ import annotations
+
+import sys as _sys
+
+from tumble import _notebook, _tumble
+from tumble._errors import DeviceError, Error, InputError, InputWarning, OutputError
+from tumble._tumble import (
+    Chunk,
+    Chunks,
+    Clip,
+    Engine,
+    File,
+    Verification,
+    devices,
+    evaluate,
+    load,
+    methods,
+    save,
+)
+
+read = load
+write = save
+
+__version__: str = _tumble.__version__
+
+__all__ = [
+    "Chunk",
+    "Chunks",
+    "Clip",
+    "DeviceError",
+    "Engine",
+    "Error",
+    "File",
+    "InputError",
+    "InputWarning",
+    "OutputError",
+    "Verification",
+    "devices",
+    "evaluate",
+    "load",
+    "methods",
+    "read",
+    "save",
+    "write",
+]
+
+# A Vulkan driver may end the process that loads it, so a process of its own loads them first: this
+# interpreter, with the extension module alone.
+_LOAD_DRIVERS = """
+import importlib.util, sys
+spec = importlib.util.spec_from_file_location("tumble._tumble", sys.argv[1])
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+module.load_drivers()
+"""
+if _sys.executable and _tumble.__file__:
+    _tumble.set_probe([_sys.executable, "-I", "-S", "-c", _LOAD_DRIVERS, _tumble.__file__])

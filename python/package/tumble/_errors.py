@@ -1,0 +1,82 @@
+"""Exceptions and warnings, with the codes and places of the program's messages."""
+
+from __future__ import annotations
+
+
+class _Place(Exception):
+    """What the program says beside its message; None where it does not apply."""
+
+    code: str | None
+    file: str | None
+    line: int | None
+    column: int | None
+    pointer: str | None
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: str | None = None,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        pointer: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.file = file
+        self.line = line
+        self.column = column
+        self.pointer = pointer
+
+
+class Error(_Place):
+    """Anything that Tumble refuses.
+
+    `code` is that of docs/codes.md (`tumble explain E026`), or None; `file`, `line` and `column`
+    say where it is in text, `pointer` where it is in what has no lines: a JSON pointer, an
+    archive's member, a table's column and row, or a place in the arrays that were given.
+
+    >>> import tumble
+    >>> try:
+    ...     tumble.Clip([0.0, 0.0], [[0, 0, 0, 1], [0, 0, 0, 1]])
+    ... except tumble.Error as error:
+    ...     print(error.code, error.pointer)
+    E026 times[0][1]
+    """
+
+
+class InputError(Error, ValueError):
+    """A file, an array or an option is not what it should be.
+
+    >>> import tumble
+    >>> issubclass(tumble.InputError, ValueError)
+    True
+    """
+
+
+class DeviceError(Error, RuntimeError):
+    """A device cannot be opened, or has failed.
+
+    >>> import tumble
+    >>> issubclass(tumble.DeviceError, RuntimeError)
+    True
+    """
+
+
+class OutputError(Error, OSError):
+    """A file cannot be written.
+
+    >>> import tumble
+    >>> issubclass(tumble.OutputError, OSError)
+    True
+    """
+
+
+class InputWarning(_Place, UserWarning):
+    """A file is read, and something about it is probably not meant.
+
+    >>> import tumble
+    >>> issubclass(tumble.InputWarning, UserWarning)
+    True
+    """

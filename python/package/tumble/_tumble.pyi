@@ -1,0 +1,331 @@
+import os
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Any, Literal, Protocol, TypeAlias, TypedDict, final, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Buffer, Unpack
+
+from tumble._notebook import View
+
+__all__: list[str]
+__version__: str
+
+class _Rotation(Protocol):
+    """`scipy.spatial.transform.Rotation`."""
+
+    def as_quat(self) -> Any: ...
+
+class _DLPack(Protocol):
+    def __dlpack__(self) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+
+_Array: TypeAlias = ArrayLike | Buffer | _DLPack
+_Arrays: TypeAlias = _Array | Sequence[_Array]
+_Keys: TypeAlias = _Arrays | _Rotation | Sequence[_Rotation]
+_Rate: TypeAlias = float | str | Fraction | np.integer[Any] | np.floating[Any]
+_Path: TypeAlias = str | os.PathLike[str]
+_Order: TypeAlias = Literal["xyzw", "wxyz"]
+_Layout: TypeAlias = Literal["track", "frame"]
+_Axes: TypeAlias = Literal["body", "world"]
+_Wrap: TypeAlias = Literal["hold", "loop", "mirror", "extrapolate"]
+_Single: TypeAlias = NDArray[np.float32]
+
+class _Options(TypedDict, total=False):
+    fps: _Rate | None
+    at: _Arrays | None
+    start: float | None
+    end: float | None
+    method: str | None
+    path: Literal["shortest", "as-authored"] | None
+    ends: (
+        Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"]
+        | ArrayLike
+        | None
+    )
+    speed: Literal["as-keyed", "constant"] | None
+    before: _Wrap | None
+    after: _Wrap | None
+    tension: float | None
+    continuity: float | None
+    bias: float | None
+
+class _OptionsOrTimes(_Options, total=False):
+    times: _Arrays | None
+
+@final
+class Clip:
+    def __new__(
+        cls,
+        times: _Arrays,
+        keys: _Keys,
+        *,
+        order: _Order = "xyzw",
+        name: str | None = None,
+        names: Sequence[str] | None = None,
+        parents: Sequence[int | None] | None = None,
+        offsets: ArrayLike | None = None,
+        translations: _Arrays | Sequence[_Array | None] | None = None,
+        scales: _Arrays | Sequence[_Array | None] | None = None,
+        velocities: _Arrays | Sequence[_Array | None] | None = None,
+        tangents: _Arrays | Sequence[_Array | None] | None = None,
+        tcb: _Arrays | Sequence[_Array | None] | None = None,
+    ) -> Clip: ...
+    @property
+    def name(self) -> str | None: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def parents(self) -> list[int | None] | None: ...
+    @property
+    def offsets(self) -> _Single | None: ...
+    @property
+    def rate(self) -> Fraction | None: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
+    @property
+    def duration(self) -> float: ...
+    @property
+    def key_count(self) -> int: ...
+    @property
+    def time_offset(self) -> int: ...
+    @property
+    def is_world(self) -> bool: ...
+    @property
+    def path(self) -> os.PathLike[str] | None: ...
+    def __len__(self) -> int: ...
+    def times(self, track: int | str) -> NDArray[np.float64]: ...
+    def keys(self, track: int | str, *, order: _Order = "xyzw") -> _Single: ...
+    def translations(
+        self, track: int | str
+    ) -> tuple[NDArray[np.float64], _Single] | None: ...
+    def scales(
+        self, track: int | str
+    ) -> tuple[NDArray[np.float64], _Single] | None: ...
+    def frames(self, fps: _Rate) -> int: ...
+    # Lists of times of different lengths give a list of arrays, and `as_rotation` gives SciPy's.
+    @overload
+    def evaluate(
+        self,
+        *,
+        out: _Single | None = None,
+        order: _Order = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    @overload
+    def evaluate(
+        self,
+        *,
+        out: None = None,
+        order: Literal["xyzw"] = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[True],
+        **options: Unpack[_OptionsOrTimes],
+    ) -> Any: ...
+    def plot(
+        self,
+        track: int | str | None = None,
+        *,
+        fps: _Rate | None = None,
+        axes: Any = None,
+        **options: Any,
+    ) -> Any: ...
+    def view(self, **options: Any) -> View: ...
+
+@final
+class Engine:
+    def __new__(
+        cls,
+        device: str | int | None = None,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        allow_inexact: bool = False,
+    ) -> Engine: ...
+    @property
+    def device(self) -> str: ...
+    @overload
+    def evaluate(
+        self,
+        clip: Clip,
+        *,
+        out: _Single | None = None,
+        order: _Order = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    @overload
+    def evaluate(
+        self,
+        clip: Clip,
+        *,
+        out: None = None,
+        order: Literal["xyzw"] = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[True],
+        **options: Unpack[_OptionsOrTimes],
+    ) -> Any: ...
+    def velocity(
+        self,
+        clip: Clip,
+        *,
+        axes: _Axes = "body",
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    def acceleration(
+        self,
+        clip: Clip,
+        *,
+        axes: _Axes = "body",
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    def matrices(
+        self,
+        clip: Clip,
+        *,
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    def euler(
+        self,
+        clip: Clip,
+        *,
+        sequence: str = "XYZ",
+        degrees: bool = True,
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        **options: Unpack[_OptionsOrTimes],
+    ) -> _Single: ...
+    def poses(
+        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
+    ) -> tuple[_Single, _Single, _Single]: ...
+    def world(
+        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
+    ) -> tuple[_Single, _Single]: ...
+    def stream(
+        self,
+        clip: Clip,
+        *,
+        chunk: int = 1048576,
+        order: _Order = "xyzw",
+        layout: _Layout = "track",
+        **options: Unpack[_OptionsOrTimes],
+    ) -> Chunks: ...
+    def verify(self, clip: Clip, **options: Unpack[_OptionsOrTimes]) -> Verification: ...
+
+@final
+class Chunks:
+    def __iter__(self) -> Chunks: ...
+    def __next__(self) -> Chunk: ...
+
+@final
+class Chunk:
+    @property
+    def tracks(self) -> slice[int, int, None]: ...
+    @property
+    def frames(self) -> slice[int, int, None]: ...
+    @property
+    def rotations(self) -> _Single: ...
+
+@final
+class Verification:
+    @property
+    def method(self) -> str: ...
+    @property
+    def device(self) -> str | None: ...
+    @property
+    def rotations(self) -> int: ...
+    @property
+    def differing(self) -> int: ...
+    @property
+    def max_error(self) -> float: ...
+    @property
+    def rms_error(self) -> float: ...
+    @property
+    def max_norm_error(self) -> float: ...
+    @property
+    def error_bound(self) -> float: ...
+    @property
+    def passes(self) -> bool: ...
+
+@final
+class File:
+    @property
+    def clips(self) -> list[Clip]: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def clip(self) -> Clip: ...
+    @property
+    def path(self) -> os.PathLike[str]: ...
+    @property
+    def refused(self) -> list[str]: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[Clip]: ...
+    def __contains__(self, name: str, /) -> bool: ...
+    def __getitem__(self, key: int | str, /) -> Clip: ...
+
+@overload
+def evaluate(
+    times: _Arrays,
+    keys: _Keys,
+    *,
+    out: _Single | None = None,
+    order: _Order = "xyzw",
+    layout: _Layout = "track",
+    as_rotation: Literal[False] = False,
+    **options: Unpack[_Options],
+) -> _Single: ...
+@overload
+def evaluate(
+    times: _Arrays,
+    keys: _Keys,
+    *,
+    out: None = None,
+    order: _Order = "xyzw",
+    layout: _Layout = "track",
+    as_rotation: Literal[True],
+    **options: Unpack[_Options],
+) -> Any: ...
+def load(
+    path: _Path,
+    *,
+    format: str | None = None,
+    source_fps: _Rate | None = None,
+    map: str | None = None,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    duplicates: Literal["first", "last"] | None = None,
+    raw_times: bool = False,
+    scale: float | None = None,
+    up: Literal["y", "z"] | None = None,
+) -> File: ...
+def save(
+    path: _Path,
+    clips: Clip | File | Sequence[Clip],
+    /,
+    *,
+    format: str | None = None,
+    sequence: str | None = None,
+    linear: Sequence[str] = ...,
+    order: _Order = "xyzw",
+    layout: _Layout = "track",
+    overwrite: bool = True,
+    engine: Engine | None = None,
+    **options: Unpack[_OptionsOrTimes],
+) -> None: ...
+def devices() -> list[str]: ...
+def methods() -> dict[str, str]: ...
+def load_drivers() -> None: ...
+def page(clips: Clip | File | Sequence[Clip], options: Sequence[str]) -> str: ...
+def panic() -> None: ...
+def run(arguments: Sequence[str]) -> int: ...
+def set_probe(command: Sequence[str]) -> None: ...

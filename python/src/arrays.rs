@@ -1,0 +1,287 @@
+//! What comes in: arrays of NumPy's, whatever they look like in memory, lists, and objects that
+//! NumPy makes arrays of.
+
+use std::sync::Arc;
+
+use glam::{DQuat, Quat};
+use numpy::{
+    PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyFloat, PyInt, PyList, PyTuple};
+use tumble_formats::quaternion::nearest_unit;
+
+use crate::errors::input;
+use crate::options::Samples;
+
+/// The order of a quaternion's components.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    Xyzw,
+    Wxyz,
+}
+
+impl Order {
+    pub(crate) fn named(name: &str) -> PyResult<Self> {
+        match name {
+            "xyzw" => Ok(Self::Xyzw),
+            "wxyz" => Ok(Self::Wxyz),
+            _ => Err(input(format!(
+                "order: there is no `{name}`; there are xyzw, wxyz"
+            ))),
+        }
+    }
+
+    pub(crate) fn xyzw<T: Copy>(self, [a, b, c, d]: [T; 4]) -> [T; 4] {
+        match self {
+            Self::Xyzw => [a, b, c, d],
+            Self::Wxyz => [b, c, d, a],
+        }
+    }
+
+    /// Components of this order, from `x y z w`.
+    pub(crate) fn of_xyzw<T: Copy>(self, [x, y, z, w]: [T; 4]) -> [T; 4] {
+        match self {
+            Self::Xyzw => [x, y, z, w],
+            Self::Wxyz => [w, x, y, z],
+        }
+    }
+}
+
+/// Numbers with a shape, in C order.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Numbers<T> {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<T>,
+}
+
+/// A borrowed array of one of the two types that are taken as they are.
+enum Array<'py> {
+    Single(PyReadonlyArrayDyn<'py, f32>),
+    Double(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl Array<'_> {
+    fn shape(&self) -> &[usize] {
+        match self {
+            Self::Single(array) => array.shape(),
+            Self::Double(array) => array.shape(),
+        }
+    }
+}
+
+/// The `numpy` module.
+pub(crate) fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
+    static MODULE: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
+    let module = MODULE.get_or_try_init(py, || py.import("numpy").map(Bound::unbind))?;
+    Ok(module.bind(py))
+}
+
+/// What NumPy makes of an object.
+fn as_array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = value.py();
+    if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
+        return Ok(array.clone());
+    }
+    if value.is_instance_of::<PyUntypedArray>() && value.hasattr(intern!(py, "mask"))? {
+        return Err(input(format!(
+            "{what}: a masked array; fill or remove what is masked"
+        )));
+    }
+    let speaks_dlpack = value.hasattr(intern!(py, "__dlpack__"))?;
+    let name = match speaks_dlpack && !value.hasattr(intern!(py, "__array__"))? {
+        true => intern!(py, "from_dlpack"),
+        false => intern!(py, "asarray"),
+    };
+    let made = numpy(py)?.call_method1(name, (value,));
+    let made = made.map_err(|error| match error.is_instance_of::<PyValueError>(py) {
+        true => input(format!("{what}: no array can be made of it: {error}")),
+        false => error,
+    })?;
+    Ok(made.cast_into::<PyUntypedArray>()?)
+}
+
+/// The numbers of an array; those of other types than float32 and float64 are converted.
+fn array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Array<'py>> {
+    let own = as_array(value, what)?;
+    if let Some(array) = borrowed(own.as_any())? {
+        return Ok(array);
+    }
+    let kind = own.dtype().kind();
+    if !matches!(kind, b'f' | b'i' | b'u') {
+        return Err(input(format!(
+            "{what}: its type is {}; give float32 or float64",
+            own.dtype()
+        )));
+    }
+    let converted = own.call_method1(intern!(value.py(), "astype"), ("float64",))?;
+    borrowed(&converted)?.ok_or_else(|| input(format!("{what}: no array of numbers")))
+}
+
+/// An array of a type and an alignment that can be read where it lies.
+fn borrowed<'py>(own: &Bound<'py, PyAny>) -> PyResult<Option<Array<'py>>> {
+    let taken = |error: numpy::BorrowError| PyValueError::new_err(error.to_string());
+    if let Ok(array) = own.cast::<PyArrayDyn<f32>>()
+        && is_aligned(array.data() as usize, array.strides(), 4)
+    {
+        return Ok(Some(Array::Single(array.try_readonly().map_err(taken)?)));
+    }
+    if let Ok(array) = own.cast::<PyArrayDyn<f64>>()
+        && is_aligned(array.data() as usize, array.strides(), 8)
+    {
+        return Ok(Some(Array::Double(array.try_readonly().map_err(taken)?)));
+    }
+    Ok(None)
+}
+
+pub(crate) fn is_aligned(start: usize, strides: &[isize], to: usize) -> bool {
+    start.is_multiple_of(to)
+        && strides
+            .iter()
+            .all(|stride| stride.unsigned_abs().is_multiple_of(to))
+}
+
+/// The numbers as they lie in memory, where that is C order. (`as_slice` takes Fortran's too.)
+fn in_order<'a, T: numpy::Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Option<&'a [T]> {
+    array.as_slice().ok().filter(|_| array.is_c_contiguous())
+}
+
+/// Numbers of any shape, in f64.
+pub(crate) fn doubles(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Numbers<f64>> {
+    let array = array(value, what)?;
+    let shape = array.shape().to_vec();
+    let values = match &array {
+        Array::Single(array) => array.as_array().iter().map(|&it| f64::from(it)).collect(),
+        Array::Double(array) => match in_order(array) {
+            Some(slice) => slice.to_vec(),
+            None => array.as_array().iter().copied().collect(),
+        },
+    };
+    Ok(Numbers { shape, values })
+}
+
+/// One finite number.
+pub(crate) fn number(value: &Bound<'_, PyAny>, what: &str, unit: &str) -> PyResult<f64> {
+    let number: f64 = value
+        .extract()
+        .map_err(|_| PyTypeError::new_err(format!("{what}: give {unit}, as a number")))?;
+    match number.is_finite() {
+        true => Ok(number),
+        false => Err(input(format!("{what}: {number} is not finite"))),
+    }
+}
+
+/// Quaternions: an array whose last axis has four components, or rotations of `SciPy`'s, which are
+/// always x y z w.
+pub(crate) fn quaternions(
+    value: &Bound<'_, PyAny>,
+    order: Order,
+    what: &str,
+) -> PyResult<Numbers<Quat>> {
+    if !value.is_instance_of::<PyUntypedArray>()
+        && let Some(as_quat) = value.getattr_opt(intern!(value.py(), "as_quat"))?
+    {
+        return components(&as_quat.call0()?, Order::Xyzw, what);
+    }
+    components(value, order, what)
+}
+
+fn components(value: &Bound<'_, PyAny>, order: Order, what: &str) -> PyResult<Numbers<Quat>> {
+    let array = array(value, what)?;
+    let mut shape = array.shape().to_vec();
+    if shape.pop() != Some(4) {
+        return Err(input(format!(
+            "{what}: its shape is {:?}; the last axis has the 4 components of a quaternion",
+            array.shape()
+        )));
+    }
+    let single = |of: [f32; 4]| Quat::from_array(order.xyzw(of));
+    let double = |of: [f64; 4]| unit(DQuat::from_array(order.xyzw(of)));
+    let values = match &array {
+        Array::Single(array) => match in_order(array) {
+            Some(slice) => slice.as_chunks().0.iter().copied().map(single).collect(),
+            None => fours(array.as_array().iter().copied(), single),
+        },
+        Array::Double(array) => fours(array.as_array().iter().copied(), double),
+    };
+    Ok(Numbers { shape, values })
+}
+
+fn fours<T: Copy + Default>(
+    mut numbers: impl ExactSizeIterator<Item = T>,
+    make: impl Fn([T; 4]) -> Quat,
+) -> Vec<Quat> {
+    let count = numbers.len() / 4;
+    let next = |_| make([(); 4].map(|()| numbers.next().unwrap_or_default()));
+    (0..count).map(next).collect()
+}
+
+/// Rounded to f32, normalised before where that is a matter of rounding; what is no rotation is
+/// left for the set to refuse.
+fn unit(key: DQuat) -> Quat {
+    let is_near = (key.length() - 1.0).abs() <= tumble::NORM_TOLERANCE;
+    match is_near {
+        true => nearest_unit(key),
+        false => Quat::from_array(key.to_array().map(|component| component as f32)),
+    }
+}
+
+/// The parts of a list or tuple whose parts are arrays or lists themselves.
+pub(crate) fn parts<'py>(value: &Bound<'py, PyAny>) -> Option<Vec<Bound<'py, PyAny>>> {
+    let parts: Vec<Bound<'py, PyAny>> = if let Ok(list) = value.cast::<PyList>() {
+        list.iter().collect()
+    } else {
+        value.cast::<PyTuple>().ok()?.iter().collect()
+    };
+    let is_number = |part: &Bound<'_, PyAny>| {
+        part.is_instance_of::<PyFloat>()
+            || part.is_instance_of::<PyInt>()
+            || part
+                .getattr("ndim")
+                .is_ok_and(|axes| axes.eq(0).unwrap_or(false))
+    };
+    let first = parts.first()?;
+    (!is_number(first)).then_some(parts)
+}
+
+/// The times of `at`.
+pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<Samples> {
+    if let Some(parts) = parts(value) {
+        let mut lists = Vec::with_capacity(parts.len());
+        for part in &parts {
+            let Numbers { shape, values } = doubles(part, "at")?;
+            if shape.len() != 1 {
+                return Err(input(format!(
+                    "at: a part of the list has shape {shape:?}; give a list of times for each track"
+                )));
+            }
+            lists.push(values);
+        }
+        let count = lists.first().map_or(0, Vec::len);
+        if lists.iter().any(|list| list.len() != count) {
+            return Ok(Samples::Ragged(lists));
+        }
+        let times: Arc<[f64]> = lists.concat().into();
+        return Ok(Samples::Each { times, count });
+    }
+    let Numbers { shape, values } = doubles(value, "at")?;
+    let times: Arc<[f64]> = values.into();
+    match *shape {
+        [] => Ok(Samples::Shared {
+            times,
+            is_one: true,
+        }),
+        [_] => Ok(Samples::Shared {
+            times,
+            is_one: false,
+        }),
+        [_, count] => Ok(Samples::Each { times, count }),
+        _ => Err(input(format!(
+            "at: its shape is {shape:?}; give one time, (frames,), or (tracks, frames)"
+        ))),
+    }
+}

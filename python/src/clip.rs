@@ -1,0 +1,385 @@
+//! `tumble.Clip`: keyed tracks, from arrays or from a file.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::Vec3;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+use tumble::Channel;
+use tumble_formats::format::Document;
+use tumble_formats::motion::Motion;
+
+use crate::arrays::Order;
+use crate::build::{Parts, clip_of};
+use crate::engine::default_engine;
+use crate::errors::guarded;
+use crate::options::frame_rate;
+
+/// Tracks of rotation keys, with names, a skeleton, translations and scales where there are any.
+///
+/// `Clip(times, keys, *, order="xyzw", name=None, names=None, parents=None, offsets=None,
+/// translations=None, scales=None, velocities=None, tangents=None, tcb=None)`
+///
+/// `times` are seconds, increasing: `(keys,)` for all tracks, `(tracks, keys)`, or a list with an
+/// array for each track. `keys` are unit quaternions: `(keys, 4)` for one track,
+/// `(tracks, keys, 4)`, or a list with an array `(keys, 4)` for each track; a `Rotation` of SciPy's,
+/// or a list of them, will do. `order` says what the four components of `keys` are.
+///
+/// For each track: `names`, text; `parents`, the track that it hangs on (`None` or -1 for a root);
+/// `offsets`, `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists
+/// like `keys` with 3 components instead of 4: `translations`, `scales`, and what some methods use:
+/// `velocities` (rad/s, body frame; `hermite`), `tangents` (`(…, 2, 4)`, arriving and leaving, a
+/// second; `gltf-cubic`), `tcb` (tension, continuity, bias; `kochanek-bartels`).
+///
+/// >>> import numpy as np, tumble
+/// >>> half = np.sqrt(0.5)
+/// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, half, half]], names=["door"])
+/// >>> clip
+/// Clip(1 track, 2 keys, 0 to 1 s)
+/// >>> clip.evaluate(fps=2, method="slerp").shape
+/// (1, 3, 4)
+#[pyclass(frozen, from_py_object, module = "tumble")]
+#[derive(Clone)]
+pub(crate) struct Clip {
+    pub(crate) motion: Arc<Motion>,
+    pub(crate) source: Option<Arc<Source>>,
+}
+
+/// The file that a clip was read from.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) path: PathBuf,
+    pub(crate) document: Option<Arc<dyn Document>>,
+    pub(crate) box_length: Option<f64>,
+}
+
+#[pymethods]
+impl Clip {
+    #[new]
+    #[pyo3(signature = (
+        times, keys, *, order="xyzw", name=None, names=None, parents=None, offsets=None,
+        translations=None, scales=None, velocities=None, tangents=None, tcb=None
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn new(
+        times: &Bound<'_, PyAny>,
+        keys: &Bound<'_, PyAny>,
+        order: &str,
+        name: Option<String>,
+        names: Option<Vec<String>>,
+        parents: Option<Vec<Option<i64>>>,
+        offsets: Option<&Bound<'_, PyAny>>,
+        translations: Option<&Bound<'_, PyAny>>,
+        scales: Option<&Bound<'_, PyAny>>,
+        velocities: Option<&Bound<'_, PyAny>>,
+        tangents: Option<&Bound<'_, PyAny>>,
+        tcb: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        guarded(|| {
+            let (mut motion, _) = clip_of(times, keys, Order::named(order)?, names.as_deref())?;
+            let parts = Parts {
+                parents,
+                offsets,
+                translations,
+                scales,
+                velocities,
+                tangents,
+                tcb,
+            };
+            parts.put_into(&mut motion, Order::named(order)?)?;
+            motion.name = name;
+            Ok(Self {
+                motion: Arc::new(motion),
+                source: None,
+            })
+        })
+    }
+
+    /// The clip's name, or None.
+    #[getter]
+    fn name(&self) -> Option<&str> {
+        self.motion.name.as_deref()
+    }
+
+    /// The tracks' names; `box1`, `box2` … where there are none.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        let tracks = 0..self.motion.set.track_count();
+        tracks
+            .map(|track| self.motion.set.track_name(track))
+            .collect()
+    }
+
+    /// For each track the one that it hangs on, None for roots; None without a skeleton.
+    #[getter]
+    fn parents(&self) -> Option<Vec<Option<usize>>> {
+        let skeleton = &self.motion.skeleton;
+        (!skeleton.is_empty()).then(|| skeleton.iter().map(|joint| joint.parent).collect())
+    }
+
+    /// Where each track rests in its parent's frame, (tracks, 3); None without a skeleton.
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let skeleton = &self.motion.skeleton;
+        let offsets = skeleton.iter().map(|joint| joint.rest.translation);
+        match skeleton.is_empty() {
+            true => Ok(None),
+            false => vectors(py, offsets).map(Some),
+        }
+    }
+
+    /// The rate on whose frames all key times lie, a Fraction in frames per second, or None.
+    #[getter]
+    fn rate<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(rate) = self.motion.rate else {
+            return Ok(None);
+        };
+        let fraction = py.import("fractions")?.getattr("Fraction")?;
+        fraction.call1((rate.to_string(),)).map(Some)
+    }
+
+    /// The first and the last key time, seconds.
+    #[getter]
+    fn span(&self) -> (f64, f64) {
+        self.motion.set.time_span().unwrap_or((0.0, 0.0))
+    }
+
+    /// Seconds from the first key to the last.
+    #[getter]
+    fn duration(&self) -> f64 {
+        let (first, last) = self.span();
+        last - first
+    }
+
+    /// How many keys all tracks have together.
+    #[getter]
+    fn key_count(&self) -> usize {
+        self.motion.set.key_count()
+    }
+
+    /// Whole seconds that all times of the clip are to be moved by, such as those of clocks that
+    /// count from 1970; 0 for most files.
+    #[getter]
+    fn time_offset(&self) -> i64 {
+        self.motion.time_offset
+    }
+
+    /// Whether rotations and translations are relative to the world instead of the parent.
+    #[getter]
+    fn is_world(&self) -> bool {
+        self.motion.is_world
+    }
+
+    /// The file that it was read from, or None.
+    #[getter]
+    fn path(&self) -> Option<PathBuf> {
+        Some(self.source.as_ref()?.path.clone())
+    }
+
+    /// The number of tracks.
+    fn __len__(&self) -> usize {
+        self.motion.set.track_count()
+    }
+
+    fn __repr__(&self) -> String {
+        let set = &self.motion.set;
+        let name = self.motion.name.as_deref();
+        let name = name.map_or_else(String::new, |name| format!("{name:?}: "));
+        let (first, last) = self.span();
+        let rate = self.motion.rate;
+        let rate = rate.map_or_else(String::new, |rate| format!(", {rate} fps"));
+        format!(
+            "Clip({name}{}, {}, {first} to {last} s{rate})",
+            counted(set.track_count(), "track"),
+            counted(set.key_count(), "key")
+        )
+    }
+
+    /// The key times of a track, by its place or name: (keys,), float64, seconds.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]], names=["hip"])
+    /// >>> clip.times("hip")
+    /// array([0. , 0.5])
+    fn times<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let track = self.track(track)?;
+        Ok(PyArray1::from_slice(py, self.motion.set.track(track).times))
+    }
+
+    /// The keys of a track, by its place or name: (keys, 4), float32; `order` says what the
+    /// components are.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.keys(0, order="wxyz")
+    /// array([[1., 0., 0., 0.],
+    ///        [0., 1., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (track, *, order="xyzw"))]
+    fn keys<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+        order: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let order = Order::named(order)?;
+        let track = self.track(track)?;
+        let keys = self.motion.set.track(track).keys.iter();
+        let numbers: Vec<f32> = keys.flat_map(|key| order.of_xyzw(key.to_array())).collect();
+        let count = numbers.len() / 4;
+        PyArray1::from_vec(py, numbers).reshape([count, 4])
+    }
+
+    /// The translation keys of a track, by its place or name: their times (keys,), seconds, and
+    /// their values (keys, 3), float32, in the file's units; None for a track without.
+    fn translations<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        self.vector_keys(py, Channel::Translation, track)
+    }
+
+    /// The scale keys of a track; otherwise as `translations`.
+    fn scales<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        self.vector_keys(py, Channel::Scale, track)
+    }
+
+    /// How many frames the clip has at a rate, from its first key to its last.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.frames("30000/1001")
+    /// 60
+    fn frames(&self, fps: &Bound<'_, PyAny>) -> PyResult<usize> {
+        let rate = crate::options::Samples::Rate(frame_rate(fps)?, None, None);
+        Ok(rate.resolved(&self.motion.set)?.1)
+    }
+
+    /// As `Engine.evaluate`, by an engine that is shared by all calls and chooses its device.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
+    /// array([[0., 0., 0., 1.],
+    ///        [1., 0., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+    fn evaluate<'py>(
+        slf: &Bound<'py, Self>,
+        out: Option<&Bound<'py, PyAny>>,
+        order: &str,
+        layout: &str,
+        as_rotation: bool,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let engine = default_engine(slf.py())?;
+        engine
+            .get()
+            .evaluate(slf, out, order, layout, as_rotation, options)
+    }
+
+    /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
+    ///
+    /// `plot(track=0, *, fps=120, axes=None, **options)`: `track` is a place or a name, `axes` those
+    /// of matplotlib to draw on, the other options are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> axes = clip.plot(method="slerp")  # doctest: +SKIP
+    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        track: Option<&Bound<'py, PyAny>>,
+        fps: Option<&Bound<'py, PyAny>>,
+        axes: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let notebook = slf.py().import("tumble._notebook")?;
+        notebook.call_method("plot", (slf, track, fps, axes), options)
+    }
+
+    /// The page of `tumble view`: the bones or boxes moving, to be looked at from any side. The last
+    /// value of a notebook's cell is shown in its output; `save(path)` writes the page, `html` is
+    /// its text.
+    ///
+    /// `view(*, methods=None, fps=60, start=None, end=None, height=520)`: the `methods` to choose
+    /// from, names or "all"; `height` is that of the output, pixels.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> page = clip.view(methods=["slerp"])
+    /// >>> page.html.startswith("<!doctype html>")
+    /// True
+    #[pyo3(signature = (**options))]
+    fn view<'py>(
+        slf: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let notebook = slf.py().import("tumble._notebook")?;
+        notebook.call_method("view", (slf,), options)
+    }
+}
+
+/// `1 track`, `4 tracks`.
+pub(crate) fn counted(number: usize, noun: &str) -> String {
+    match number {
+        1 => format!("1 {noun}"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
+/// Vectors as an array (n, 3).
+fn vectors(py: Python<'_>, of: impl Iterator<Item = Vec3>) -> PyResult<Bound<'_, PyAny>> {
+    let numbers: Vec<f32> = of.flat_map(|vector| vector.to_array()).collect();
+    let count = numbers.len() / 3;
+    Ok(PyArray1::from_vec(py, numbers)
+        .reshape([count, 3])?
+        .into_any())
+}
+
+impl Clip {
+    /// A track's place, of its place or name.
+    fn track(&self, track: &Bound<'_, PyAny>) -> PyResult<usize> {
+        let set = &self.motion.set;
+        let tracks = set.track_count();
+        if let Ok(name) = track.cast::<PyString>() {
+            let name = name.to_cow()?;
+            let found = (0..tracks).find(|&place| set.track_name(place) == *name);
+            return found.ok_or_else(|| PyKeyError::new_err(format!("there is no track `{name}`")));
+        }
+        let place: isize = track
+            .extract()
+            .map_err(|_| PyTypeError::new_err("a track is its place, from 0, or its name"))?;
+        let from_end = if place < 0 { tracks as isize } else { 0 };
+        usize::try_from(place + from_end)
+            .ok()
+            .filter(|&place| place < tracks)
+            .ok_or_else(|| {
+                PyIndexError::new_err(format!("there is no track {place}; there are {tracks}"))
+            })
+    }
+
+    fn vector_keys<'py>(
+        &self,
+        py: Python<'py>,
+        channel: Channel,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        let track = self.track(track)?;
+        let Some(own) = self.motion.set.vector_keys(channel, track) else {
+            return Ok(None);
+        };
+        let times = PyArray1::from_slice(py, own.times).into_any();
+        Ok(Some((times, vectors(py, own.keys.iter().copied())?)))
+    }
+}

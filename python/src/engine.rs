@@ -1,0 +1,437 @@
+//! `tumble.Engine`: one device, kept open.
+
+use std::sync::OnceLock;
+
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyTuple};
+use tumble::{Axes, Device, Encoding, EngineOptions, EulerSequence, Layout, MatrixOrder, Quantity};
+use tumble_cli::host;
+
+use crate::arrays::Order;
+use crate::clip::Clip;
+use crate::errors::{device, guarded, input, of_engine};
+use crate::evaluate::Result;
+use crate::options::Request;
+use crate::poses;
+use crate::stream::Chunks;
+use crate::verify::Verification;
+
+/// Fewer rotations than this the CPU evaluates before another device is open.
+const FEW: usize = 1 << 20;
+
+/// Evaluates clips on one device, which stays open.
+///
+/// `Engine(device="auto", *, memory=None, threads=None, allow_inexact=False)`
+///
+/// `device`: "auto", the CPU, and for calls of a million rotations or more the device that is
+/// measured to be the fastest; "cpu"; "first", the first Vulkan device that is exact, else the CPU;
+/// "vulkan"; or a device's index or part of its name (`tumble.devices()`). All give the same bits.
+/// `memory`: bytes of a Vulkan device that segments may take; `threads`: of the CPU;
+/// `allow_inexact`: use a device that fails its self-test.
+///
+/// An engine may be used by several threads at once. The interpreter's lock is released while it
+/// works, and Ctrl-C ends a long evaluation.
+///
+/// >>> import tumble
+/// >>> engine = tumble.Engine("cpu")
+/// >>> engine
+/// Engine('CPU')
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Engine {
+    own: tumble::Engine,
+    /// For large calls, where the choice is by cost.
+    by_cost: Option<OnceLock<tumble::Engine>>,
+}
+
+/// The engine that functions and methods without one share.
+pub(crate) fn default_engine(py: Python<'_>) -> PyResult<&Bound<'_, Engine>> {
+    static ENGINE: PyOnceLock<Py<Engine>> = PyOnceLock::new();
+    let engine = ENGINE.get_or_try_init(py, || {
+        Py::new(py, Engine::new(py, None, None, None, false)?)
+    })?;
+    Ok(engine.bind(py))
+}
+
+pub(crate) fn layout_named(name: &str) -> PyResult<Layout> {
+    match name {
+        "track" => Ok(Layout::TrackMajor),
+        "frame" => Ok(Layout::FrameMajor),
+        _ => Err(input(format!(
+            "layout: there is no `{name}`; there are track, frame"
+        ))),
+    }
+}
+
+pub(crate) fn axes_named(name: &str) -> PyResult<Axes> {
+    match name {
+        "body" => Ok(Axes::Body),
+        "world" => Ok(Axes::World),
+        _ => Err(input(format!(
+            "axes: there is no `{name}`; there are body, world"
+        ))),
+    }
+}
+
+#[pymethods]
+impl Engine {
+    #[new]
+    #[pyo3(signature = (device=None, *, memory=None, threads=None, allow_inexact=false))]
+    pub(crate) fn new(
+        py: Python<'_>,
+        device: Option<&Bound<'_, PyAny>>,
+        memory: Option<u64>,
+        threads: Option<usize>,
+        allow_inexact: bool,
+    ) -> PyResult<Self> {
+        let mut options = EngineOptions::default();
+        options.memory = memory;
+        options.allow_inexact = allow_inexact;
+        options.threads = threads;
+        let name = match device {
+            Some(name) => name.str()?.to_str()?.to_owned(),
+            None => "auto".to_owned(),
+        };
+        let is_auto = name.eq_ignore_ascii_case("auto");
+        py.detach(|| {
+            guarded(|| {
+                let own = match is_auto {
+                    true => tumble::Engine::with_options(Device::Cpu, &options)
+                        .map_err(|error| of_engine(&error))?,
+                    false => host::open(&name, &options).map_err(|failure| of_host(&failure))?,
+                };
+                let by_cost = is_auto.then(OnceLock::new);
+                Ok(Self { own, by_cost })
+            })
+        })
+    }
+
+    /// The name of its device; that of small calls, where the choice is by cost.
+    #[getter]
+    fn device(&self) -> &str {
+        self.own.device_name()
+    }
+
+    fn __repr__(&self) -> String {
+        match &self.by_cost {
+            None => format!("Engine('{}')", self.own.device_name()),
+            Some(large) => match large.get() {
+                Some(large) => format!(
+                    "Engine('auto': CPU; {} for large calls)",
+                    large.device_name()
+                ),
+                None => "Engine('auto': CPU)".to_owned(),
+            },
+        }
+    }
+
+    /// The rotation of every track at every sample, written by the engine into NumPy's memory:
+    /// float32, (tracks, frames, 4), unit quaternions.
+    ///
+    /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
+    /// as_rotation=False, **options)`
+    ///
+    /// Which samples: `fps`, a rate ("30000/1001" is exact, 29.97 is not it), with `start` and
+    /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
+    /// order: one list for all tracks, (tracks, frames), or a list with an array for each track. A
+    /// single time gives a result without the axis of frames; lists of different lengths give a
+    /// list of arrays.
+    ///
+    /// `out`: a C-contiguous float32 array of the result's shape, which is filled and returned.
+    /// `order`: "xyzw" or "wxyz", of the result. `layout`: "frame" gives (frames, tracks, 4).
+    /// `as_rotation`: a `Rotation` of SciPy's for each track.
+    ///
+    /// Other options: `method` ("authored": as a file says of each channel, bessel-overhauser where
+    /// it says nothing; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
+    /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
+    /// rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop", "mirror",
+    /// "extrapolate"), `tension`, `continuity`, `bias`.
+    ///
+    /// >>> import numpy as np, tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> out = np.empty((1, 25, 4), np.float32)
+    /// >>> tumble.Engine().evaluate(clip, fps=24, method="slerp", out=out) is out
+    /// True
+    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+    pub(crate) fn evaluate<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        out: Option<&Bound<'py, PyAny>>,
+        order: &str,
+        layout: &str,
+        as_rotation: bool,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = Result {
+            order: Order::named(order)?,
+            layout: layout_named(layout)?,
+            as_rotation,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,
+    /// about the axes of the "body" or of the "world" (in a skeleton, the parent's). Other keywords
+    /// are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().velocity(clip, at=[1.0], method="slerp").round(4)
+    /// array([[[0.    , 0.    , 1.5708]]], dtype=float32)
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options))]
+    fn velocity<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        axes: &str,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = Result {
+            quantity: Quantity::Velocity(axes_named(axes)?),
+            encoding: Encoding::Vector,
+            layout: layout_named(layout)?,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The angular acceleration, rad/s²; otherwise as `velocity`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().acceleration(clip, at=[1.0], method="slerp").shape
+    /// (1, 1, 3)
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options))]
+    fn acceleration<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        axes: &str,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = Result {
+            quantity: Quantity::Acceleration(axes_named(axes)?),
+            encoding: Encoding::Vector,
+            layout: layout_named(layout)?,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3). Other
+    /// keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().matrices(clip, at=2.0)[0].round(3)
+    /// array([[-1.,  0.,  0.],
+    ///        [ 0., -1.,  0.],
+    ///        [ 0.,  0.,  1.]], dtype=float32)
+    #[pyo3(signature = (clip, *, out=None, layout="track", **options))]
+    fn matrices<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = Result {
+            encoding: Encoding::Matrix3x3(MatrixOrder::RowMajor),
+            layout: layout_named(layout)?,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The rotations as Euler angles: float32, (tracks, frames, 3), degrees or radians. `sequence`
+    /// is as SciPy has it: "XYZ" about turned axes (intrinsic), "xyz" about fixed ones (extrinsic).
+    /// Other keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().euler(clip, at=1.0, sequence="ZXY", method="slerp").round(3)
+    /// array([[90.,  0.,  0.]], dtype=float32)
+    #[pyo3(signature = (clip, *, sequence="XYZ", degrees=true, out=None, layout="track", **options))]
+    fn euler<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        sequence: &str,
+        degrees: bool,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let sequence: EulerSequence = sequence
+            .parse()
+            .map_err(|error| input(format!("sequence: {error}")))?;
+        let result = Result {
+            encoding: Encoding::Euler(sequence),
+            radians: !degrees,
+            layout: layout_named(layout)?,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// Whole poses relative to the parents: translations (tracks, frames, 3), rotations
+    /// (tracks, frames, 4), x y z w, each with the sign that continues the one before it, and scales
+    /// (tracks, frames, 3), float32. Keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]],
+    /// ...                    translations=[[[0, 0, 0], [4, 0, 0]]])
+    /// >>> translations, rotations, scales = tumble.Engine().poses(clip, fps=1, method="slerp")
+    /// >>> translations[0]
+    /// array([[0., 0., 0.],
+    ///        [2., 0., 0.],
+    ///        [4., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (clip, *, layout="track", **options))]
+    fn poses<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        poses::local(self, clip, layout_named(layout)?, options)
+    }
+
+    /// Where the joints of a skeleton are in the world: positions (tracks, frames, 3) and rotations
+    /// (tracks, frames, 4), x y z w, float32. Keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> half = 0.5 ** 0.5
+    /// >>> clip = tumble.Clip([0.0], [[[0, 0, half, half]], [[0, 0, 0, 1]]],
+    /// ...                    parents=[None, 0], offsets=[[0, 0, 0], [1, 0, 0]])
+    /// >>> positions, rotations = tumble.Engine().world(clip, at=[0.0])
+    /// >>> positions[1, 0].round(3)
+    /// array([0., 1., 0.], dtype=float32)
+    #[pyo3(signature = (clip, *, layout="track", **options))]
+    fn world<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        poses::in_world(self, clip, layout_named(layout)?, options)
+    }
+
+    /// The rotations in pieces of about `chunk` rotations, for results larger than memory: an
+    /// iterator of `Chunk`s, in the order of the whole result. Other keywords are those of
+    /// `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 9.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> for chunk in tumble.Engine().stream(clip, fps=1, chunk=4):
+    /// ...     print(chunk.tracks, chunk.frames, chunk.rotations.shape)
+    /// slice(0, 1, None) slice(0, 4, None) (1, 4, 4)
+    /// slice(0, 1, None) slice(4, 8, None) (1, 4, 4)
+    /// slice(0, 1, None) slice(8, 10, None) (1, 2, 4)
+    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options))]
+    fn stream(
+        &self,
+        clip: &Bound<'_, Clip>,
+        chunk: usize,
+        order: &str,
+        layout: &str,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Chunks> {
+        let request = Request::new(options)?;
+        let form = (Order::named(order)?, layout_named(layout)?);
+        let motion = &clip.get().motion;
+        let engine = self.engine(chunk)?;
+        clip.py()
+            .detach(|| guarded(|| Chunks::new(engine, motion, &request, chunk, form)))
+    }
+
+    /// Compares the device with the CPU, bit by bit, and both with a reference in float64 that
+    /// shares no code with them. Keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> found = tumble.Engine("cpu").verify(clip, fps=25, method="slerp")
+    /// >>> found.passes, found.differing, found.max_error < 6e-7
+    /// (True, 0, True)
+    #[pyo3(signature = (clip, **options))]
+    fn verify(
+        &self,
+        clip: &Bound<'_, Clip>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Verification> {
+        let request = Request::new(options)?;
+        let (motion, wanted) = (&clip.get().motion, request.samples()?);
+        let (_, count) = wanted.resolved(&motion.set)?;
+        let engine = self.engine(motion.set.track_count() * count)?;
+        clip.py()
+            .detach(|| guarded(|| Verification::of(&engine, motion, &request)))
+    }
+}
+
+impl Engine {
+    /// The engine for a call of so many rotations.
+    pub(crate) fn engine(&self, rotations: usize) -> PyResult<tumble::Engine> {
+        let Some(large) = self.by_cost.as_ref().filter(|_| rotations >= FEW) else {
+            return Ok(self.own.clone());
+        };
+        if let Some(large) = large.get() {
+            return Ok(large.clone());
+        }
+        Python::attach(|py| {
+            py.detach(|| {
+                guarded(|| {
+                    let chosen = host::auto(rotations).map_err(|failure| of_host(&failure))?;
+                    // Two threads may have chosen at once: both have the same bits.
+                    let chosen = chosen.unwrap_or_else(|| self.own.clone());
+                    Ok(large.get_or_init(|| chosen).clone())
+                })
+            })
+        })
+    }
+
+    fn result<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        result: &Result,
+        out: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        guarded(|| {
+            let request = Request::new(options)?;
+            let engine = |rotations| self.engine(rotations);
+            let inputs = request_arrays(options)?;
+            let inputs: Vec<_> = inputs.iter().collect();
+            result.of(
+                clip.py(),
+                engine,
+                &clip.get().motion,
+                &request,
+                out,
+                &inputs,
+            )
+        })
+    }
+}
+
+/// The arrays among the keywords.
+pub(crate) fn request_arrays<'py>(
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let Some(options) = options else {
+        return Ok(Vec::new());
+    };
+    let named = |name: &str| options.get_item(name);
+    Ok([named("at")?, named("times")?]
+        .into_iter()
+        .flatten()
+        .collect())
+}
+
+/// Why a device cannot be opened.
+fn of_host(failure: &host::Refused) -> PyErr {
+    match failure.is_usage {
+        true => input(&failure.message),
+        false => device(&failure.message),
+    }
+}

@@ -1,0 +1,199 @@
+//! What went wrong, as Python's exceptions. The classes are defined in `tumble/_errors.py`, because
+//! each has two bases.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
+use tumble::{Error, FramesError, InterpolationError, TrackError};
+use tumble_formats::diagnostic::{Code, Diagnostic, Place, Severity};
+use tumble_formats::format::WriteError;
+use tumble_formats::output::OutputError;
+
+/// A class of `tumble._errors`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Class {
+    Input,
+    Device,
+    Output,
+    Warning,
+}
+
+impl Class {
+    fn of(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+        static CLASSES: [PyOnceLock<Py<PyType>>; 4] = [const { PyOnceLock::new() }; 4];
+        let name = match self {
+            Self::Input => "InputError",
+            Self::Device => "DeviceError",
+            Self::Output => "OutputError",
+            Self::Warning => "InputWarning",
+        };
+        CLASSES[self as usize].import(py, "tumble._errors", name)
+    }
+
+    /// An exception with this message; `place` is a diagnostic's.
+    pub(crate) fn error(self, message: &str, place: &Found) -> PyErr {
+        Python::attach(|py| {
+            let made = self.of(py).and_then(|class| {
+                let fields = PyDict::new(py);
+                fields.set_item("code", place.code)?;
+                fields.set_item("file", &place.file)?;
+                fields.set_item("line", place.line)?;
+                fields.set_item("column", place.column)?;
+                fields.set_item("pointer", &place.pointer)?;
+                class.call((message,), Some(&fields))
+            });
+            made.map_or_else(|error| error, PyErr::from_value)
+        })
+    }
+}
+
+/// Which fault was found, and where: what exceptions carry beside their message.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    code: Option<&'static str>,
+    file: Option<String>,
+    line: Option<u64>,
+    column: Option<u64>,
+    pointer: Option<String>,
+}
+
+impl From<&Diagnostic> for Found {
+    fn from(diagnostic: &Diagnostic) -> Self {
+        let mut found = Self {
+            code: Some(diagnostic.code.name()),
+            file: Some(diagnostic.file.clone()),
+            ..Self::default()
+        };
+        match &diagnostic.place {
+            Some(Place::Text { line, column }) => {
+                (found.line, found.column) = (Some(*line), Some(*column));
+            }
+            Some(Place::Inside(place)) => found.pointer = Some(place.clone()),
+            None => {}
+        }
+        found
+    }
+}
+
+/// A refused argument.
+pub(crate) fn input(message: impl AsRef<str>) -> PyErr {
+    Class::Input.error(message.as_ref(), &Found::default())
+}
+
+/// A refused argument, with the code of the program's for the same fault in a file, and the place
+/// in the arrays.
+pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
+    let found = Found {
+        code: Some(code.name()),
+        pointer: Some(pointer),
+        ..Found::default()
+    };
+    Class::Input.error(message, &found)
+}
+
+/// What is wrong with a file.
+pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
+    let class = match diagnostic.code.severity() {
+        Severity::Error => Class::Input,
+        Severity::Warning => Class::Warning,
+    };
+    class.error(&diagnostic.to_string(), &diagnostic.into())
+}
+
+/// What is remarkable about a file.
+pub(crate) fn warn(py: Python<'_>, diagnostic: &Diagnostic) -> PyResult<()> {
+    let warning = Class::Warning.error(&diagnostic.to_string(), &diagnostic.into());
+    py.import("warnings")?
+        .call_method1("warn", (warning.value(py),))?;
+    Ok(())
+}
+
+/// Keys that were refused.
+pub(crate) fn of_track(error: &TrackError) -> PyErr {
+    let message = error.to_string();
+    let at = |name: &str, track: usize, key: usize| format!("{name}[{track}][{key}]");
+    match *error {
+        TrackError::TimeNotFinite { track, key, .. } => {
+            input_at(&message, Code::NotFinite, at("times", track, key))
+        }
+        TrackError::TimeOutOfRange { track, key, .. } => {
+            input_at(&message, Code::TooLarge, at("times", track, key))
+        }
+        TrackError::TimeNotIncreasing { track, key, .. } => {
+            input_at(&message, Code::TimeNotIncreasing, at("times", track, key))
+        }
+        TrackError::NotUnit { track, key, norm } if norm.is_finite() => {
+            input_at(&message, Code::Norm, at("keys", track, key))
+        }
+        TrackError::NotUnit { track, key, .. } => {
+            input_at(&message, Code::NotFinite, at("keys", track, key))
+        }
+        TrackError::DataNotFinite { track, key, what } => {
+            input_at(&message, Code::NotFinite, at(what, track, key))
+        }
+        _ => input(message),
+    }
+}
+
+/// An evaluation that failed.
+pub(crate) fn of_engine(error: &Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::Vulkan(_) | Error::Threads { .. } => device(&message),
+        Error::Frames(FramesError::TimeNotFinite { index, .. }) => {
+            input_at(&message, Code::NotFinite, format!("at[{index}]"))
+        }
+        Error::Interpolation(
+            InterpolationError::Antipodal { track, .. }
+            | InterpolationError::OpenLoop { track, .. },
+        ) => Class::Input.error(
+            &message,
+            &Found {
+                pointer: Some(format!("keys[{track}]")),
+                ..Found::default()
+            },
+        ),
+        _ => input(message),
+    }
+}
+
+/// A device that cannot be used.
+pub(crate) fn device(message: &str) -> PyErr {
+    Class::Device.error(message, &Found::default())
+}
+
+/// An output that cannot be written.
+pub(crate) fn output(message: &str) -> PyErr {
+    Class::Output.error(message, &Found::default())
+}
+
+pub(crate) fn of_output(error: &OutputError) -> PyErr {
+    output(&error.to_string())
+}
+
+pub(crate) fn of_write(error: &WriteError) -> PyErr {
+    match error {
+        WriteError::Io(error) => output(&error.to_string()),
+        WriteError::Refused(diagnostic) => of_diagnostic(diagnostic),
+    }
+}
+
+/// Runs `work`; a panic, which is a bug of ours, becomes an exception that asks for a report.
+pub(crate) fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)))
+}
+
+fn of_panic(panic: &(dyn Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let what = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    PyRuntimeError::new_err(format!(
+        "internal error: {}; this is a bug in tumble {}: please report it with the call and, if \
+         they can be shared, its arguments",
+        what.unwrap_or("no reason given"),
+        env!("CARGO_PKG_VERSION"),
+    ))
+}

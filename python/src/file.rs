@@ -1,0 +1,264 @@
+//! `tumble.load` and `tumble.File`: what a file holds.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DQuat;
+use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use tumble_formats::adjust::adjust;
+use tumble_formats::format::TimeUnit;
+use tumble_formats::keys::Duplicates;
+use tumble_formats::{Format, Limits, Loaded, ReadOptions};
+
+use crate::clip::{Clip, Source, counted};
+use crate::errors::{guarded, input, of_diagnostic, of_track, warn};
+use crate::options::{frame_rate, one_of};
+
+/// The clips of a file, by their places or names.
+///
+/// >>> import tumble, tempfile, os
+/// >>> path = os.path.join(tempfile.mkdtemp(), "door.tum")
+/// >>> tumble.save(path, tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]]))
+/// >>> file = tumble.load(path)
+/// >>> len(file), file.clip
+/// (1, Clip(1 track, 2 keys, 0 to 1 s, 24 fps))
+#[pyclass(frozen, module = "tumble", mapping)]
+pub(crate) struct File {
+    clips: Vec<Clip>,
+    path: PathBuf,
+    refused: Vec<String>,
+}
+
+#[pymethods]
+impl File {
+    /// The clips, in the file's order.
+    #[getter]
+    fn clips(&self) -> Vec<Clip> {
+        self.clips.clone()
+    }
+
+    /// The clips' names; their places where they have none.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        let name = |clip: &Clip| {
+            let motion = &clip.motion;
+            motion
+                .name
+                .clone()
+                .unwrap_or_else(|| motion.place.to_string())
+        };
+        self.clips.iter().map(name).collect()
+    }
+
+    /// The only clip; an error where there are several.
+    #[getter]
+    fn clip(&self) -> PyResult<Clip> {
+        match &*self.clips {
+            [clip] => Ok(clip.clone()),
+            _ => Err(input(format!(
+                "{}: has {}: {}; choose one by its name or place",
+                self.path.display(),
+                counted(self.clips.len(), "clip"),
+                self.names().join(", ")
+            ))),
+        }
+    }
+
+    /// Where it was read.
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.path.clone()
+    }
+
+    /// Why other clips of the file could not be read.
+    #[getter]
+    fn refused(&self) -> Vec<String> {
+        self.refused.clone()
+    }
+
+    fn __len__(&self) -> usize {
+        self.clips.len()
+    }
+
+    fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let clips = slf.get().clips().into_pyobject(slf.py())?;
+        Ok(clips.try_iter()?.into_any())
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.names().iter().any(|own| own == name)
+    }
+
+    fn __getitem__(&self, key: &Bound<'_, PyAny>) -> PyResult<Clip> {
+        if let Ok(name) = key.cast::<PyString>() {
+            let name = name.to_cow()?;
+            let place = self.names().iter().position(|own| *own == *name);
+            return place.map(|place| self.clips[place].clone()).ok_or_else(|| {
+                let names = self.names().join(", ");
+                PyKeyError::new_err(format!("there is no clip `{name}`; there are {names}"))
+            });
+        }
+        let place: isize = key
+            .extract()
+            .map_err(|_| PyTypeError::new_err("a clip is its place, from 0, or its name"))?;
+        let from_end = if place < 0 {
+            self.clips.len() as isize
+        } else {
+            0
+        };
+        let clip = usize::try_from(place + from_end)
+            .ok()
+            .and_then(|place| self.clips.get(place));
+        clip.cloned().ok_or_else(|| {
+            PyIndexError::new_err(format!(
+                "there is no clip {place}; there are {}",
+                self.clips.len()
+            ))
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let clips: Vec<String> = self
+            .names()
+            .iter()
+            .map(|name| format!("{name:?}"))
+            .collect();
+        format!(
+            "File({:?}: {})",
+            self.path.display().to_string(),
+            clips.join(", ")
+        )
+    }
+}
+
+/// Reads a motion file of any format: glTF and GLB, BVH, NPZ and NPY, Parquet, Arrow, CSV, TUM,
+/// `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
+/// with the place.
+///
+/// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
+/// raw_times=False, scale=None, up=None)`
+///
+/// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
+/// keys, where the file does not say it. `map`: which array or column is what, where names do not
+/// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
+/// or "ns". `duplicates`: of two different keys at one time, keep the "first" or the "last".
+/// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
+/// `scale`: multiply translations. `up`: turn so that "y" or "z" is up, where the other was.
+///
+/// `read` is another name of it.
+///
+/// >>> import tumble
+/// >>> tumble.load("missing.glb")  # doctest: +IGNORE_EXCEPTION_DETAIL
+/// Traceback (most recent call last):
+/// tumble.InputError: missing.glb: error[E001]: ...
+#[pyfunction]
+#[pyo3(signature = (
+    path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
+    raw_times=false, scale=None, up=None
+))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn load(
+    py: Python<'_>,
+    path: PathBuf,
+    format: Option<&str>,
+    source_fps: Option<&Bound<'_, PyAny>>,
+    map: Option<String>,
+    time_unit: Option<&Bound<'_, PyAny>>,
+    duplicates: Option<&Bound<'_, PyAny>>,
+    raw_times: bool,
+    scale: Option<f64>,
+    up: Option<&Bound<'_, PyAny>>,
+) -> PyResult<File> {
+    let options = ReadOptions {
+        limits: Limits::default(),
+        pipes: false,
+        raw_times,
+        duplicates: match duplicates {
+            None => Duplicates::Refuse,
+            Some(which) => one_of(
+                which,
+                "duplicates",
+                &[("first", Duplicates::First), ("last", Duplicates::Last)],
+            )?,
+        },
+        source_rate: source_fps.map(frame_rate).transpose()?,
+        map,
+        time_unit: time_unit
+            .map(|unit| {
+                let units = [
+                    ("s", TimeUnit::Seconds),
+                    ("ms", TimeUnit::Milliseconds),
+                    ("us", TimeUnit::Microseconds),
+                    ("ns", TimeUnit::Nanoseconds),
+                ];
+                one_of(unit, "time_unit", &units)
+            })
+            .transpose()?,
+    };
+    let format = format.map(format_named).transpose()?;
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let turn = up
+        .map(|axis| one_of(axis, "up", &[("y", -quarter), ("z", quarter)]))
+        .transpose()?;
+    if let Some(scale) = scale.filter(|scale| !scale.is_finite() || *scale <= 0.0) {
+        return Err(input(format!("scale: {scale} is not a number over 0")));
+    }
+    let mut loaded = py.detach(|| {
+        guarded(|| {
+            let read = match format {
+                Some(format) => format.open(&path, &options),
+                None => Format::open_detected(&path, &options),
+            };
+            let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+            if scale.is_some() || turn.is_some() {
+                let turn = DQuat::from_rotation_x(turn.unwrap_or(0.0));
+                for clip in &mut loaded.clips {
+                    *clip = adjust(clip, scale.unwrap_or(1.0), turn)
+                        .map_err(|error| of_track(&error))?;
+                }
+                // What is kept of the file has its own units and axes.
+                loaded.document = None;
+            }
+            Ok(loaded)
+        })
+    })?;
+    if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
+        return Err(of_diagnostic(first));
+    }
+    for diagnostic in loaded.warnings.iter().chain(&loaded.refused) {
+        warn(py, diagnostic)?;
+    }
+    Ok(File::new(path, &mut loaded))
+}
+
+impl File {
+    fn new(path: PathBuf, loaded: &mut Loaded) -> Self {
+        let source = Arc::new(Source {
+            path: path.clone(),
+            document: loaded.document.take(),
+            box_length: loaded.box_length,
+        });
+        let clip = |motion| Clip {
+            motion: Arc::new(motion),
+            source: Some(Arc::clone(&source)),
+        };
+        Self {
+            clips: loaded.clips.drain(..).map(clip).collect(),
+            path,
+            refused: loaded.refused.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+/// The format of that name.
+pub(crate) fn format_named(name: &str) -> PyResult<&'static Format> {
+    Format::named(name).ok_or_else(|| {
+        let names: Vec<&str> = tumble_formats::FORMATS.iter().map(|it| it.name).collect();
+        input(format!(
+            "there is no format `{name}`; there are {}",
+            names.join(", ")
+        ))
+    })
+}

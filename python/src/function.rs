@@ -1,0 +1,58 @@
+//! `tumble.evaluate`: arrays of keys to an array of rotations, in one call.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::Order;
+use crate::build::clip_of;
+use crate::engine::{default_engine, layout_named, request_arrays};
+use crate::errors::guarded;
+use crate::evaluate::Result;
+use crate::options::Request;
+
+/// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
+///
+/// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
+/// as_rotation=False, **options)`
+///
+/// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
+/// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
+/// and the other keywords are as those of `Engine.evaluate`.
+///
+/// >>> import numpy as np, tumble
+/// >>> half = np.sqrt(0.5)
+/// >>> tumble.evaluate([0.0, 2.0], [[1, 0, 0, 0], [0, 0, 0, 1]], at=[0.0, 1.0], order="wxyz",
+/// ...                 method="slerp").round(4)
+/// array([[1.    , 0.    , 0.    , 0.    ],
+///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
+#[pyfunction]
+#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn evaluate<'py>(
+    times: &Bound<'py, PyAny>,
+    keys: &Bound<'py, PyAny>,
+    out: Option<&Bound<'py, PyAny>>,
+    order: &str,
+    layout: &str,
+    as_rotation: bool,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    guarded(|| {
+        let py = times.py();
+        let request = Request::new(options)?;
+        let order = Order::named(order)?;
+        let (motion, is_one_track) = clip_of(times, keys, order, None)?;
+        let result = Result {
+            // Rotations of SciPy's have an order of their own.
+            order: if as_rotation { Order::Xyzw } else { order },
+            layout: layout_named(layout)?,
+            as_rotation,
+            is_one_track,
+            ..Result::default()
+        };
+        let engine = |rotations| default_engine(py)?.get().engine(rotations);
+        let arrays = request_arrays(options)?;
+        let inputs: Vec<_> = [times, keys].into_iter().chain(&arrays).collect();
+        result.of(py, engine, &motion.into(), &request, out, &inputs)
+    })
+}

@@ -1,0 +1,52 @@
+//! Tumble for Python: the extension module behind the package `tumble`.
+//!
+//! Arguments become values of the engine's (`arrays`, `build`, `options`), results are written by
+//! the engine into NumPy's memory (`evaluate`, `output`, `run`), and what went wrong becomes an
+//! exception (`errors`). The interpreter's lock is released while the engine works.
+
+#![forbid(unsafe_code)]
+
+mod arrays;
+mod build;
+mod clip;
+mod engine;
+mod errors;
+mod evaluate;
+mod file;
+mod function;
+mod options;
+mod output;
+mod poses;
+mod program;
+mod run;
+mod save;
+mod stream;
+mod verify;
+
+use pyo3::pymodule;
+
+/// The extension module; its public names are those of the package `tumble`.
+#[pymodule(gil_used = false)]
+mod _tumble {
+    #[pymodule_export]
+    use crate::clip::Clip;
+    #[pymodule_export]
+    use crate::engine::Engine;
+    #[pymodule_export]
+    use crate::file::{File, load};
+    #[pymodule_export]
+    use crate::function::evaluate;
+    #[pymodule_export]
+    use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
+    #[pymodule_export]
+    use crate::save::save;
+    #[pymodule_export]
+    use crate::stream::{Chunk, Chunks};
+    #[pymodule_export]
+    use crate::verify::Verification;
+
+    /// The version of the package.
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "Python's name")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

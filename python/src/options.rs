@@ -1,0 +1,326 @@
+//! The keywords that all evaluations share: which samples, and how to interpolate.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use glam::DVec3;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+use tumble::{
+    Ends, FrameRate, Frames, Interpolation, METHODS, Method, Path, Quantity, Speed, Tcb, TrackSet,
+    WrapMode,
+};
+
+use crate::arrays;
+use crate::errors::{input, of_engine};
+
+/// Which samples.
+#[derive(Debug, Clone)]
+pub(crate) enum Samples {
+    /// Frames at a rate.
+    Rate(FrameRate, Option<f64>, Option<f64>),
+    /// One list of times for all tracks; a single time stands for a result without an axis of
+    /// frames.
+    Shared { times: Arc<[f64]>, is_one: bool },
+    /// A list of times for each track, of one length.
+    Each { times: Arc<[f64]>, count: usize },
+    /// A list of times for each track.
+    Ragged(Vec<Vec<f64>>),
+}
+
+/// What was asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Request {
+    /// `None` where neither a rate nor times were given.
+    pub(crate) samples: Option<Samples>,
+    /// `None`: each channel's own.
+    pub(crate) method: Option<Method>,
+    manner: Manner,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Manner {
+    path: Path,
+    ends: Option<Ends>,
+    speed: Speed,
+    before: WrapMode,
+    after: WrapMode,
+    tcb: Tcb,
+}
+
+/// Where a file has a word for each channel, its own; bessel-overhauser where it has none.
+pub(crate) const AUTHORED: &str = "authored";
+
+impl Request {
+    /// Reads the keywords.
+    pub(crate) fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut request = Self {
+            samples: None,
+            method: None,
+            manner: Manner {
+                path: Path::Shortest,
+                ends: None,
+                speed: Speed::AsKeyed,
+                before: WrapMode::Hold,
+                after: WrapMode::Hold,
+                tcb: Tcb::default(),
+            },
+        };
+        let (mut rate, mut times, mut start, mut end) = (None, None, None, None);
+        for (name, value) in keywords.into_iter().flatten() {
+            let name: Cow<'_, str> = name.extract()?;
+            if value.is_none() {
+                check_name(&name)?;
+                continue;
+            }
+            let manner = &mut request.manner;
+            match &*name {
+                "fps" => rate = Some(frame_rate(&value)?),
+                "at" | "times" if times.is_some() => {
+                    return Err(PyTypeError::new_err(
+                        "`times` is another name of `at`; give one of them",
+                    ));
+                }
+                "at" | "times" => times = Some(value),
+                "start" => start = Some(arrays::number(&value, "start", "seconds")?),
+                "end" => end = Some(arrays::number(&value, "end", "seconds")?),
+                "method" => request.method = method(&value)?,
+                "path" => {
+                    manner.path = one_of(
+                        &value,
+                        "path",
+                        &[
+                            ("shortest", Path::Shortest),
+                            ("as-authored", Path::AsAuthored),
+                        ],
+                    )?;
+                }
+                "ends" => manner.ends = Some(ends(&value)?),
+                "speed" => {
+                    manner.speed = one_of(
+                        &value,
+                        "speed",
+                        &[("as-keyed", Speed::AsKeyed), ("constant", Speed::Constant)],
+                    )?;
+                }
+                "before" => manner.before = wrap(&value, "before")?,
+                "after" => manner.after = wrap(&value, "after")?,
+                "tension" => manner.tcb.tension = arrays::number(&value, "tension", "a number")?,
+                "continuity" => {
+                    manner.tcb.continuity = arrays::number(&value, "continuity", "a number")?;
+                }
+                "bias" => manner.tcb.bias = arrays::number(&value, "bias", "a number")?,
+                _ => check_name(&name)?,
+            }
+        }
+        request.samples = samples(rate, times, start, end)?;
+        Ok(request)
+    }
+
+    /// The samples, of which there must be some.
+    pub(crate) fn samples(&self) -> PyResult<&Samples> {
+        self.samples
+            .as_ref()
+            .ok_or_else(|| input("give `fps`, frames per second, or `at`, times in seconds"))
+    }
+
+    /// What is asked of a method.
+    pub(crate) fn with(&self, quantity: Quantity) -> impl Fn(Method) -> Interpolation + use<> {
+        let manner = self.manner;
+        move |method| Interpolation {
+            method,
+            path: method.path.unwrap_or(manner.path),
+            ends: manner.ends.unwrap_or(method.ends),
+            tcb: manner.tcb,
+            quantity,
+            speed: manner.speed,
+            before: manner.before,
+            after: manner.after,
+        }
+    }
+
+    /// The method's name.
+    pub(crate) fn method_name(&self) -> &'static str {
+        self.method.map_or(AUTHORED, |method| method.name)
+    }
+}
+
+impl Samples {
+    /// The samples of some tracks of a set as the engine takes them.
+    pub(crate) fn frames(&self, set: &TrackSet, tracks: Option<&[usize]>) -> PyResult<Frames> {
+        Ok(match self {
+            &Self::Rate(rate, start, end) => {
+                let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+                Frames::rate(rate).between(start.unwrap_or(first), end.unwrap_or(last))
+            }
+            Self::Shared { times, .. } => Frames::at(times.to_vec()),
+            Self::Each { times, count } => {
+                let given = times.len() / (*count).max(1);
+                if given != set.track_count() && !times.is_empty() {
+                    return Err(input(format!(
+                        "there are times for {given} tracks; the clip has {}",
+                        set.track_count()
+                    )));
+                }
+                match tracks {
+                    None => Frames::at_each(times.to_vec()),
+                    Some(tracks) => {
+                        let row = |&track: &usize| &times[track * count..(track + 1) * count];
+                        Frames::at_each(tracks.iter().flat_map(row).copied().collect())
+                    }
+                }
+            }
+            Self::Ragged(_) => {
+                return Err(input(
+                    "lists of times of different lengths are for rotations; give each track as \
+                     many times",
+                ));
+            }
+        })
+    }
+
+    /// As [`Samples::frames`], and how many there are.
+    pub(crate) fn resolved(&self, set: &TrackSet) -> PyResult<(Frames, usize)> {
+        let frames = self.frames(set, None)?;
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| of_engine(&error.into()))?;
+        Ok((frames, timeline.len()))
+    }
+}
+
+fn samples(
+    rate: Option<FrameRate>,
+    times: Option<Bound<'_, PyAny>>,
+    start: Option<f64>,
+    end: Option<f64>,
+) -> PyResult<Option<Samples>> {
+    match (rate, times) {
+        (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
+        (None, Some(_)) if start.is_some() || end.is_some() => Err(input(
+            "`start` and `end` go with `fps`; `at` says all times",
+        )),
+        (Some(rate), None) => Ok(Some(Samples::Rate(rate, start, end))),
+        (None, Some(times)) => arrays::sample_times(&times).map(Some),
+        (None, None) if start.is_some() || end.is_some() => {
+            Err(input("`start` and `end` go with `fps`; give it too"))
+        }
+        (None, None) => Ok(None),
+    }
+}
+
+/// `60`, `29.97`, `"30000/1001"`, `Fraction(30000, 1001)`: each exactly what it says.
+pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
+    let text = value.str()?;
+    text.to_str()?
+        .parse()
+        .map_err(|error: tumble::FramesError| input(format!("fps: {error}")))
+}
+
+fn method(value: &Bound<'_, PyAny>) -> PyResult<Option<Method>> {
+    let name = text(value, "method")?;
+    if name == AUTHORED {
+        return Ok(None);
+    }
+    let found = Method::named(&name);
+    found.map(Some).ok_or_else(|| {
+        let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
+        input(format!(
+            "there is no method `{name}`; there are {AUTHORED}, {}",
+            names.join(", ")
+        ))
+    })
+}
+
+fn wrap(value: &Bound<'_, PyAny>, what: &str) -> PyResult<WrapMode> {
+    let modes = [
+        ("hold", WrapMode::Hold),
+        ("loop", WrapMode::Loop),
+        ("mirror", WrapMode::Mirror),
+        ("extrapolate", WrapMode::Extrapolate),
+    ];
+    one_of(value, what, &modes)
+}
+
+/// A name, or a pair of angular velocities.
+fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
+    let still = Ends::Clamped {
+        start: DVec3::ZERO,
+        end: DVec3::ZERO,
+    };
+    if !value.is_instance_of::<PyString>() {
+        let numbers = arrays::doubles(value, "ends")?;
+        return match (&*numbers.shape, &*numbers.values) {
+            ([2, 3], &[a, b, c, x, y, z]) => Ok(Ends::Clamped {
+                start: DVec3::new(a, b, c),
+                end: DVec3::new(x, y, z),
+            }),
+            (shape, _) => Err(input(format!(
+                "ends: shape {shape:?}; give a name, or the angular velocities at the first and \
+                 the last key, of shape (2, 3), rad/s"
+            ))),
+        };
+    }
+    let known = [
+        ("parabolic", Ends::Parabolic),
+        ("natural", Ends::Natural),
+        ("clamped", still),
+        ("secant", Ends::Secant),
+        ("loop", Ends::Loop),
+        ("frozen", Ends::Frozen),
+    ];
+    one_of(value, "ends", &known)
+}
+
+/// The value of that name.
+pub(crate) fn one_of<T: Copy>(
+    value: &Bound<'_, PyAny>,
+    what: &str,
+    known: &[(&str, T)],
+) -> PyResult<T> {
+    let name = text(value, what)?;
+    let found = known.iter().find(|(own, _)| **own == *name);
+    found.map(|&(_, value)| value).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|&(name, _)| name).collect();
+        input(format!(
+            "{what}: there is no `{name}`; there are {}",
+            names.join(", ")
+        ))
+    })
+}
+
+fn text<'a>(value: &'a Bound<'_, PyAny>, what: &str) -> PyResult<Cow<'a, str>> {
+    value
+        .cast::<PyString>()
+        .map_err(|_| PyTypeError::new_err(format!("{what}: give a name, as text")))?
+        .to_cow()
+}
+
+/// The keywords, for the message about one that is none of them.
+const NAMES: [&str; 14] = [
+    "fps",
+    "at",
+    "times",
+    "start",
+    "end",
+    "method",
+    "path",
+    "ends",
+    "speed",
+    "before",
+    "after",
+    "tension",
+    "continuity",
+    "bias",
+];
+
+fn check_name(name: &str) -> PyResult<()> {
+    if NAMES.contains(&name) {
+        return Ok(());
+    }
+    Err(PyTypeError::new_err(format!(
+        "there is no keyword `{name}`; there are {}",
+        NAMES.join(", ")
+    )))
+}

@@ -1,0 +1,113 @@
+//! Whole poses: translations, rotations and scales, relative to the parents or in the world.
+
+use glam::{Quat, Vec3};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use tumble::{Layout, Quantity};
+use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::world;
+
+use crate::clip::Clip;
+use crate::engine::Engine;
+use crate::errors::{guarded, input, of_engine};
+use crate::options::{Request, Samples as Wanted};
+
+/// Translations, rotations and scales relative to the parents.
+pub(crate) fn local<'py>(
+    engine: &Engine,
+    clip: &Bound<'py, Clip>,
+    layout: Layout,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let py = clip.py();
+    let (samples, tracks) = samples(engine, clip, options)?;
+    let count = samples.times.len();
+    let all = |own: &[Vec3], rest: Vec3| -> Vec<f32> {
+        match own.is_empty() {
+            true => [rest.to_array()].repeat(tracks * count).into_flattened(),
+            false => own.iter().flat_map(Vec3::to_array).collect(),
+        }
+    };
+    let rotations = samples.rotations.iter().flat_map(Quat::to_array);
+    let three = (tracks, count, 3);
+    PyTuple::new(
+        py,
+        [
+            shaped(py, all(&samples.translations, Vec3::ZERO), three, layout)?,
+            shaped(py, rotations.collect(), (tracks, count, 4), layout)?,
+            shaped(py, all(&samples.scales, Vec3::ONE), three, layout)?,
+        ],
+    )
+}
+
+/// Positions and rotations in the world.
+pub(crate) fn in_world<'py>(
+    engine: &Engine,
+    clip: &Bound<'py, Clip>,
+    layout: Layout,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let py = clip.py();
+    let (samples, tracks) = samples(engine, clip, options)?;
+    let motion = &clip.get().motion;
+    let poses = py
+        .detach(|| guarded(|| world(motion, &samples).map_err(|error| input(error.to_string()))))?;
+    let count = samples.times.len();
+    let positions = poses.iter().flat_map(|it| it.position.to_array());
+    let rotations = poses.iter().flat_map(|it| it.rotation.to_array());
+    PyTuple::new(
+        py,
+        [
+            shaped(py, positions.collect(), (tracks, count, 3), layout)?,
+            shaped(py, rotations.collect(), (tracks, count, 4), layout)?,
+        ],
+    )
+}
+
+/// All channels of a clip, `[sample][track]`.
+fn samples(
+    engine: &Engine,
+    clip: &Bound<'_, Clip>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Samples, usize)> {
+    let request = Request::new(options)?;
+    let motion = &clip.get().motion;
+    let wanted = request.samples()?;
+    if !matches!(wanted, Wanted::Rate(..) | Wanted::Shared { .. }) {
+        return Err(input("at: poses are of all tracks at the same times"));
+    }
+    let (frames, count) = wanted.resolved(&motion.set)?;
+    let tracks = motion.set.track_count();
+    let engine = engine.engine(tracks * count)?;
+    let samples = clip.py().detach(|| {
+        guarded(|| {
+            let methods = ChannelMethods {
+                method: request.method,
+                with: &request.with(Quantity::Rotation),
+            };
+            methods
+                .sample(&engine, motion, &frames)
+                .map_err(|error| of_engine(&error))
+        })
+    })?;
+    Ok((samples, tracks))
+}
+
+/// Sampled numbers as an array, without a copy; `[sample][track]` is shown as `[track][sample]` if
+/// that is the layout.
+fn shaped<'py>(
+    py: Python<'py>,
+    numbers: Vec<f32>,
+    (tracks, samples, components): (usize, usize, usize),
+    layout: Layout,
+) -> PyResult<Bound<'py, PyAny>> {
+    let flat = PyArray1::from_vec(py, numbers);
+    debug_assert_eq!(flat.len(), tracks * samples * components);
+    let array = flat.reshape([samples, tracks, components])?;
+    match layout {
+        Layout::FrameMajor => Ok(array.into_any()),
+        Layout::TrackMajor => array.call_method1(intern!(py, "swapaxes"), (0, 1)),
+    }
+}

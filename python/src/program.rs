@@ -1,0 +1,88 @@
+//! The program and its parts: `python -m tumble`, devices, methods, the page of `tumble view`.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tumble::METHODS;
+use tumble_cli::host;
+
+use crate::errors::{device, guarded, input};
+use crate::save::clips_of;
+
+/// Runs the program `tumble` with these arguments, the first of which is its name; gives its exit
+/// code.
+#[pyfunction]
+pub(crate) fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| host::run(arguments))
+}
+
+/// Says which command loads the Vulkan drivers in a process of its own, where one that crashes does
+/// no harm.
+#[pyfunction]
+pub(crate) fn set_probe(command: Vec<OsString>) {
+    host::set_probe(command);
+}
+
+/// Loads the Vulkan drivers: what that process does.
+#[pyfunction]
+pub(crate) fn load_drivers(py: Python<'_>) {
+    py.detach(host::load_drivers);
+}
+
+/// The names of the Vulkan devices, in the order of their indices; empty where there is no Vulkan.
+///
+/// >>> import tumble
+/// >>> isinstance(tumble.devices(), list)
+/// True
+#[pyfunction]
+pub(crate) fn devices(py: Python<'_>) -> PyResult<Vec<String>> {
+    let devices = py.detach(|| guarded(|| Ok(host::devices().unwrap_or_default())))?;
+    Ok(devices
+        .iter()
+        .map(|device| device.name().to_owned())
+        .collect())
+}
+
+/// What each method is: its name, and a few words.
+///
+/// >>> import tumble
+/// >>> tumble.methods()["slerp"]
+/// 'constant angular velocity between keys; velocity jumps at each key'
+#[pyfunction]
+pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let found = PyDict::new(py);
+    for method in METHODS {
+        found.set_item(method.name, method.summary)?;
+    }
+    Ok(found)
+}
+
+/// The page of `tumble view` with some clips, as HTML that needs nothing beside it.
+#[pyfunction]
+pub(crate) fn page(
+    py: Python<'_>,
+    clips: &Bound<'_, PyAny>,
+    options: Vec<String>,
+) -> PyResult<String> {
+    let clips = clips_of(clips)?;
+    let source = clips.first().and_then(|clip| clip.source.clone());
+    let path = source
+        .as_ref()
+        .map_or(PathBuf::from("clip"), |own| own.path.clone());
+    let motions = clips.iter().map(|clip| (*clip.motion).clone()).collect();
+    let box_length = source.and_then(|own| own.box_length);
+    let made =
+        py.detach(|| guarded(|| Ok(host::page(Path::new(&path), motions, box_length, &options))))?;
+    made.map_err(|refused| match refused.is_usage {
+        true => input(refused.message),
+        false => device(&refused.message),
+    })
+}
+
+/// Panics, so that tests see what becomes of it.
+#[pyfunction]
+pub(crate) fn panic() -> PyResult<()> {
+    guarded(|| panic!("asked for"))
+}

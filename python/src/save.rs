@@ -1,0 +1,376 @@
+//! `tumble.save`: clips into files, as `tumble eval` and `tumble convert` write them.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity};
+use tumble_formats::Diagnostic;
+use tumble_formats::format::{
+    Document, Format, MotionOptions, ResultShape, WriteError, WriteResults,
+};
+use tumble_formats::keyed::keyed;
+use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::npy::ComponentOrder;
+use tumble_formats::output::Output;
+use tumble_formats::sample::{ChannelMethods, Samples};
+
+use crate::arrays::Order;
+use crate::clip::Clip;
+use crate::engine::{default_engine, layout_named};
+use crate::errors::{guarded, input, of_engine, of_output, of_write, warn};
+use crate::evaluate::uniform;
+use crate::file::{File, format_named};
+use crate::options::{Request, Samples as Wanted};
+use crate::run::check_signals;
+
+/// Rotations evaluated at once.
+const CHUNK: usize = 1 << 20;
+
+/// Writes clips to a file, whole or not at all; its format is that of the name's ending.
+///
+/// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order="xyzw",
+/// layout="track", overwrite=True, engine=None, **options)`
+///
+/// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
+/// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
+/// into the same format baked: all else in the file stays as it is. Without, the keys are written
+/// at their own times. NPY, and CSV, Parquet and Arrow for clips without a skeleton, hold rotations
+/// alone, in the `order` and `layout` that is asked for; the bytes are those that the program
+/// `tumble` writes.
+///
+/// `sequence`: of BVH's angles, such as "ZXY". `linear`: arrays of an NPZ file with a number for
+/// each frame that are to be interpolated linearly instead of being left out. `engine`: which
+/// evaluates, else one that all calls share.
+///
+/// `write` is another name of it.
+///
+/// >>> import numpy as np, tempfile, os, tumble
+/// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+/// >>> path = os.path.join(tempfile.mkdtemp(), "door.npy")
+/// >>> tumble.save(path, clip, fps=30)
+/// >>> np.load(path).shape
+/// (1, 31, 4)
+#[pyfunction]
+#[pyo3(signature = (
+    path, clips, /, *, format=None, sequence=None, linear=vec![], order="xyzw", layout="track",
+    overwrite=true, engine=None, **options
+))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn save(
+    py: Python<'_>,
+    path: PathBuf,
+    clips: &Bound<'_, PyAny>,
+    format: Option<&str>,
+    sequence: Option<&str>,
+    linear: Vec<String>,
+    order: &str,
+    layout: &str,
+    overwrite: bool,
+    engine: Option<&Bound<'_, crate::engine::Engine>>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<()> {
+    let request = Request::new(options)?;
+    let clips = clips_of(clips)?;
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let Some(name) = format.or(ending) else {
+        return Err(input(
+            "the name has no ending that tells the format; name one with `format`",
+        ));
+    };
+    let sequence = sequence
+        .map(str::parse)
+        .transpose()
+        .map_err(|error| input(format!("sequence: {error}")))?;
+    let job = Save {
+        format: format_named(name)?,
+        motion: MotionOptions {
+            name: path.display().to_string(),
+            format: name.to_lowercase(),
+            sequence,
+            linear,
+        },
+        order: Order::named(order)?,
+        layout: layout_named(layout)?,
+        engine: match engine {
+            Some(engine) => engine.get(),
+            None => default_engine(py)?.get(),
+        },
+        request: &request,
+        clips: &clips,
+        path: &path,
+    };
+    let sources = clips
+        .iter()
+        .filter_map(|clip| Some(clip.source.as_ref()?.path.clone()));
+    let inputs: Vec<PathBuf> = sources.collect();
+    let warnings = py.detach(|| {
+        guarded(|| {
+            let create = || Output::create(&path, overwrite, &inputs);
+            let mut out = create().map_err(|error| of_output(&error))?;
+            let warnings = job.write(&mut out)?;
+            out.commit().map_err(|error| of_output(&error))?;
+            Ok(warnings)
+        })
+    })?;
+    warnings
+        .iter()
+        .try_for_each(|diagnostic| warn(py, diagnostic))
+}
+
+/// A clip, the clips of a file, or a list of them.
+pub(crate) fn clips_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Clip>> {
+    if let Ok(clip) = value.cast::<Clip>() {
+        return Ok(vec![clip.get().clone()]);
+    }
+    if let Ok(file) = value.cast::<File>() {
+        return file.as_any().getattr("clips")?.extract();
+    }
+    let clips: Vec<Clip> = value.extract().map_err(|_| {
+        let kind = value.get_type().to_string();
+        pyo3::exceptions::PyTypeError::new_err(format!(
+            "{kind}: give a Clip, a File or a list of clips"
+        ))
+    })?;
+    match clips.is_empty() {
+        true => Err(input("there is no clip to write")),
+        false => Ok(clips),
+    }
+}
+
+/// What is written, and how.
+struct Save<'a> {
+    format: &'static Format,
+    motion: MotionOptions,
+    order: Order,
+    layout: Layout,
+    engine: &'a crate::engine::Engine,
+    request: &'a Request,
+    clips: &'a [Clip],
+    path: &'a Path,
+}
+
+impl Save<'_> {
+    fn write(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
+        let Some(samples) = &self.request.samples else {
+            return self.keys(out);
+        };
+        let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
+        if let Some(document) = self.document() {
+            let Wanted::Rate(rate, None, None) = *samples else {
+                return Err(input(
+                    "the animations of a file that is kept keep their lengths; leave out `at`, \
+                     `start` and `end`, or write another format",
+                ));
+            };
+            return self.baked(&motions, &*document, rate, out);
+        }
+        if self.format.takes_motion(&motions) {
+            return self.sampled(&motions, samples, out);
+        }
+        match (&*motions, &self.format.write) {
+            ([motion], Some(write)) => self.rotations(motion, samples, write, out),
+            (_, None) => Err(input(format!(
+                "{} is read, and not written",
+                self.format.name
+            ))),
+            _ => Err(input(format!(
+                "{} holds the rotations of one clip; there are {}",
+                self.format.name,
+                motions.len()
+            ))),
+        }
+    }
+
+    /// The file that all clips come from, if it can be written again.
+    fn document(&self) -> Option<Arc<dyn Document>> {
+        let mut sources = self.clips.iter().map(|clip| clip.source.as_ref());
+        let first = sources.next()??;
+        let is_one = sources.all(|source| source.is_some_and(|own| Arc::ptr_eq(own, first)));
+        let document = first.document.as_ref().filter(|_| is_one)?;
+        document.writes(self.format).then(|| Arc::clone(document))
+    }
+
+    /// Keys at their own times.
+    fn keys(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
+        let Some(write) = self.format.write_motion else {
+            return Err(input(format!(
+                "{} holds samples, not keys; give `fps` or `at`",
+                self.format.name
+            )));
+        };
+        let keys = self.clips.iter().map(|clip| keyed(&clip.motion));
+        let keys: Result<Vec<Samples>, _> = keys.collect();
+        let keys = keys.map_err(|error| input(error.to_string()))?;
+        let sampled: Vec<Sampled<'_>> = (self.clips.iter().zip(&keys))
+            .map(|(clip, keys)| {
+                let rate = clip.motion.rate.or_else(|| clip.motion.rate_of_keys());
+                keys.of(&clip.motion, rate, &[])
+            })
+            .collect();
+        write(&sampled, &self.motion, out).map_err(|error| of_write(&error))
+    }
+
+    /// The clips' own file with other keys.
+    fn baked(
+        &self,
+        clips: &[&Motion],
+        document: &dyn Document,
+        rate: FrameRate,
+        out: &mut dyn Write,
+    ) -> PyResult<Vec<Diagnostic>> {
+        let times = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);
+        let frames: Result<Vec<Frames>, Diagnostic> = clips.iter().map(times).collect();
+        let frames = frames.map_err(|error| of_write(&error.into()))?;
+        self.written(clips, &frames, Some(rate), |sampled| {
+            let places = clips.iter().map(|clip| clip.place);
+            let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled.iter().cloned()).collect();
+            document.write(&clips, &self.motion, self.path, out)
+        })
+    }
+
+    /// Clips as a file of their own.
+    fn sampled(
+        &self,
+        clips: &[&Motion],
+        samples: &Wanted,
+        out: &mut dyn Write,
+    ) -> PyResult<Vec<Diagnostic>> {
+        let frames = clips.iter().map(|clip| Ok(samples.resolved(&clip.set)?.0));
+        let frames: Vec<Frames> = frames.collect::<PyResult<_>>()?;
+        let rate = match samples {
+            Wanted::Rate(rate, ..) => Some(*rate),
+            _ => None,
+        };
+        let write = self.format.write_motion;
+        self.written(clips, &frames, rate, |sampled| match write {
+            Some(write) => write(sampled, &self.motion, out),
+            None => Ok(Vec::new()),
+        })
+    }
+
+    fn written(
+        &self,
+        clips: &[&Motion],
+        frames: &[Frames],
+        rate: Option<FrameRate>,
+        write: impl FnOnce(&[Sampled<'_>]) -> Result<Vec<Diagnostic>, WriteError>,
+    ) -> PyResult<Vec<Diagnostic>> {
+        let mut all = Vec::new();
+        for (clip, frames) in clips.iter().zip(frames) {
+            check_signals()?;
+            let count = frames.resolve(clip.set.track_count(), clip.set.time_span());
+            let count = count.map_err(|error| of_engine(&error.into()))?.len();
+            let engine = self.engine.engine(clip.set.track_count() * count)?;
+            let methods = ChannelMethods {
+                method: self.request.method,
+                with: &self.request.with(Quantity::Rotation),
+            };
+            let samples = methods.sample(&engine, clip, frames);
+            all.push(samples.map_err(|error| of_engine(&error))?);
+        }
+        let notes = self.notes();
+        let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
+            .map(|(clip, samples)| samples.of(clip, rate, &notes))
+            .collect();
+        write(&sampled).map_err(|error| of_write(&error))
+    }
+
+    fn notes(&self) -> Vec<(&'static str, String)> {
+        let mut notes = vec![("method", self.request.method_name().to_owned())];
+        if let Some(source) = self.clips.first().and_then(|clip| clip.source.as_ref()) {
+            notes.push(("input", source.path.display().to_string()));
+        }
+        notes
+    }
+
+    /// The rotations of one clip.
+    fn rotations(
+        &self,
+        clip: &Motion,
+        samples: &Wanted,
+        format: &WriteResults,
+        out: &mut dyn Write,
+    ) -> PyResult<Vec<Diagnostic>> {
+        let (frames, count) = samples.resolved(&clip.set)?;
+        let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
+        let timeline = timeline.map_err(|error| of_engine(&error.into()))?;
+        let mut notes = vec![("method", self.request.method_name().to_owned())];
+        if let Wanted::Rate(rate, ..) = samples {
+            notes.push(("rate", rate.to_string()));
+        }
+        let layout = format.layout.unwrap_or(self.layout);
+        let shape = ResultShape {
+            name: &self.motion.name,
+            set: &clip.set,
+            timeline: &timeline,
+            layout,
+            order: match self.order {
+                Order::Xyzw => ComponentOrder::Xyzw,
+                Order::Wxyz => ComponentOrder::Wxyz,
+            },
+            encoding: Encoding::F32,
+            notes: &notes,
+        };
+        let of_io = |error: std::io::Error| of_write(&error.into());
+        let mut writer = (format.rotations)(out, &shape).map_err(of_io)?;
+        let engine = self.engine.engine(clip.set.track_count() * count)?;
+        let with = self.request.with(Quantity::Rotation);
+        if let Some(method) = uniform(clip, self.request) {
+            stream(&engine, clip, with(method), &frames, layout, |rotations| {
+                let written = writer.write(rotations).map_err(of_io);
+                written.and_then(|()| check_signals())
+            })?;
+        } else {
+            let methods = ChannelMethods {
+                method: self.request.method,
+                with: &with,
+            };
+            let found = methods.rotations(&engine, clip, &frames, layout);
+            let found = found.map_err(|error| of_engine(&error))?;
+            writer.write(&found).map_err(of_io)?;
+        }
+        writer.finish().map_err(of_io)?;
+        Ok(Vec::new())
+    }
+}
+
+/// Evaluates in chunks.
+fn stream(
+    engine: &Engine,
+    clip: &Motion,
+    interpolation: tumble::Interpolation,
+    frames: &Frames,
+    layout: Layout,
+    mut sink: impl FnMut(&[glam::Quat]) -> PyResult<()>,
+) -> PyResult<()> {
+    /// Why a stream ends early.
+    enum Ended {
+        Evaluating(Error),
+        Sink(PyErr),
+    }
+    impl From<Error> for Ended {
+        fn from(error: Error) -> Self {
+            Self::Evaluating(error)
+        }
+    }
+    let row = match layout {
+        Layout::TrackMajor => 1,
+        Layout::FrameMajor => clip.set.track_count(),
+    };
+    let sink = |chunk: tumble::Chunk<'_>| sink(chunk.rotations).map_err(Ended::Sink);
+    let streamed = engine.stream(
+        &clip.set,
+        interpolation,
+        frames,
+        layout,
+        CHUNK.max(row),
+        sink,
+    );
+    streamed.map_err(|ended| match ended {
+        Ended::Evaluating(error) => of_engine(&error),
+        Ended::Sink(error) => error,
+    })
+}

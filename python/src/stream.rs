@@ -1,0 +1,211 @@
+//! Results in pieces.
+
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PySlice;
+use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Quantity};
+use tumble_formats::motion::Motion;
+
+use crate::arrays::Order;
+use crate::errors::{guarded, input, of_engine};
+use crate::evaluate::uniform;
+use crate::options::Request;
+use crate::output::{array, filled};
+use crate::run::Job;
+
+/// An iterator of `Chunk`s; see `Engine.stream`.
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Chunks {
+    engine: Engine,
+    motion: Arc<Motion>,
+    interpolation: Interpolation,
+    frames: Frames,
+    samples: usize,
+    order: Order,
+    layout: Layout,
+    /// Prepared once, where chunks have some samples of a track and not all.
+    clip: Option<tumble::Clip>,
+    /// Rows and columns that a chunk has at most; rows are tracks or frames, as the layout has it.
+    each: (usize, usize),
+    /// The row and the column where the next chunk starts.
+    next: Mutex<(usize, usize)>,
+}
+
+/// A part of a result, contiguous in the whole.
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Chunk {
+    tracks: Range<usize>,
+    frames: Range<usize>,
+    rotations: Py<PyArrayDyn<f32>>,
+}
+
+impl Chunks {
+    /// Of a clip that one method interpolates.
+    pub(crate) fn new(
+        engine: Engine,
+        motion: &Arc<Motion>,
+        request: &Request,
+        chunk: usize,
+        (order, layout): (Order, Layout),
+    ) -> PyResult<Self> {
+        let (frames, samples) = request.samples()?.resolved(&motion.set)?;
+        if chunk == 0 {
+            return Err(input(
+                "chunk: give the number of rotations of a piece, over 0",
+            ));
+        }
+        let Some(method) = uniform(motion, request) else {
+            return Err(input(
+                "the tracks of this clip are interpolated by different methods; name one with \
+                 `method` to stream it",
+            ));
+        };
+        let interpolation = request.with(Quantity::Rotation)(method);
+        let columns = match layout {
+            Layout::TrackMajor => samples,
+            Layout::FrameMajor => motion.set.track_count(),
+        };
+        let each = ((chunk / columns.max(1)).max(1), columns.min(chunk));
+        let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
+        let clip = match is_prepared {
+            true => Some(
+                engine
+                    .upload(&motion.set, interpolation)
+                    .map_err(|error| of_engine(&error))?,
+            ),
+            false => None,
+        };
+        Ok(Self {
+            engine,
+            motion: Arc::clone(motion),
+            interpolation,
+            frames,
+            samples,
+            order,
+            layout,
+            clip,
+            each,
+            next: Mutex::new((0, 0)),
+        })
+    }
+
+    /// The tracks and frames of the next chunk; `None` after the last.
+    fn advance(&self) -> Option<(Range<usize>, Range<usize>)> {
+        let tracks = self.motion.set.track_count();
+        let (rows, columns) = match self.layout {
+            Layout::TrackMajor => (tracks, self.samples),
+            Layout::FrameMajor => (self.samples, tracks),
+        };
+        let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
+        let (row, column) = *next;
+        if row >= rows || columns == 0 {
+            return None;
+        }
+        let own = (
+            row..rows.min(row + self.each.0),
+            column..columns.min(column + self.each.1),
+        );
+        *next = match own.1.end < columns {
+            true => (row, own.1.end),
+            false => (own.0.end, 0),
+        };
+        Some(match self.layout {
+            Layout::TrackMajor => own,
+            Layout::FrameMajor => (own.1, own.0),
+        })
+    }
+}
+
+#[pymethods]
+impl Chunks {
+    fn __iter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Chunk>> {
+        let Some((tracks, frames)) = self.advance() else {
+            return Ok(None);
+        };
+        let shape = match self.layout {
+            Layout::TrackMajor => [tracks.len(), frames.len(), 4],
+            Layout::FrameMajor => [frames.len(), tracks.len(), 4],
+        };
+        let array = array(py, &shape, None, &[])?;
+        let part = (tracks.clone(), frames.clone());
+        filled(&array, |numbers| {
+            guarded(|| {
+                let bytes = bytemuck::cast_slice_mut(&mut *numbers);
+                match &self.clip {
+                    Some(clip) => clip
+                        .evaluate_part_into(&self.frames, self.layout, part, Encoding::F32, bytes)
+                        .map_err(|error| of_engine(&error)),
+                    None => self.job().tracks(part.0, bytes),
+                }?;
+                if self.order == Order::Wxyz {
+                    for quaternion in numbers.as_chunks_mut().0 {
+                        *quaternion = self.order.of_xyzw(*quaternion);
+                    }
+                }
+                Ok(())
+            })
+        })?;
+        debug_assert_eq!(array.shape(), shape);
+        Ok(Some(Chunk {
+            tracks,
+            frames,
+            rotations: array.unbind(),
+        }))
+    }
+
+    fn __repr__(&self) -> String {
+        let (tracks, samples) = (self.motion.set.track_count(), self.samples);
+        format!("Chunks({tracks} tracks × {samples} frames)")
+    }
+}
+
+impl Chunks {
+    fn job(&self) -> Job<'_> {
+        Job {
+            engine: &self.engine,
+            set: &self.motion.set,
+            interpolation: self.interpolation,
+            frames: &self.frames,
+            samples: self.samples,
+            layout: self.layout,
+            encoding: Encoding::F32,
+        }
+    }
+}
+
+#[pymethods]
+impl Chunk {
+    /// Its tracks, a slice of all.
+    #[getter]
+    fn tracks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        slice(py, &self.tracks)
+    }
+
+    /// Its frames, a slice of all.
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        slice(py, &self.frames)
+    }
+
+    /// The rotations: float32, (tracks, frames, 4), or (frames, tracks, 4) if that is the layout.
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
+        self.rotations.bind(py).clone()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Chunk(tracks {:?}, frames {:?})", self.tracks, self.frames)
+    }
+}
+
+fn slice<'py>(py: Python<'py>, range: &Range<usize>) -> PyResult<Bound<'py, PyAny>> {
+    let class = py.get_type::<PySlice>();
+    class.call1((range.start, range.end))
+}

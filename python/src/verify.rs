@@ -1,0 +1,92 @@
+//! What a comparison of a device with the CPU and with the reference found.
+
+use pyo3::prelude::*;
+use tumble::verify::verify;
+use tumble::{Engine, Quantity};
+use tumble_formats::motion::Motion;
+
+use crate::errors::of_engine;
+use crate::evaluate::sets;
+use crate::options::Request;
+use crate::run::check_signals;
+
+/// What `Engine.verify` found.
+#[pyclass(frozen, get_all, module = "tumble")]
+pub(crate) struct Verification {
+    /// The method; "authored" where tracks have methods of their own.
+    method: &'static str,
+    /// The Vulkan device; None on the CPU, where nothing is compared between devices.
+    device: Option<String>,
+    /// Rotations compared.
+    rotations: u64,
+    /// Rotations whose bits differ between the device and the CPU.
+    differing: u64,
+    /// The largest angle between a result and the reference, rad.
+    max_error: f64,
+    /// The root mean square of that angle, rad.
+    rms_error: f64,
+    /// The largest distance of a norm from 1.
+    max_norm_error: f64,
+    /// The largest `max_error` that is allowed, rad.
+    error_bound: f64,
+    /// Whether all bits agree and all errors are within their bounds, those of velocities,
+    /// matrices and other outputs included.
+    passes: bool,
+}
+
+impl Verification {
+    /// Verifies the tracks of each method, and puts together what was found.
+    pub(crate) fn of(engine: &Engine, clip: &Motion, request: &Request) -> PyResult<Self> {
+        let mut all = Self {
+            method: request.method_name(),
+            device: None,
+            rotations: 0,
+            differing: 0,
+            max_error: 0.0,
+            rms_error: 0.0,
+            max_norm_error: 0.0,
+            error_bound: 0.0,
+            passes: true,
+        };
+        let with = request.with(Quantity::Rotation);
+        let sets = sets(clip, request);
+        let is_one = sets.len() == 1;
+        for (method, set, tracks) in sets {
+            check_signals()?;
+            let frames = request.samples()?.frames(&clip.set, tracks.as_deref())?;
+            let found = verify(engine, &set, with(method), &frames);
+            let found = found.map_err(|error| of_engine(&error))?;
+            if is_one {
+                all.method = found.method;
+            }
+            all.passes &= found.passes();
+            all.device = found.device;
+            let squares = |rms: f64, count: u64| rms * rms * count as f64;
+            let sum =
+                squares(all.rms_error, all.rotations) + squares(found.rms_error, found.rotations);
+            all.rotations += found.rotations;
+            all.rms_error = (sum / all.rotations.max(1) as f64).sqrt();
+            all.differing += found.differing;
+            all.max_error = all.max_error.max(found.max_error);
+            all.max_norm_error = all.max_norm_error.max(found.max_norm_error);
+            all.error_bound = all.error_bound.max(found.error_bound);
+        }
+        Ok(all)
+    }
+}
+
+#[pymethods]
+impl Verification {
+    fn __repr__(&self) -> String {
+        format!(
+            "Verification({} by {} on {}: {}, {} differ, error {:.1e} of {:.0e} rad)",
+            self.rotations,
+            self.method,
+            self.device.as_deref().unwrap_or("CPU"),
+            if self.passes { "passes" } else { "fails" },
+            self.differing,
+            self.max_error,
+            self.error_bound,
+        )
+    }
+}

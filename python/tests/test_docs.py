@@ -1,0 +1,123 @@
+"""What is written about the package is true: docstrings, README, guide, and types."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT, SHARED
+
+import tumble
+
+# Where the package lies; its stubs are beside it.
+PACKAGE = pathlib.Path(tumble.__file__).parent
+
+
+def documented():
+    """Everything that is public, by its full name."""
+    yield "tumble", tumble
+    for name in tumble.__all__:
+        value = getattr(tumble, name)
+        yield f"tumble.{name}", value
+        if inspect.isclass(value):
+            for part, member in vars(value).items():
+                if not part.startswith("_") and getattr(member, "__doc__", None):
+                    yield f"tumble.{name}.{part}", member
+
+
+ALL = dict(documented())
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_examples_in_docstrings(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    test = doctest.DocTestParser().get_doctest(inspect.getdoc(ALL[name]), {}, name, name, 0)
+    output = []
+    failed, _ = doctest.DocTestRunner().run(test, out=output.append)
+    assert not failed, "".join(output)
+
+
+def test_everything_public_is_documented_with_an_example():
+    for name in tumble.__all__:
+        assert inspect.getdoc(getattr(tumble, name)), name
+    exempt = {"tumble.Chunk", "tumble.Chunks", "tumble.Verification"}
+    for name, value in ALL.items():
+        is_callable = inspect.isclass(value) or callable(value)
+        if is_callable and name not in exempt:
+            small = {"translations", "scales"}
+            assert ">>>" in value.__doc__ or name.split(".")[-1] in small, name
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/python.md"])
+def test_examples_in_documents(document, monkeypatch, tmp_path):
+    """Their blocks of Python run one after another, in a folder with a file of each kind."""
+    text = (ROOT / document).read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert blocks
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(5)
+    poses = 0.1 * rng.normal(size=(40, 3 * 22))
+    np.savez("walk.npz", poses=poses, trans=np.zeros((40, 3)), mocap_framerate=np.float64(120))
+    if SHARED.is_dir():
+        shutil.copy(SHARED / "gltf" / "Fox.glb", "fox.glb")
+    else:
+        keys = rng.normal(size=(3, 5, 4))
+        keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
+        tumble.save("fox.glb", tumble.Clip(np.arange(5) / 24, keys, name="Run"))
+    if shutil.which("true"):
+        pytest.importorskip("matplotlib").use("Agg")
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, document, "exec"), names)
+
+
+def mypy(*arguments, cwd):
+    environment = {**os.environ, "MYPY_CACHE_DIR": str(cwd / ".mypy_cache")}
+    command = [sys.executable, "-m", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_types_are_those_of_the_stubs(tmp_path):
+    mypy("mypy.stubtest", "tumble", cwd=tmp_path)
+
+
+def test_the_package_and_its_users_pass_strict_checks(tmp_path):
+    user = tmp_path / "user.py"
+    user.write_text(USER, encoding="utf-8")
+    mypy("mypy", "--strict", "-p", "tumble", cwd=tmp_path)
+    mypy("mypy", "--strict", str(user), cwd=tmp_path)
+
+
+USER = '''
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tumble
+
+engine = tumble.Engine("cpu")
+clip = tumble.Clip([0.0, 1.0], np.zeros((2, 2, 4)), names=["a", "b"], order="wxyz")
+found: NDArray[np.float32] = engine.evaluate(clip, fps="30000/1001", method="slerp")
+found = engine.velocity(clip, at=np.linspace(0, 1, 9), axes="world", out=found)
+found = tumble.evaluate([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]], fps=Fraction(24), start=0.5)
+found = clip.evaluate(times=[[0.0, 0.5], [0.0, 1.0]])
+rate: Fraction | None = clip.rate
+for chunk in engine.stream(clip, fps=24, chunk=1000):
+    found = chunk.rotations
+for one in tumble.load("walk.glb", source_fps=30):
+    tumble.save("walk.npz", one, fps=60, sequence="ZXY")
+try:
+    tumble.load("walk.glb")["Run"].view(fps=30).save("run.html")
+except tumble.InputError as error:
+    print(error.code, error.line, error.pointer)
+'''

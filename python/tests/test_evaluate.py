@@ -1,0 +1,242 @@
+"""What is evaluated, its shapes, and the memory that it lies in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import unit
+from scipy.spatial.transform import Rotation
+
+import tumble
+
+TIMES = np.array([0.0, 0.5, 1.25, 2.0])
+
+
+@pytest.fixture
+def clip(rng):
+    return tumble.Clip(TIMES, unit(rng, 3, 4), names=["a", "b", "c"])
+
+
+@pytest.fixture
+def engine():
+    return tumble.Engine("cpu")
+
+
+def test_arrays_in_arrays_out(rng):
+    keys = unit(rng, 3, 4)
+    found = tumble.evaluate(TIMES, keys, fps=60, method="slerp")
+    assert (found.shape, found.dtype) == ((3, 121, 4), np.float32)
+    assert found.flags.c_contiguous and found.flags.writeable
+    one = tumble.evaluate(TIMES, keys[1], fps=60, method="slerp")
+    assert np.array_equal(one, found[1])
+    assert np.array_equal(found[:, [0, 30, 75, 120]], keys), "keys are met bit for bit"
+
+
+def test_times_may_be_of_any_type_and_shape(rng):
+    keys = unit(rng, 3, 4)
+    expected = tumble.evaluate(TIMES, keys, at=[0.25, 1.0])
+    for times in [list(TIMES), TIMES.astype(np.float32), np.stack([TIMES] * 3), [TIMES] * 3]:
+        assert np.array_equal(tumble.evaluate(times, keys, at=(0.25, 1.0)), expected)
+    whole = tumble.evaluate([0, 1, 2, 3], keys, at=[1])
+    assert np.array_equal(whole[:, 0], keys[:, 1])
+
+
+def test_a_single_time_has_no_axis(clip, rng):
+    at = clip.evaluate(at=0.7)
+    assert at.shape == (3, 4)
+    assert np.array_equal(at, clip.evaluate(at=[0.7])[:, 0])
+    assert np.array_equal(at, clip.evaluate(at=np.float64(0.7)))
+    assert np.array_equal(at, clip.evaluate(at=np.array(0.7)))
+    assert tumble.evaluate(TIMES, unit(rng, 4), at=0.7).shape == (4,)
+
+
+def test_a_time_list_for_each_track(clip, rng):
+    at = rng.uniform(-0.5, 2.5, (3, 50))
+    found = clip.evaluate(at=at, method="c2")
+    assert found.shape == (3, 50, 4)
+    for track in range(3):
+        assert np.array_equal(found[track], clip.evaluate(at=at[track], method="c2")[track])
+    lists = [at[0], at[1][:7], np.array([])]
+    ragged = clip.evaluate(times=lists, method="c2")
+    assert [part.shape for part in ragged] == [(50, 4), (7, 4), (0, 4)]
+    assert np.array_equal(ragged[1], found[1][:7])
+    assert np.shares_memory(ragged[0].base, ragged[1].base)
+
+
+def test_tracks_of_different_lengths(rng):
+    keys = [unit(rng, 4), unit(rng, 2), unit(rng, 1)]
+    times = [TIMES, TIMES[1:3], [0.1]]
+    clip = tumble.Clip(times, keys)
+    assert (len(clip), clip.key_count, clip.span) == (3, 7, (0.0, 2.0))
+    found = clip.evaluate(fps=10)
+    assert found.shape == (3, 21, 4)
+    assert np.array_equal(found[2], np.broadcast_to(keys[2], (21, 4)))
+    alone = tumble.evaluate(TIMES[1:3], keys[1], fps=10, start=0, end=2)
+    assert np.array_equal(found[1], alone)
+
+
+def test_orders_and_layouts(clip, rng):
+    keys = unit(rng, 3, 4)
+    xyzw = tumble.evaluate(TIMES, keys, fps=30)
+    wxyz = tumble.evaluate(TIMES, np.roll(keys, 1, axis=-1), fps=30, order="wxyz")
+    assert np.array_equal(np.roll(wxyz, -1, axis=-1), xyzw)
+    frames = tumble.evaluate(TIMES, keys, fps=30, layout="frame")
+    assert frames.flags.c_contiguous
+    assert np.array_equal(frames.swapaxes(0, 1), xyzw)
+    assert np.array_equal(clip.keys("b", order="wxyz"), np.roll(clip.keys(1), 1, axis=-1))
+
+
+def test_results_go_where_they_are_told(clip, engine):
+    expected = clip.evaluate(fps=60)
+    out = np.empty_like(expected)
+    assert engine.evaluate(clip, fps=60, out=out) is out
+    assert np.array_equal(out, expected)
+    # A part of a larger array, aligned as float32 and no better.
+    store = np.zeros(expected.size + 1, np.float32)
+    part = store[1:].reshape(expected.shape)
+    assert clip.evaluate(fps=60, out=part) is part and np.shares_memory(part, store)
+    assert np.array_equal(part, expected) and store[0] == 0
+    frames = np.empty((121, 3, 4), np.float32)
+    clip.evaluate(fps=60, out=frames, layout="frame")
+    assert np.array_equal(frames.swapaxes(0, 1), expected)
+    velocities = np.empty((3, 121, 3), np.float32)
+    assert engine.velocity(clip, fps=60, out=velocities) is velocities
+    assert np.array_equal(velocities, engine.velocity(clip, fps=60))
+
+
+def test_what_follows_from_rotations(clip, engine):
+    found = clip.evaluate(fps=60).astype(np.float64).reshape(-1, 4)
+    rotations = Rotation.from_quat(found)
+    matrices = engine.matrices(clip, fps=60)
+    assert matrices.shape == (3, 121, 3, 3)
+    assert np.abs(matrices.reshape(-1, 3, 3) - rotations.as_matrix()).max() < 1e-6
+    for sequence in ["XYZ", "zxy", "ZXZ"]:
+        angles = engine.euler(clip, fps=60, sequence=sequence).reshape(-1, 3)
+        again = Rotation.from_euler(sequence, angles, degrees=True)
+        assert (rotations.inv() * again).magnitude().max() < 2e-6
+        radians = engine.euler(clip, fps=60, sequence=sequence, degrees=False)
+        assert np.allclose(np.degrees(radians).reshape(-1, 3), angles, atol=1e-4)
+    step = 1e-4
+    at = np.array([0.2, 0.9, 1.7])
+    before, after = (clip.evaluate(at=at + s, method="c2").astype(np.float64) for s in (-step, step))
+    turn = Rotation.from_quat(before.reshape(-1, 4)).inv() * Rotation.from_quat(after.reshape(-1, 4))
+    body = engine.velocity(clip, at=at, method="c2").reshape(-1, 3)
+    assert np.abs(turn.as_rotvec() / (2 * step) - body).max() < 5e-3
+    here = Rotation.from_quat(clip.evaluate(at=at, method="c2").reshape(-1, 4))
+    world = engine.velocity(clip, at=at, method="c2", axes="world").reshape(-1, 3)
+    assert np.abs(here.apply(body) - world).max() < 1e-4
+    acceleration = engine.acceleration(clip, at=at, method="c2").reshape(-1, 3)
+    faster, slower = (
+        engine.velocity(clip, at=at + s, method="c2").reshape(-1, 3) for s in (step, -step)
+    )
+    assert np.abs((faster - slower) / (2 * step) - acceleration).max() < 0.2
+
+
+def test_poses_and_places_in_the_world(engine):
+    half = np.float32(np.sqrt(0.5))
+    keys = [[[0, 0, 0, 1], [0, 0, half, half]], [[0, 0, 0, 1], [0, 0, 0, 1]]]
+    clip = tumble.Clip(
+        [0.0, 1.0],
+        keys,
+        names=["hip", "knee"],
+        parents=[None, 0],
+        offsets=[[0, 0, 0], [2, 0, 0]],
+        translations=[[[0, 0, 1], [0, 0, 3]], None],
+    )
+    assert clip.parents == [None, 0] and clip.offsets.tolist() == [[0, 0, 0], [2, 0, 0]]
+    translations, rotations, scales = engine.poses(clip, fps=2, method="slerp")
+    assert (translations.shape, rotations.shape, scales.shape) == ((2, 3, 3), (2, 3, 4), (2, 3, 3))
+    assert translations[0].tolist() == [[0, 0, 1], [0, 0, 2], [0, 0, 3]]
+    assert np.array_equal(rotations, clip.evaluate(fps=2, method="slerp"))
+    assert (scales == 1).all()
+    positions, turned = engine.world(clip, fps=2, method="slerp")
+    assert np.allclose(positions[1, -1], [0, 2, 3], atol=1e-6)
+    assert np.allclose(turned[1, -1], [0, 0, half, half], atol=1e-6)
+    frames, _, _ = engine.poses(clip, fps=2, layout="frame", method="slerp")
+    assert np.array_equal(frames.swapaxes(0, 1), translations)
+
+
+def test_rotations_of_scipys_in_and_out(rng):
+    keys = Rotation.random(8, rng=rng)
+    expected = tumble.evaluate(np.arange(8), keys.as_quat(), fps=10)
+    assert np.array_equal(tumble.evaluate(np.arange(8), keys, fps=10), expected)
+    # They are x y z w, whatever the arrays beside them are.
+    assert np.array_equal(
+        np.roll(tumble.evaluate(np.arange(8), keys, fps=10, order="wxyz"), -1, axis=-1), expected
+    )
+    found = tumble.evaluate(np.arange(8), keys, fps=10, as_rotation=True)
+    assert isinstance(found, Rotation) and len(found) == 71
+    several = tumble.evaluate(np.arange(8), [keys, keys.inv()], fps=10, as_rotation=True)
+    assert [len(one) for one in several] == [71, 71]
+    assert (several[0].inv() * found).magnitude().max() == 0
+
+
+def test_data_beside_the_keys(rng):
+    keys = unit(rng, 1, 3)
+    still = tumble.Clip([0, 1, 2], keys, velocities=np.zeros((1, 3, 3)))
+    engine = tumble.Engine("cpu")
+    assert np.abs(engine.velocity(still, at=[0, 1, 2], method="hermite")).max() < 1e-4
+    tight = tumble.Clip([0, 1, 2], keys, tcb=[[[1, 0, 0]] * 3])
+    asked = tumble.Clip([0, 1, 2], keys).evaluate(fps=9, method="kochanek-bartels", tension=1)
+    assert np.array_equal(tight.evaluate(fps=9, method="kochanek-bartels"), asked)
+    flat = tumble.Clip([0, 1, 2], keys, tangents=np.zeros((1, 3, 2, 4)))
+    assert flat.evaluate(fps=9, method="gltf-cubic").shape == (1, 19, 4)
+
+
+def test_options_say_how(clip, engine):
+    plain = clip.evaluate(fps=30, start=-1, end=4)
+    for options in [
+        {"method": "c2"},
+        {"ends": "natural"},
+        {"ends": [[1, 0, 0], [0, 2, 0]]},
+        {"speed": "constant"},
+        {"before": "extrapolate"},
+        {"after": "mirror"},
+    ]:
+        other = clip.evaluate(fps=30, start=-1, end=4, **options)
+        assert other.shape == plain.shape and not np.array_equal(other, plain), options
+    loop = clip.evaluate(fps=30, start=0, end=4, after="loop")
+    assert np.array_equal(loop[:, 0], loop[:, 60])
+
+
+def test_streams_are_the_whole(clip, engine):
+    for layout in ["track", "frame"]:
+        whole = clip.evaluate(fps=1000, layout=layout)
+        for chunk in [100, 2500, 1 << 20]:
+            found = np.full_like(whole, np.nan)
+            for part in engine.stream(clip, fps=1000, chunk=chunk, layout=layout):
+                place = (part.tracks, part.frames)
+                assert part.rotations.size // 4 <= chunk
+                found[place if layout == "track" else place[::-1]] = part.rotations
+            assert np.array_equal(found, whole)
+    first = next(iter(engine.stream(clip, fps=1000, order="wxyz")))
+    assert np.array_equal(np.roll(first.rotations, -1, axis=-1), clip.evaluate(fps=1000))
+
+
+def test_verification(clip, engine):
+    found = engine.verify(clip, fps=25, method="c2")
+    assert found.passes and found.differing == 0 and found.rotations == 3 * 51
+    assert (found.method, found.device) == ("c2", None)
+    assert 0 < found.rms_error <= found.max_error <= found.error_bound == 1e-6
+
+
+def test_all_devices_have_the_same_bits(clip):
+    expected = tumble.Engine("cpu").evaluate(clip, fps=240)
+    for index, name in enumerate(tumble.devices()):
+        engine = tumble.Engine(index)
+        assert engine.device == name
+        assert np.array_equal(engine.evaluate(clip, fps=240), expected)
+        found = engine.verify(clip, fps=24)
+        assert found.passes and found.device == name
+
+
+def test_every_method_is_there(clip):
+    assert len(tumble.methods()) == 15
+    for method in tumble.methods():
+        assert np.isfinite(clip.evaluate(fps=30, method=method)).all()
+
+
+def test_representations_help(clip):
+    assert repr(clip) == "Clip(3 tracks, 12 keys, 0 to 2 s)"
+    assert repr(tumble.Engine()) == "Engine('auto': CPU)"
+    assert repr(tumble.Engine("cpu")) == "Engine('CPU')"

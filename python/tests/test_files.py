@@ -1,0 +1,227 @@
+"""Files in and out, and the program."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from conftest import ROOT, unit
+
+import tumble
+
+PENDULUM = ROOT / "data" / "pendulum.dat"
+
+
+def program(*arguments, code=0):
+    """Runs `python -m tumble`; gives what it prints."""
+    command = [sys.executable, "-m", "tumble", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def digest(data):
+    return hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.parametrize("method", ["slerp", "bessel-overhauser", "c2"])
+def test_the_same_bits_as_the_program(tmp_path, method):
+    out = tmp_path / "program.npy"
+    program("eval", PENDULUM, "-m", method, "--fps", "30000/1001", "-o", out)
+    clip = tumble.load(PENDULUM).clip
+    found = clip.evaluate(fps="30000/1001", method=method)
+    assert digest(found.tobytes()) == digest(np.load(out).tobytes())
+    own = tmp_path / "own.npy"
+    tumble.save(own, clip, fps="30000/1001", method=method)
+    assert own.read_bytes() == out.read_bytes()
+
+
+@pytest.mark.parametrize("ending", ["npy", "csv", "npz", "bvh", "parquet", "arrow", "glb"])
+def test_every_format_as_the_program_writes_it(tmp_path, ending):
+    theirs, ours = tmp_path / f"theirs.{ending}", tmp_path / f"ours.{ending}"
+    program("eval", PENDULUM, "--fps", "30", "-o", theirs)
+    tumble.save(ours, tumble.load(PENDULUM), fps=30)
+    if ending in ("npy", "csv", "bvh"):
+        assert ours.read_bytes() == theirs.read_bytes()
+    if ending != "npy":
+        a, b = tumble.load(ours).clip, tumble.load(theirs).clip
+        assert len(a) == len(b) == 4 and a.key_count == b.key_count
+        assert all(np.array_equal(a.keys(i), b.keys(i)) for i in range(4))
+
+
+def test_clips_come_back_from_every_format(tmp_path, rng):
+    clip = tumble.Clip(
+        np.arange(5) / 30,
+        unit(rng, 3, 5),
+        name="walk",
+        names=["hip", "knee", "foot"],
+        parents=[None, 0, 1],
+        offsets=[[0, 1, 0], [0, -0.5, 0], [0, -0.5, 0]],
+    )
+    for ending in ["glb", "gltf", "bvh", "npz", "parquet", "arrow", "csv"]:
+        path = tmp_path / f"walk.{ending}"
+        tumble.write(path, clip)
+        again = tumble.read(path).clip
+        assert [name for name in again.names if name in clip.names] == clip.names, ending
+        for name in clip.names:
+            turn = (clip.keys(name) * again.keys(name)).sum(axis=-1)
+            assert np.abs(np.abs(turn) - 1).max() < 1e-6, (ending, name)
+            assert np.allclose(again.times(name), clip.times(name)), ending
+    one = tumble.Clip([0.0, 0.1], unit(rng, 2), translations=[[[0, 0, 0], [1, 2, 3]]])
+    tumble.save(tmp_path / "camera.tum", one)
+    times, places = tumble.load(tmp_path / "camera.tum").clip.translations(0)
+    assert times.tolist() == [0.0, 0.1] and places[1].tolist() == [1, 2, 3]
+
+
+def test_files_are_mappings(shared):
+    fox = tumble.load(shared / "gltf" / "Fox.glb")
+    assert fox.names == ["Survey", "Walk", "Run"] and len(fox) == 3
+    run = fox["Run"]
+    assert fox[2].name == fox[-1].name == run.name == "Run" and "Run" in fox
+    assert [clip.name for clip in fox] == fox.names
+    assert run.rate == 120 and len(run) == len(run.names)
+    with pytest.raises(tumble.InputError, match="Survey, Walk, Run"):
+        fox.clip
+    with pytest.raises(KeyError, match="Survey, Walk, Run"):
+        fox["Jump"]
+    with pytest.raises(IndexError):
+        fox[3]
+    assert run.evaluate(fps=60).shape == (len(run), run.frames(60), 4)
+    positions, _ = tumble.Engine().world(run, fps=60)
+    assert np.isfinite(positions).all()
+
+
+def test_baked_files_are_those_of_the_program(shared, tmp_path):
+    source = shared / "gltf" / "Fox.glb"
+    program("eval", source, "--fps", "60", "-o", tmp_path / "program.glb")
+    tumble.save(tmp_path / "own.glb", tumble.load(source), fps=60)
+    assert (tmp_path / "own.glb").read_bytes() == (tmp_path / "program.glb").read_bytes()
+
+
+def test_channels_of_different_samplers(shared):
+    mixed = tumble.load(shared / "gltf" / "interpolation_test.gltf")
+    for clip in mixed:
+        found = clip.evaluate(fps=30)
+        assert found.shape == (len(clip), clip.frames(30), 4)
+        _, rotations, _ = tumble.Engine().poses(clip, fps=30)
+        assert np.abs(np.abs((found * rotations).sum(axis=-1)) - 1).max() < 1e-6
+        assert tumble.Engine("cpu").verify(clip, fps=30).passes
+
+
+def test_all_sample_files_are_read_or_refused_with_a_reason(shared):
+    read, refused = 0, 0
+    for path in sorted(shared.rglob("*")):
+        if path.suffix not in {".glb", ".gltf", ".bvh", ".npz", ".parquet", ".arrow", ".txt"}:
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", tumble.InputWarning)
+            try:
+                clips = list(tumble.load(path))
+            except tumble.InputError as error:
+                assert error.code and error.code in str(error) and error.file == str(path)
+                refused += 1
+                continue
+        for clip in clips:
+            assert np.isfinite(clip.evaluate(at=clip.span)).all()
+        read += 1
+    assert read > 60 and refused > 20
+
+
+def test_errors_have_codes_and_places(tmp_path):
+    path = tmp_path / "bad.dat"
+    path.write_text("# 1 3.0\n0 1 0 0 0\n1 1 0 nan 0\n")
+    with pytest.raises(tumble.InputError) as caught:
+        tumble.load(path)
+    error = caught.value
+    assert (error.code, error.file, error.line, error.column) == ("E022", str(path), 3, 7)
+    assert str(error).startswith(f"{path}:3:7: error[E022]")
+    said = program("info", path, code=4).stderr
+    assert str(error) in said
+    glb = tmp_path / "bad.gltf"
+    glb.write_text(json.dumps({"asset": {"version": "2.0"}, "animations": [{"channels": 3}]}))
+    with pytest.raises(tumble.InputError) as caught:
+        tumble.load(glb)
+    assert caught.value.pointer and caught.value.pointer.startswith("/animations/0")
+    assert caught.value.line is None
+
+
+def test_warnings_are_warnings(tmp_path):
+    path = tmp_path / "odd.dat"
+    path.write_bytes(b"\xef\xbb\xbf# 1 3.0\n0 1 0 0 0\n1 0.9 0 0 0\n")
+    with pytest.warns(tumble.InputWarning) as caught:
+        tumble.load(path)
+    codes = {warning.message.code for warning in caught}
+    assert "W001" in codes
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", tumble.InputWarning)
+        with pytest.raises(tumble.InputWarning):
+            tumble.load(path)
+
+
+def test_outputs_that_cannot_be_written(tmp_path, rng):
+    clip = tumble.Clip([0.0, 1.0], unit(rng, 2))
+    with pytest.raises(tumble.OutputError) as caught:
+        tumble.save(tmp_path / "none" / "a.npz", clip)
+    assert isinstance(caught.value, OSError) and "does not exist" in str(caught.value)
+    path = tmp_path / "a.npz"
+    tumble.save(path, clip)
+    tumble.save(path, clip)
+    with pytest.raises(tumble.OutputError, match="exists"):
+        tumble.save(path, clip, overwrite=False)
+    with pytest.raises(tumble.OutputError, match="is the input"):
+        tumble.save(path, tumble.load(path))
+    for wrong in ["a.txt", "a"]:
+        with pytest.raises(tumble.InputError, match="format"):
+            tumble.save(tmp_path / wrong, clip)
+    with pytest.raises(tumble.InputError, match="give `fps`"):
+        tumble.save(tmp_path / "a.npy", clip)
+    with pytest.raises(TypeError):
+        tumble.save(path, 3)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.npz"]
+
+
+def test_what_files_do_not_say(tmp_path, rng):
+    keys = unit(rng, 6)
+    path = tmp_path / "keys.npz"
+    np.savez(path, q=np.roll(keys, 1, axis=-1), t=np.arange(6) / 50)
+    with pytest.raises(tumble.InputError) as caught:
+        tumble.load(path)
+    assert caught.value.code == "E310"
+    clip = tumble.load(path, map="rotations=q:wxyz,time=t").clip
+    assert np.array_equal(clip.keys(0), keys)
+    assert clip.rate == 50
+    for wrong in [dict(format="doc"), dict(up="x"), dict(scale=0), dict(time_unit="h")]:
+        with pytest.raises(tumble.InputError):
+            tumble.load(path, **wrong)
+
+
+def test_units_and_axes(shared):
+    path = shared / "bvh" / "example.bvh"
+    plain, scaled = tumble.load(path).clip, tumble.load(path, scale=0.01).clip
+    assert np.allclose(scaled.offsets, plain.offsets * 0.01)
+    turned = tumble.load(path, up="z").clip
+    before, _ = tumble.Engine().world(plain, at=0.0)
+    after, _ = tumble.Engine().world(turned, at=0.0)
+    assert np.allclose(after, before[..., [0, 2, 1]] * [1, -1, 1], atol=1e-4)
+
+
+def test_python_minus_m_is_the_program():
+    assert program("--version").stdout == f"tumble {tumble.__version__}\n"
+    assert "slerp" in program("methods").stdout
+    assert "Usage: tumble" in program("eval", code=2).stderr
+    assert "nowhere.dat" in program("info", "nowhere.dat", code=4).stderr
+    # The process that loads the drivers is Python too.
+    named = program("devices").stdout
+    assert all(name in named for name in tumble.devices())
+
+
+def test_the_script_is_the_program():
+    script = pathlib.Path(sys.executable).with_name("tumble")
+    done = subprocess.run([script, "--version"], capture_output=True, text=True, timeout=60)
+    assert done.stdout == f"tumble {tumble.__version__}\n"
