@@ -1,0 +1,4 @@
+//! Bodies that follow paths: the numbers of worked examples, the reference, and the same bits on
+//! every device.
+
+mod examples;
