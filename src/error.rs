@@ -4,6 +4,7 @@ use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::OfDevice;
 use crate::output::encoding::Encoding;
+use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
 use crate::time::frames::FramesError;
@@ -18,6 +19,9 @@ pub enum Error {
     /// A track cannot be interpolated as asked.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
+    /// A path cannot be followed as asked.
+    #[error(transparent)]
+    Follow(#[from] FollowError),
     /// The Vulkan device could not be used, or stopped working.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),

@@ -59,6 +59,7 @@ mod math;
 pub mod method;
 mod output;
 mod own_device;
+mod path;
 mod pose;
 mod prepare;
 pub mod reference;
@@ -88,6 +89,10 @@ pub use crate::output::component_type::ComponentType;
 pub use crate::output::encoding::{Encoding, EncodingOptions, MatrixOrder};
 pub use crate::output::euler::{EulerSequence, UnknownSequence};
 pub use crate::output::rotations::{Layout, Rotations};
+pub use crate::path::options::{
+    BodyAxis, Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
+};
+pub use crate::pose::follow::Followed;
 pub use crate::pose::poses::WorldPoses;
 pub use crate::pose::skeleton::{Skeleton, SkeletonError};
 pub use crate::pose::transforms::{Transforms, Vectors};

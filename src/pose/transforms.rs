@@ -30,6 +30,10 @@ pub struct Transforms {
 pub struct Vectors(Rotations);
 
 impl Vectors {
+    pub(crate) fn new(values: Rotations) -> Self {
+        Self(values)
+    }
+
     /// The vector of one track at one sample; `None` out of range.
     #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Vec3> {

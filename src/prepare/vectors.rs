@@ -31,6 +31,7 @@ pub(crate) fn add(
         times: vec![0.0],
         keys: vec![rest],
         tangents: Vec::new(),
+        ups: Vec::new(),
     };
     let track = track.unwrap_or(&still);
     let last = track.keys.len() - 1;

@@ -71,7 +71,7 @@ pub struct Followed<'a> {
     lengths: Vec<f64>,
     /// Rolls to add, by length: (length, angle, slope).
     rolls: Vec<[f64; 3]>,
-    /// What was left over after one round, or at the last given up, radians.
+    /// By how much the frame was off after one round, or at the last given up, radians.
     pub left_over: f64,
 }
 
@@ -122,7 +122,7 @@ impl Follower {
             let arrived = DQuat::from_rotation_arc(last, start) * up;
             walk.give(&mut keys, intervals * STEPS, arrived, walk.ups[0], start);
         }
-        walk.left_over = keys[keys.len() - 1].1;
+        walk.left_over = -keys[keys.len() - 1].1;
         walk.rolls = slopes(&keys);
         walk
     }
