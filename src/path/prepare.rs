@@ -114,6 +114,7 @@ fn route(path: &VectorTrack, follow: &Follow) -> Route {
         || matches!(follow.direction, Direction::Ahead(_))
         || path.ups.iter().any(Option::is_some);
     Route::new(
+        path.keys[0].as_dvec3(),
         polynomials.collect(),
         Schedule::new(follow.speed, &path.times),
         follow.is_closed(),

@@ -10,6 +10,8 @@ use crate::path::schedule::Schedule;
 /// The curves of a path, and when a body is where on them.
 #[derive(Debug, Clone)]
 pub(crate) struct Route {
+    /// The first point.
+    start: DVec3,
     /// The positions of each interval.
     pub(crate) curves: Vec<Polynomial>,
     pub(crate) slopes: Vec<Polynomial>,
@@ -32,6 +34,7 @@ const STILL: f64 = 1e-14;
 
 impl Route {
     pub(crate) fn new(
+        start: DVec3,
         curves: Vec<Polynomial>,
         schedule: Schedule,
         is_closed: bool,
@@ -74,6 +77,7 @@ impl Route {
             false => Lengths::default(),
         };
         Self {
+            start,
             curves,
             slopes,
             stops,
@@ -87,7 +91,7 @@ impl Route {
     /// The position at a time.
     pub(crate) fn position(&self, time: f64) -> [DVec3; 2] {
         if self.curves.is_empty() {
-            return [DVec3::ZERO; 2];
+            return [self.start, DVec3::ZERO];
         }
         let (interval, t) = self.schedule.place(&self.lengths, time);
         let slope = self.slopes[interval].at(t);

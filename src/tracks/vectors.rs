@@ -92,11 +92,7 @@ impl TrackSet {
             up.is_some_and(|up| !up.is_finite() || up.as_dvec3().length() == 0.0)
         };
         if let Some(key) = ups.iter().position(has_no_length) {
-            return Err(TrackError::DataNotFinite {
-                track,
-                key,
-                what: "upward direction has no length, or",
-            });
+            return Err(TrackError::NoUp { track, key });
         }
         if let Some(key) = points.iter().position(|point| !point.is_finite()) {
             return Err(TrackError::DataNotFinite {

@@ -1,4 +1,5 @@
 //! Bodies that follow paths: the numbers of worked examples, the reference, and the same bits on
 //! every device.
 
+mod engine;
 mod examples;

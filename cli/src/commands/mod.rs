@@ -7,6 +7,7 @@ pub(crate) mod convert;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod explain;
+pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
 pub(crate) mod methods;
@@ -25,6 +26,7 @@ use crate::messages::exit::Failure;
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
     Convert(convert::Arguments),
+    Follow(Box<follow::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
@@ -46,6 +48,7 @@ impl Command {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
+            Self::Follow(arguments) => follow::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),
