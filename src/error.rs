@@ -7,6 +7,7 @@ use crate::output::encoding::Encoding;
 use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
+use crate::smooth::kernel::SmoothingError;
 use crate::time::frames::FramesError;
 
 /// Why an evaluation failed.
@@ -22,6 +23,9 @@ pub enum Error {
     /// A path cannot be followed as asked.
     #[error(transparent)]
     Follow(#[from] FollowError),
+    /// Samples cannot be smoothed as asked.
+    #[error(transparent)]
+    Smoothing(#[from] SmoothingError),
     /// The Vulkan device could not be used, or stopped working.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),

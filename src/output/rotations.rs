@@ -4,6 +4,8 @@ use std::fmt;
 
 use glam::Quat;
 
+use crate::output::buffer::OutputBuffer;
+
 /// The order of a result in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Layout {
@@ -59,6 +61,19 @@ impl Rotations {
             samples,
             layout,
         }
+    }
+
+    /// Rotations from elsewhere, of so many tracks, in this order; `None` if their number is not a
+    /// multiple of the tracks'.
+    #[must_use]
+    pub fn of(rotations: &[Quat], tracks: usize, layout: Layout) -> Option<Self> {
+        let samples = rotations.len().checked_div(tracks).unwrap_or(0);
+        if samples * tracks != rotations.len() {
+            return None;
+        }
+        let mut storage = OutputBuffer::new(rotations.len());
+        storage.copy_from_slice(rotations);
+        Some(Self::new(Box::new(storage), tracks, samples, layout))
     }
 
     /// Number of tracks.

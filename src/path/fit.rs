@@ -19,8 +19,15 @@ const PAIRS: usize = 5;
 /// and its middle stands for it.
 const MOST_CUTS: u32 = 44;
 
+/// The most pieces of a span. A corner takes two for each cut; more are asked for only where rounding
+/// leaves a curve no direction at all, and then the middle of each stands for it.
+const MOST_PIECES: u32 = 4096;
+
 /// The largest error at the ends of a span, where a polynomial through inner nodes errs most.
 const LARGEST: f64 = 2.5e-7;
+
+/// The part of the latest time that the rounding of times, and of lengths made of them, may hide.
+const UNKNOWN: f64 = 64.0 * f64::EPSILON;
 
 /// What is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +54,13 @@ pub(crate) fn fit(
     kind: Kind,
     sample: &dyn Fn(usize, f64) -> [f64; 4],
 ) {
-    let mut waiting: Vec<(Span, u32)> = spans.iter().rev().map(|&span| (span, 0)).collect();
+    let whole = spans.iter().enumerate().rev();
+    let mut waiting: Vec<(Span, u32, usize)> = whole.map(|(i, &span)| (span, 0, i)).collect();
+    let mut pieces = vec![1u32; spans.len()];
+    let ends = [spans.first(), spans.last()].into_iter().flatten();
+    let latest = ends.fold(0.0f64, |latest, span| {
+        latest.max(span.from.abs()).max(span.to.abs())
+    });
     let mut done: Vec<(f64, Source)> = Vec::with_capacity(spans.len());
     while !waiting.is_empty() {
         let block = waiting.split_off(waiting.len().saturating_sub(MOST));
@@ -61,15 +74,30 @@ pub(crate) fn fit(
             places,
             ..
         } = fitted;
-        for (lane, &(span, cuts)) in block.iter().enumerate() {
+        for (lane, &(span, cuts, own)) in block.iter().enumerate() {
             let segment = &mut segments[places[lane]];
             for own in &mut segment.coefficients {
                 *own = own.map(|c| canonical(c * units[lane]));
             }
             let middle = span.from + 0.5 * (span.to - span.from);
-            let is_finest = cuts == MOST_CUTS || middle <= span.from || middle >= span.to;
-            let is_smooth = samples.is_smooth[lane] && tails[lane] <= TOLERANCE;
-            if is_smooth && ends_fit(kind, segment, span, f64::from(units[lane]), sample) {
+            let is_finest = cuts == MOST_CUTS
+                || pieces[own] == MOST_PIECES
+                || middle <= span.from
+                || middle >= span.to;
+            // A time is known within its own rounding, which is more of a shorter span.
+            let known = UNKNOWN * latest / (span.to - span.from);
+            let is_smooth =
+                samples.is_smooth[lane] && f64::from(tails[lane]) <= f64::from(TOLERANCE) + known;
+            if is_smooth
+                && ends_fit(
+                    kind,
+                    segment,
+                    span,
+                    f64::from(units[lane]),
+                    LARGEST + known,
+                    sample,
+                )
+            {
                 done.push((span.from, Source::Segment(places[lane] as u32)));
             } else if is_finest {
                 let value = round_quat(sample(span.stretch, middle));
@@ -81,14 +109,16 @@ pub(crate) fn fit(
                 ));
             } else {
                 *segment = PolynomialSegment::zeroed();
+                pieces[own] += 1;
                 waiting.push((
                     Span {
                         from: middle,
                         ..span
                     },
                     cuts + 1,
+                    own,
                 ));
-                waiting.push((Span { to: middle, ..span }, cuts + 1));
+                waiting.push((Span { to: middle, ..span }, cuts + 1, own));
             }
         }
     }
@@ -116,7 +146,7 @@ struct Lane {
 impl<'a> Fitted<'a> {
     fn new(
         kind: Kind,
-        block: &[(Span, u32)],
+        block: &[(Span, u32, usize)],
         sample: &dyn Fn(usize, f64) -> [f64; 4],
         segments: &'a mut Vec<PolynomialSegment>,
     ) -> Self {
@@ -133,7 +163,7 @@ impl<'a> Fitted<'a> {
             tails: [0.0; MOST],
             segments,
         };
-        for (lane, (span, _)) in block.iter().enumerate() {
+        for (lane, (span, ..)) in block.iter().enumerate() {
             own.sample(kind, lane, *span, sample);
         }
         own
@@ -215,6 +245,7 @@ fn ends_fit(
     segment: &PolynomialSegment,
     span: Span,
     unit: f64,
+    largest: f64,
     sample: &dyn Fn(usize, f64) -> [f64; 4],
 ) -> bool {
     [(-0.5, span.from), (0.5, span.to)]
@@ -237,6 +268,6 @@ fn ends_fit(
             } else {
                 off(1.0)
             };
-            least <= LARGEST * unit && found.iter().all(|c| c.is_finite())
+            least <= largest * unit && found.iter().all(|c| c.is_finite())
         })
 }

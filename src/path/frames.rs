@@ -297,15 +297,19 @@ impl Frames {
     /// `P' × P''` on a stretch, with the sign that it has at the start; `None` where it is straight.
     fn normal(&self, own: &Stretch) -> Option<Polynomial> {
         let curve = &self.route.curves[own.interval];
-        let (start, end) = (curve.at(own.from), curve.at(own.to));
-        let chord = (end - start).normalize_or_zero();
-        let far = start.abs().max_element().max(end.abs().max_element());
-        let off = |i: u32| {
-            let t = own.from + (own.to - own.from) * f64::from(i) / 8.0;
-            let offset = curve.at(t) - start;
-            (offset - chord * chord.dot(offset)).length()
-        };
-        let bow = (1..8).map(off).fold(0.0, f64::max);
+        let start = curve.at(own.from);
+        let offsets: [DVec3; 8] = std::array::from_fn(|i| {
+            curve.at(own.from + (own.to - own.from) * (i + 1) as f64 / 8.0) - start
+        });
+        // The line to the farthest point: the ends of a curve that comes back may be one point.
+        let farthest = |a: &&DVec3, b: &&DVec3| a.length().total_cmp(&b.length());
+        let line = offsets
+            .iter()
+            .max_by(farthest)
+            .map_or(DVec3::ZERO, |far| far.normalize_or_zero());
+        let off = |offset: &DVec3| (offset - line * line.dot(*offset)).length();
+        let bow = offsets.iter().map(off).fold(0.0, f64::max);
+        let far = self.route.far;
         if matches!(own.heading, Heading::Still(_)) || bow < STRAIGHT * far {
             return None;
         }

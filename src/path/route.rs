@@ -23,6 +23,8 @@ pub(crate) struct Route {
     pub(crate) is_closed: bool,
     /// The size of the path: the diagonal of its box.
     pub(crate) size: f64,
+    /// The largest magnitude of a coordinate.
+    pub(crate) far: f64,
 }
 
 /// A slope below this part of the largest coefficient vanishes.
@@ -85,6 +87,7 @@ impl Route {
             schedule,
             is_closed,
             size,
+            far,
         }
     }
 

@@ -5,4 +5,5 @@ pub(crate) mod follow;
 pub(crate) mod on_cpu;
 pub(crate) mod poses;
 pub(crate) mod skeleton;
+pub(crate) mod smooth;
 pub(crate) mod transforms;

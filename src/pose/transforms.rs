@@ -1,6 +1,6 @@
 //! Rotations with the translations and the scales beside them.
 
-use glam::{Vec3, Vec4};
+use glam::{Quat, Vec3, Vec4};
 
 use crate::clip::Clip;
 use crate::engine::Engine;
@@ -32,6 +32,22 @@ pub struct Vectors(Rotations);
 impl Vectors {
     pub(crate) fn new(values: Rotations) -> Self {
         Self(values)
+    }
+
+    /// Vectors from elsewhere, of so many tracks, in this order; `None` if their number is not a
+    /// multiple of the tracks'.
+    #[must_use]
+    pub fn of(vectors: &[Vec3], tracks: usize, layout: Layout) -> Option<Self> {
+        let rows: Vec<Quat> = vectors
+            .iter()
+            .map(|v| Quat::from_vec4(v.extend(0.0)))
+            .collect();
+        Rotations::of(&rows, tracks, layout).map(Self)
+    }
+
+    /// As rows of four numbers.
+    pub(crate) fn rows(&self) -> &Rotations {
+        &self.0
     }
 
     /// The vector of one track at one sample; `None` out of range.

@@ -1,13 +1,15 @@
 //! Bodies that follow paths: the rotation-minimising frame by its differential equation, the fixed
 //! frame and Frenet's by their definitions.
 
+use std::fmt;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::reference::vector::VectorCurve;
 
 /// Steps of an interval: the error of Runge and Kutta's method of fourth order is below 1e-11 where
 /// the direction turns by a few radians.
-const STEPS: usize = 1024;
+const STEPS: usize = 512;
 
 /// Which way a body on a path faces.
 #[derive(Debug, Clone)]
@@ -63,9 +65,10 @@ pub struct Follower {
 }
 
 /// A follower with all that takes a walk along its path.
-#[derive(Debug)]
 pub struct Followed<'a> {
     own: &'a Follower,
+    /// Position, velocity and second derivative on each interval.
+    curves: Vec<Box<dyn Fn(f64) -> [DVec3; 3] + 'a>>,
     /// The y axis of the frame that does not turn, and the length, at every step of every interval.
     ups: Vec<DVec3>,
     lengths: Vec<f64>,
@@ -82,6 +85,7 @@ impl Follower {
         let intervals = self.curve.keys.len() - 1;
         let mut walk = Followed {
             own: self,
+            curves: (0..intervals).map(|i| self.curve.interval(i)).collect(),
             ups: Vec::new(),
             lengths: vec![0.0],
             rolls: Vec::new(),
@@ -90,7 +94,7 @@ impl Follower {
         for step in 0..intervals * STEPS {
             let (i, t) = (step / STEPS, (step % STEPS) as f64 / STEPS as f64);
             let length =
-                walk.lengths[step] + gauss(|t| self.speed(i, t), t, t + 1.0 / STEPS as f64);
+                walk.lengths[step] + gauss(|t| walk.speed(i, t), t, t + 1.0 / STEPS as f64);
             walk.lengths.push(length);
         }
         let mut up = across(
@@ -126,13 +130,22 @@ impl Follower {
         walk.rolls = slopes(&keys);
         walk
     }
+}
 
-    fn speed(&self, i: usize, t: f64) -> f64 {
-        self.curve.interval(i)(t)[1].length()
+impl fmt::Debug for Followed<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Followed")
+            .field("own", &self.own)
+            .field("left_over", &self.left_over)
+            .finish_non_exhaustive()
     }
 }
 
 impl Followed<'_> {
+    fn speed(&self, i: usize, t: f64) -> f64 {
+        self.curves[i](t)[1].length()
+    }
+
     /// The length of the path.
     #[must_use]
     pub fn length(&self) -> f64 {
@@ -156,7 +169,7 @@ impl Followed<'_> {
         };
         let up = across(up, forward);
         let axes = DMat3::from_cols(up.cross(forward), up, forward);
-        (self.own.curve.interval(i)(t)[0], DQuat::from_mat3(&axes))
+        (self.curves[i](t)[0], DQuat::from_mat3(&axes))
     }
 
     /// The interval and its parameter at a time.
@@ -194,13 +207,12 @@ impl Followed<'_> {
     fn length_at(&self, i: usize, t: f64) -> f64 {
         let step = ((t * STEPS as f64) as usize).min(STEPS - 1);
         let from = step as f64 / STEPS as f64;
-        self.lengths[i * STEPS + step] + gauss(|t| self.own.speed(i, t), from, t)
+        self.lengths[i * STEPS + step] + gauss(|t| self.speed(i, t), from, t)
     }
 
     /// The direction, and its derivative by the interval's parameter.
     fn way(&self, i: usize, t: f64) -> (DVec3, DVec3) {
-        let curve = &self.own.curve;
-        let [place, velocity, bend] = curve.interval(i)(t);
+        let [place, velocity, bend] = self.curves[i](t);
         let (to, change) = match self.own.heading {
             Heading::Tangent => (velocity, bend),
             Heading::At(point) => (point - place, -velocity),
@@ -219,7 +231,7 @@ impl Followed<'_> {
 
     /// The point and the tangent at a length; beyond an open path's end straight on.
     fn at_length(&self, length: f64) -> (DVec3, DVec3) {
-        let (curve, whole) = (&self.own.curve, self.length());
+        let whole = self.length();
         let length = if self.own.spread {
             length % whole
         } else {
@@ -238,7 +250,7 @@ impl Followed<'_> {
                 high = middle;
             }
         }
-        let [place, velocity, _] = curve.interval(i)((low + high) / 2.0);
+        let [place, velocity, _] = self.curves[i]((low + high) / 2.0);
         let tangent = velocity.normalize();
         (place + tangent * (length - whole).max(0.0), tangent)
     }
@@ -291,7 +303,7 @@ impl Followed<'_> {
     /// `w × u` with `u = P' × P'' / |…|`, with the sign that continues that of the start.
     fn frenet(&self, i: usize, t: f64) -> DVec3 {
         let raw = |i: usize, t: f64| {
-            let [_, velocity, bend] = self.own.curve.interval(i)(t);
+            let [_, velocity, bend] = self.curves[i](t);
             velocity
                 .normalize()
                 .cross(velocity.cross(bend))

@@ -329,7 +329,7 @@ fn followers_are_the_reference_s() {
 }
 
 /// Paths that ask for trouble: stops, reversals, corners, straight lines, vertical ones, one point.
-fn trouble() -> TrackSet {
+pub(super) fn trouble() -> TrackSet {
     let mut random = Random(3);
     let mut set = TrackSet::new();
     for track in 0..60 {
@@ -373,7 +373,7 @@ fn bits(found: &Followed) -> Vec<u32> {
     places.chain(turns).map(f32::to_bits).collect()
 }
 
-fn manners() -> Vec<Follow> {
+pub(super) fn manners() -> Vec<Follow> {
     let mut all = Vec::new();
     let directions = [
         Direction::Tangent,
@@ -410,7 +410,7 @@ fn manners() -> Vec<Follow> {
 }
 
 /// The set without what this manner refuses.
-fn taken(set: &TrackSet, follow: &Follow) -> TrackSet {
+pub(super) fn taken(set: &TrackSet, follow: &Follow) -> TrackSet {
     let mut own = TrackSet::new();
     for track in 0..set.track_count() {
         let keys = set

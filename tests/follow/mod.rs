@@ -3,3 +3,4 @@
 
 mod engine;
 mod examples;
+mod smooth;

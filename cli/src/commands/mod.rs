@@ -15,6 +15,7 @@ pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
 pub(crate) mod render;
+pub(crate) mod smooth;
 pub(crate) mod verify;
 pub(crate) mod view;
 
@@ -35,6 +36,7 @@ pub(crate) enum Command {
     Plot(Box<plot::Arguments>),
     View(Box<view::Arguments>),
     Render(Box<render::Arguments>),
+    Smooth(Box<smooth::Arguments>),
     Bench(bench::Arguments),
     Check(check::Arguments),
     Explain(explain::Arguments),
@@ -57,6 +59,7 @@ impl Command {
             Self::Plot(arguments) => plot::run(&arguments),
             Self::View(arguments) => view::run(&arguments),
             Self::Render(arguments) => render::run(&arguments),
+            Self::Smooth(arguments) => smooth::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
