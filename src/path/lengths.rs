@@ -114,7 +114,10 @@ impl Lengths {
             if step.abs() <= 1e-15 {
                 return next;
             }
-            excess += if step > 0.0 {
+            excess += if step.abs() < 1e-3 * (to - from) {
+                // One quadrature is exact enough for a short step.
+                gauss(slope, t, next)
+            } else if step > 0.0 {
                 between(slope, t, next)
             } else {
                 -between(slope, next, t)

@@ -55,7 +55,7 @@ pub enum Direction {
     Ahead(f64),
     /// To a point.
     Point(DVec3),
-    /// To the body on another track of the set.
+    /// To the body on a track of the set, which itself faces along its path.
     Track(usize),
 }
 
@@ -212,8 +212,8 @@ pub enum FollowError {
         /// What was given.
         point: DVec3,
     },
-    /// The track to look at is the body's own, or there is none.
-    #[error("track {track} cannot look at track {target}; name another track of the set")]
+    /// There is no track to look at.
+    #[error("track {track} cannot look at track {target}, which the set has not")]
     Target {
         /// The track's place in the set.
         track: usize,

