@@ -125,7 +125,14 @@ const FROM_KEYS: [(&str, &[&str], usize); 3] = [
 ];
 
 /// Kernels over evaluated poses.
-const POSES: [&str; 4] = ["poses/add", "poses/blend", "poses/mix", "poses/world"];
+const POSES: [&str; 6] = [
+    "poses/add",
+    "poses/blend",
+    "poses/mix",
+    "poses/smooth",
+    "poses/steps",
+    "poses/world",
+];
 
 /// The files of the self-test.
 const SELF_TEST: [&str; 3] = ["math/sine_cosine", "math/arc_tangent", "self_test"];

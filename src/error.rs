@@ -6,8 +6,10 @@ use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::OfDevice;
 use crate::output::encoding::Encoding;
+use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
+use crate::smooth::kernel::SmoothingError;
 use crate::time::frames::FramesError;
 
 /// Why an evaluation failed.
@@ -20,6 +22,12 @@ pub enum Error {
     /// A track cannot be interpolated as asked.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
+    /// A path cannot be followed as asked.
+    #[error(transparent)]
+    Follow(#[from] FollowError),
+    /// Samples cannot be smoothed as asked.
+    #[error(transparent)]
+    Smoothing(#[from] SmoothingError),
     /// The Vulkan device could not be used, or stopped working.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),

@@ -176,9 +176,11 @@ impl Engine {
         if encoding == Encoding::F32
             && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
         {
-            let (timeline, layout) = (&timeline, Layout::TrackMajor);
-            (self.backend).evaluate_tracks(set, tracks, interpolation, timeline, layout, quats)?;
-            return Ok(());
+            let request = Request {
+                tracks,
+                ..Request::whole(set, &interpolation, &timeline)
+            };
+            return Ok((self.backend).evaluate_tracks(&request, Layout::TrackMajor, quats)?);
         }
         let timeline = timeline.of_tracks(tracks.clone());
         let wanted = Wanted {

@@ -15,9 +15,9 @@ use crate::support::{Random, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
 use sha2::{Digest, Sha256};
 use tumble::{
-    Axes, Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS,
-    Method, Path, Quantity, Skeleton, Speed, Tcb, TrackSet, VectorMethod, VectorWidth, WrapMode,
-    method,
+    Axes, Device, Direction, Encoding, Ends, Engine, EngineOptions, Follow, Frame, Frames,
+    Interpolation, Layout, METHODS, Method, Path, PathSpeed, Quantity, Skeleton, Smoothing, Speed,
+    Tcb, TrackSet, VectorMethod, VectorWidth, WrapMode, method,
 };
 
 // ---------------------------------------------------------------- the sets
@@ -186,6 +186,10 @@ enum What {
     Transforms(Interpolation, VectorMethod, Frames),
     /// Layers blended, mixed and added, and walked down a skeleton.
     Poses,
+    /// Bodies on paths.
+    Follow(Box<Follow>),
+    /// Rotations and translations, smoothed.
+    Smooth(Smoothing),
 }
 
 struct Case {
@@ -197,6 +201,30 @@ struct Case {
 struct Cases {
     sets: BTreeMap<&'static str, TrackSet>,
     cases: Vec<Case>,
+}
+
+/// Walks of points, some of which stand still for a while, with upward directions at some keys.
+fn paths() -> TrackSet {
+    let mut random = Random(14);
+    let mut set = TrackSet::new();
+    for track in 0..9 {
+        let (mut place, mut time) = (Vec3::ZERO, 0.0);
+        let (mut times, mut points) = (Vec::new(), Vec::new());
+        for point in 0..3 + track {
+            times.push(time);
+            points.push(place);
+            time += random.between(0.3, 1.5);
+            let step = Vec3::from_array([(); 3].map(|()| random.between(-3.0, 4.0) as f32));
+            place += if (track + point) % 7 == 5 {
+                Vec3::ZERO
+            } else {
+                step
+            };
+        }
+        set.push_path("", &times, &points, &[])
+            .expect("points in order");
+    }
+    set
 }
 
 fn shortest(method: Method) -> Interpolation {
@@ -262,6 +290,7 @@ impl Cases {
             ("day", later(&uneven, 86_400.0)),
             ("closed", closed_set()),
             ("vectors", with_vectors),
+            ("paths", paths()),
             ("uneven", uneven),
         ]);
         let mut cases = Self {
@@ -273,7 +302,91 @@ impl Cases {
         cases.options();
         cases.routes();
         cases.add("uneven", "poses", What::Poses);
+        cases.paths();
+        cases.smoothing();
         cases
+    }
+
+    /// Every kind of path, direction, frame and speed.
+    fn paths(&mut self) {
+        let eased = PathSpeed::Eased {
+            start: 0.2,
+            end: 0.3,
+        };
+        for method in VectorMethod::ALL {
+            let follow = Follow {
+                method,
+                ..Follow::default()
+            };
+            self.add(
+                "paths",
+                &format!("{method}"),
+                What::Follow(Box::new(follow)),
+            );
+        }
+        let c2 = || Follow {
+            method: VectorMethod::C2,
+            ..Follow::default()
+        };
+        let point = Direction::Point(DVec3::new(9.0, 8.0, -7.0));
+        let others = [
+            (
+                "constant",
+                Follow {
+                    speed: PathSpeed::Constant,
+                    ..c2()
+                },
+            ),
+            (
+                "eased ahead",
+                Follow {
+                    speed: eased,
+                    direction: Direction::Ahead(0.7),
+                    ..c2()
+                },
+            ),
+            (
+                "fixed at",
+                Follow {
+                    frame: Frame::Fixed,
+                    direction: point,
+                    ..c2()
+                },
+            ),
+            (
+                "frenet",
+                Follow {
+                    frame: Frame::Frenet,
+                    ..c2()
+                },
+            ),
+        ];
+        for (name, follow) in others {
+            self.add("paths", name, What::Follow(Box::new(follow)));
+        }
+    }
+
+    /// Every kernel.
+    fn smoothing(&mut self) {
+        for name in [
+            "linear",
+            "cubic",
+            "box:2.25",
+            "tent:3",
+            "gaussian:2",
+            "savitzky-golay:4:3",
+        ] {
+            let kernel = name.parse().expect("a kernel");
+            let smoothing = Smoothing {
+                passes: 2,
+                ..Smoothing::new(kernel)
+            };
+            self.add(
+                "vectors",
+                &format!("{name} smoothed"),
+                What::Smooth(smoothing),
+            );
+        }
     }
 
     /// Every method, on every kind of keys, and its derivatives.
@@ -557,6 +670,31 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let rotations: &[f32] = bytemuck::cast_slice(found.rotations.as_quats());
             let scales: &[f32] = bytemuck::cast_slice(found.scales.as_slice());
             hash_of(&[translations, rotations, scales])
+        }
+        What::Follow(follow) => {
+            let frames = Frames::fps(30);
+            let found = engine
+                .follow(set, follow, &frames, Layout::TrackMajor)
+                .unwrap();
+            hash_of(&[
+                bytemuck::cast_slice::<_, f32>(found.positions.as_slice()),
+                bytemuck::cast_slice(found.rotations.as_quats()),
+            ])
+        }
+        What::Smooth(smoothing) => {
+            let (frames, layout) = (Frames::fps(30), Layout::TrackMajor);
+            let linear = VectorMethod::Linear;
+            let found = engine
+                .transforms(set, method::SLERP, linear, &frames, layout)
+                .unwrap();
+            let turned = engine.smooth(&found.rotations, smoothing).unwrap();
+            let moved = engine
+                .smooth_vectors(&found.translations, smoothing)
+                .unwrap();
+            hash_of(&[
+                bytemuck::cast_slice::<_, f32>(turned.as_quats()),
+                bytemuck::cast_slice(moved.as_slice()),
+            ])
         }
         What::Poses => {
             let frames = Frames::fps(30);

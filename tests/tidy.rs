@@ -108,7 +108,7 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 19] = [
+const LAYERS: [&str; 21] = [
     "shader",
     "math",
     "simd",
@@ -120,6 +120,8 @@ const LAYERS: [&str; 19] = [
     "fit",
     "method",
     "prepare",
+    "path",
+    "smooth",
     "output",
     "from_keys",
     "cpu",

@@ -7,6 +7,7 @@ mod cli_arguments;
 mod configurations;
 mod dat_fixtures;
 mod faults;
+mod follow;
 mod motion;
 mod peers;
 mod plot;

@@ -225,6 +225,9 @@ codes! {
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track.";
+    // E6xx: paths.
+    Path = "E601", "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, of which `t` and `ux,uy,uz` may be missing, or NPY of shape (tracks, points, 3). An upward direction has a length; its cells may be blank.";
+    PathTimes = "E602", "no times, or too many", "A path whose file has no times needs --seconds or --rate; one that has times takes neither.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";

@@ -25,6 +25,7 @@ pub mod npz;
 pub mod output;
 #[cfg(feature = "parquet")]
 pub mod parquet;
+pub mod path;
 pub mod poses;
 pub mod quaternion;
 pub mod sample;

@@ -96,6 +96,8 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::GlbTooLong,
         Code::BvhWrite,
         Code::TumWrite,
+        Code::Path,
+        Code::PathTimes,
         Code::Scales,
         Code::StartMoved,
         Code::GltfFolder,

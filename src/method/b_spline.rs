@@ -38,8 +38,13 @@ static CURVES: Curves =
 /// The durations of the two intervals before this one and of the two after it, in units of its own
 /// duration.
 fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
-    let last = track.times.len() as isize - 2;
     let closed = matches!(interpolation.ends, Ends::Loop);
+    [neighbours(track.times, interval, closed), [0.0; 4]]
+}
+
+/// As [`spacing`], of keys at these times; those of a closed curve are neighbours across the seam.
+pub(crate) fn neighbours(times: &[f64], interval: usize, closed: bool) -> [f64; 4] {
+    let last = times.len() as isize - 2;
     let duration = |offset: isize| {
         let i = interval as isize + offset;
         let i = if closed {
@@ -47,16 +52,15 @@ fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f6
         } else {
             i.clamp(0, last)
         } as usize;
-        track.times[i + 1] - track.times[i]
+        times[i + 1] - times[i]
     };
     let own = duration(0);
-    let others = [-2, -1, 1, 2].map(|offset| ratio(duration(offset), own));
-    [others, [0.0; 4]]
+    [-2, -1, 1, 2].map(|offset| ratio(duration(offset), own))
 }
 
 /// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval of length
 /// 1, from the lengths of the two intervals before it and of the two after it.
-fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
+pub(crate) fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
     let first = 1.0 / ((1.0 + before) * (1.0 + before + before_that));
     let third = 1.0 / ((1.0 + after) * (1.0 + after + after_that));
     let all = 1.0 + before + after;

@@ -21,6 +21,7 @@ pub(crate) mod shoemake_2;
 pub(crate) mod slerp;
 pub(crate) mod squad;
 pub(crate) mod step;
+pub(crate) mod vector_curve;
 pub(crate) mod vector_method;
 
 pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};

@@ -19,16 +19,23 @@ pub enum VectorMethod {
     BesselOverhauser,
     /// glTF's CUBICSPLINE with given tangents, which are 0 for a track without them.
     GltfCubic,
+    /// The cubic spline whose second derivative is continuous.
+    C2,
+    /// The cubic B-spline: its second derivative is continuous too, and it passes near its keys and
+    /// not through them.
+    BSpline,
 }
 
 impl VectorMethod {
     /// All methods for vectors.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Step,
         Self::Linear,
         Self::CatmullRom,
         Self::BesselOverhauser,
         Self::GltfCubic,
+        Self::C2,
+        Self::BSpline,
     ];
 
     /// The name by which programs call it.
@@ -40,6 +47,8 @@ impl VectorMethod {
             Self::CatmullRom => "catmull-rom",
             Self::BesselOverhauser => "bessel-overhauser",
             Self::GltfCubic => "gltf-cubic",
+            Self::C2 => "c2",
+            Self::BSpline => "b-spline",
         }
     }
 }
@@ -53,7 +62,7 @@ impl fmt::Display for VectorMethod {
 /// The error for a name that no method for vectors has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no method `{name}` for vectors; there are step, linear, catmull-rom, bessel-overhauser, gltf-cubic"
+    "there is no method `{name}` for vectors; there are step, linear, catmull-rom, bessel-overhauser, gltf-cubic, c2, b-spline"
 )]
 pub struct UnknownVectorMethod {
     /// The name given.

@@ -5,6 +5,8 @@ use std::marker::PhantomData;
 
 use glam::{Quat, Vec3, Vec4};
 
+use crate::output::buffer::OutputBuffer;
+
 /// The order of a result in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Layout {
@@ -70,6 +72,25 @@ impl<T> Samples<T> {
         }
     }
 
+    fn of_rows(
+        rows: impl ExactSizeIterator<Item = Quat>,
+        tracks: usize,
+        layout: Layout,
+    ) -> Option<Self> {
+        let samples = rows.len().checked_div(tracks).unwrap_or(0);
+        if samples * tracks != rows.len() {
+            return None;
+        }
+        let mut storage = OutputBuffer::new(rows.len());
+        storage.iter_mut().zip(rows).for_each(|(to, row)| *to = row);
+        Some(Self::new(Box::new(storage), tracks, samples, layout))
+    }
+
+    /// All values, four numbers each.
+    pub(crate) fn rows(&self) -> &[[f32; 4]] {
+        bytemuck::cast_slice(self.storage.quats())
+    }
+
     /// Number of tracks.
     #[must_use]
     pub fn tracks(&self) -> usize {
@@ -96,6 +117,13 @@ impl<T> Samples<T> {
 }
 
 impl Rotations {
+    /// Rotations from elsewhere, of so many tracks, in this order; `None` if their number is not a
+    /// multiple of the tracks'.
+    #[must_use]
+    pub fn of(rotations: &[Quat], tracks: usize, layout: Layout) -> Option<Self> {
+        Self::of_rows(rotations.iter().copied(), tracks, layout)
+    }
+
     /// All rotations, without a copy: where a device maps its memory, these are the
     /// values that the device wrote.
     #[must_use]
@@ -111,6 +139,13 @@ impl Rotations {
 }
 
 impl Vectors {
+    /// Vectors from elsewhere; otherwise as [`Rotations::of`].
+    #[must_use]
+    pub fn of(vectors: &[Vec3], tracks: usize, layout: Layout) -> Option<Self> {
+        let rows = vectors.iter().map(|v| Quat::from_vec4(v.extend(0.0)));
+        Self::of_rows(rows, tracks, layout)
+    }
+
     /// All of them, without a copy, each followed by 0.
     #[must_use]
     pub fn as_slice(&self) -> &[Vec4] {

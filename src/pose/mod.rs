@@ -1,7 +1,9 @@
 //! Poses: blending and adding layers of rotations, skeletons with rotations and positions in the
 //! world, and transforms of rotations, translations and scales.
 
+pub(crate) mod follow;
 pub(crate) mod on_cpu;
 pub(crate) mod poses;
 pub(crate) mod skeleton;
+pub(crate) mod smooth;
 pub(crate) mod transforms;

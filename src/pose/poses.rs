@@ -189,7 +189,7 @@ impl Engine {
     }
 
     /// Does some work on the engine's device; `None` stands for the CPU.
-    fn on_device<T>(
+    pub(crate) fn on_device<T>(
         &self,
         mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
     ) -> Result<T, Error> {

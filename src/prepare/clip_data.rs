@@ -165,7 +165,7 @@ impl ClipData {
         Self::of_groups(groups, set, interpolation, group_bytes)
     }
 
-    fn of_groups(
+    pub(crate) fn of_groups(
         mut groups: Vec<Prepared>,
         set: &TrackSet,
         interpolation: Interpolation,

@@ -4,12 +4,13 @@
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use crate::curve::options::{Ends, Quantity};
+use crate::curve::options::Quantity;
 use crate::fit::double::curve::{Curve, Piece};
 use crate::fit::double::shape::Shape;
-use crate::math::canonical::{canonical, round_f32};
+use crate::math::canonical::{canonical, round_f32, round_quat};
 use crate::math::quaternion::ratio;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_curve::{Cubic, Curves};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
@@ -30,6 +31,7 @@ pub(crate) fn add(
         times: vec![0.0],
         keys: vec![rest],
         tangents: Vec::new(),
+        ups: Vec::new(),
     };
     let track = track.unwrap_or(&still);
     let last = track.keys.len() - 1;
@@ -37,28 +39,35 @@ pub(crate) fn add(
     let stored = |key: &Vec3| [canonical(key.x), canonical(key.y), canonical(key.z), 0.0];
     prepared.constants.extend(track.keys.iter().map(stored));
     let first_span = prepared.spans.len();
-    let slopes = Slopes {
-        track,
-        method,
-        ends: interpolation.ends,
-    };
+    let curves = Curves::new(track, method, interpolation.ends);
     let mut beyond = [NONE; 2];
+    let mut held_keys = [first_key, first_key + last as u32];
     for i in 0..last {
         let key = first_key + i as u32;
-        let is_frozen = interpolation.ends == Ends::Frozen
-            && slopes.use_neighbours()
-            && last > 1
-            && (i == 0 || i + 1 == last);
-        if method == VectorMethod::Step || is_frozen {
+        if curves.is_held(i) {
             prepared.push_span(track.times[i], Source::Constant(key), NONE);
             continue;
         }
-        let [start, end] = [i, i + 1].map(|key| track.keys[key].as_dvec3());
-        let [leaving, arriving] = slopes.of(i);
+        let curve = curves.of(i);
+        let Cubic {
+            start,
+            leaving,
+            arriving,
+            end,
+        } = curve;
         let segments = &mut prepared.segments.polynomials;
         let source = Source::Segment(segments.len() as u32);
-        segments.push(cubic(start, leaving, arriving, end));
-        prepared.push_span(track.times[i], source, key);
+        segments.push(segment(&curve));
+        let meets_key = curves.meets_keys();
+        prepared.push_span(track.times[i], source, if meets_key { key } else { NONE });
+        if !meets_key {
+            for (at_end, held, value) in [(i == 0, 0, start), (i + 1 == last, 1, end)] {
+                if at_end {
+                    held_keys[held] =
+                        prepared.constant(round_quat([value.x, value.y, value.z, 0.0]));
+                }
+            }
+        }
         let rate = ratio(1.0, track.times[i + 1] - track.times[i]);
         let sides = [
             (i == 0, interpolation.before, start, leaving),
@@ -79,8 +88,8 @@ pub(crate) fn add(
         first_key: 0,
         spans: first_span..first_span + last,
         end: track.times[last],
-        before: held(beyond[0], first_key),
-        after: held(beyond[1], first_key + last as u32),
+        before: held(beyond[0], held_keys[0]),
+        after: held(beyond[1], held_keys[1]),
         beyond: (goes_on || prepared.wrap.repeats()).then(|| {
             Box::new(Beyond {
                 from_before: beyond[0],
@@ -91,8 +100,14 @@ pub(crate) fn add(
     });
 }
 
-/// The cubic with these ends and slopes per unit of the parameter, in powers about its middle.
-fn cubic(start: DVec3, leaving: DVec3, arriving: DVec3, end: DVec3) -> PolynomialSegment {
+/// A cubic in powers about its middle.
+fn segment(cubic: &Cubic) -> PolynomialSegment {
+    let &Cubic {
+        start,
+        leaving,
+        arriving,
+        end,
+    } = cubic;
     let rise = end - start;
     let powers = [
         (start + end) * 0.5 + (leaving - arriving) * 0.125,
@@ -120,76 +135,5 @@ fn line(from: DVec3, slope: DVec3) -> Curve {
         quantity: Quantity::Rotation,
         rate: 1.0,
         pace: None,
-    }
-}
-
-/// The slopes with which a method's curves leave and reach their keys.
-struct Slopes<'a> {
-    track: &'a VectorTrack,
-    method: VectorMethod,
-    ends: Ends,
-}
-
-impl Slopes<'_> {
-    fn use_neighbours(&self) -> bool {
-        matches!(
-            self.method,
-            VectorMethod::CatmullRom | VectorMethod::BesselOverhauser
-        )
-    }
-
-    fn rise(&self, i: usize) -> DVec3 {
-        self.track.keys[i + 1].as_dvec3() - self.track.keys[i].as_dvec3()
-    }
-
-    fn duration(&self, i: usize) -> f64 {
-        self.track.times[i + 1] - self.track.times[i]
-    }
-
-    /// The slopes of interval `i` at its first and its last key, per unit of its parameter.
-    fn of(&self, i: usize) -> [DVec3; 2] {
-        let last = self.track.keys.len() - 2;
-        let (rise, duration) = (self.rise(i), self.duration(i));
-        if self.method == VectorMethod::GltfCubic {
-            let tangent = |key: usize, side: usize| match self.track.tangents.get(key) {
-                Some(both) => both[side].as_dvec3() * duration,
-                None => DVec3::ZERO,
-            };
-            return [tangent(i, 1), tangent(i + 1, 0)];
-        }
-        if !self.use_neighbours() || last == 0 {
-            return [rise; 2];
-        }
-        let closed = self.ends == Ends::Loop;
-        let before = i.checked_sub(1).or(closed.then_some(last));
-        let after = (i < last).then_some(i + 1).or(closed.then_some(0));
-        let leaving = before.map(|before| self.at_key(before, i, duration));
-        let arriving = after.map(|after| self.at_key(i, after, duration));
-        match (leaving, arriving) {
-            (None, Some(arriving)) => [self.at_end(rise, arriving), arriving],
-            (Some(leaving), None) => [leaving, self.at_end(rise, leaving)],
-            (leaving, arriving) => [leaving.unwrap_or(rise), arriving.unwrap_or(rise)],
-        }
-    }
-
-    /// The slope at the key between two intervals, per unit of the parameter of an interval that
-    /// lasts `duration` seconds.
-    fn at_key(&self, before: usize, after: usize, duration: f64) -> DVec3 {
-        let (left, right) = (self.rise(before), self.rise(after));
-        if self.method == VectorMethod::CatmullRom {
-            return (left + right) * 0.5;
-        }
-        let (h, next_h) = (self.duration(before), self.duration(after));
-        let rate = (left * ratio(next_h, h) + right * ratio(h, next_h)) * ratio(1.0, h + next_h);
-        rate * duration
-    }
-
-    fn at_end(&self, rise: DVec3, other: DVec3) -> DVec3 {
-        match self.ends {
-            Ends::Natural => rise * 1.5 - other * 0.5,
-            Ends::Clamped { .. } => DVec3::ZERO,
-            Ends::Secant => rise,
-            Ends::Parabolic | Ends::Loop | Ends::Frozen => rise * 2.0 - other,
-        }
     }
 }

@@ -7,6 +7,7 @@
 pub(crate) mod b_spline;
 pub(crate) mod c2;
 pub(crate) mod curve;
+pub(crate) mod follow;
 pub(crate) mod given;
 pub(crate) mod handles;
 pub(crate) mod pace;
@@ -16,6 +17,7 @@ pub(crate) mod track;
 pub(crate) mod vector;
 
 pub use crate::reference::curve::{Curve, Definition};
+pub use crate::reference::follow::{Followed, Follower, Frame, Heading, Travel, eased};
 pub use crate::reference::quaternion::{
     angle_between, nlerp, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left, squad,

@@ -1,4 +1,4 @@
-//! Curves of vectors between keys: Hermite cubics, as in the books.
+//! Curves of vectors between keys: Hermite cubics and B-splines, as in the books.
 
 use glam::DVec3;
 
@@ -7,7 +7,7 @@ use crate::curve::options::Ends;
 /// Keys of a vector in f64, and which textbook curve joins them.
 #[derive(Debug, Clone)]
 pub struct VectorCurve {
-    /// `step`, `linear`, `catmull-rom`, `bessel-overhauser` or `gltf-cubic`.
+    /// `step`, `linear`, `catmull-rom`, `bessel-overhauser`, `gltf-cubic`, `c2` or `b-spline`.
     pub method: &'static str,
     /// The curve at the ends; clamped ends are at rest.
     pub ends: Ends,
@@ -25,21 +25,40 @@ impl VectorCurve {
     #[must_use]
     pub fn value(&self, time: f64) -> DVec3 {
         let last = self.keys.len() - 1;
-        if time <= self.times[0] {
+        if last == 0 {
             return self.keys[0];
         }
+        // The ends themselves belong to what is held.
         if time >= self.times[last] {
-            return self.keys[last];
+            return match self.method {
+                "b-spline" if !self.is_frozen(last - 1) => self.interval(last - 1)(1.0)[0],
+                _ => self.keys[last],
+            };
+        }
+        if time <= self.times[0] {
+            return self.interval(0)(0.0)[0];
         }
         let i = self.times.partition_point(|&key| key <= time) - 1;
         let h = self.times[i + 1] - self.times[i];
-        let t = (time - self.times[i]) / h;
+        self.interval(i)((time - self.times[i]) / h)[0]
+    }
+
+    /// Whether an interval is held at its first key.
+    fn is_frozen(&self, i: usize) -> bool {
+        let last = self.keys.len() - 1;
+        let has_ends = !matches!(self.method, "step" | "linear" | "gltf-cubic");
+        has_ends && self.ends == Ends::Frozen && last > 1 && (i == 0 || i + 1 == last)
+    }
+
+    /// The curve of interval `i`: its value and its first and second derivative at a parameter from
+    /// 0 to 1, per unit of the parameter.
+    pub(crate) fn interval(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
+        let last = self.keys.len() - 1;
         let (p0, p1) = (self.keys[i], self.keys[i + 1]);
-        let smooth = matches!(self.method, "catmull-rom" | "bessel-overhauser");
-        let frozen = self.ends == Ends::Frozen && last > 1 && (i == 0 || i + 1 == last);
+        let h = self.times[i + 1] - self.times[i];
         let (m0, m1) = match self.method {
-            "step" => return p0,
-            _ if smooth && frozen => return p0,
+            "step" => return Box::new(move |_| [p0, DVec3::ZERO, DVec3::ZERO]),
+            _ if self.is_frozen(i) => return Box::new(move |_| [p0, DVec3::ZERO, DVec3::ZERO]),
             "gltf-cubic" => {
                 let given = |key: usize, side: usize| {
                     self.tangents
@@ -48,14 +67,171 @@ impl VectorCurve {
                 };
                 (given(i, 1), given(i + 1, 0))
             }
-            _ if smooth && last > 1 => self.tangents_of(i),
-            _ => (p1 - p0, p1 - p0),
+            "linear" => (p1 - p0, p1 - p0),
+            _ if last == 1 => (p1 - p0, p1 - p0),
+            "b-spline" => return self.b_spline(i),
+            "c2" => {
+                let slopes = self.c2_slopes();
+                (slopes[i] * h, slopes[i + 1] * h)
+            }
+            _ => self.tangents_of(i),
         };
-        let (t2, t3) = (t * t, t * t * t);
-        p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
-            + m0 * (t3 - 2.0 * t2 + t)
-            + p1 * (3.0 * t2 - 2.0 * t3)
-            + m1 * (t3 - t2)
+        Box::new(move |t| {
+            let (t2, t3) = (t * t, t * t * t);
+            [
+                p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
+                    + m0 * (t3 - 2.0 * t2 + t)
+                    + p1 * (3.0 * t2 - 2.0 * t3)
+                    + m1 * (t3 - t2),
+                (p1 - p0) * (6.0 * t - 6.0 * t2)
+                    + m0 * (3.0 * t2 - 4.0 * t + 1.0)
+                    + m1 * (3.0 * t2 - 2.0 * t),
+                (p1 - p0) * (6.0 - 12.0 * t) + m0 * (6.0 * t - 4.0) + m1 * (6.0 * t - 2.0),
+            ]
+        })
+    }
+
+    /// The slopes at all keys, per second, such that the second derivative is continuous: a full
+    /// system of equations, solved by Gauss' elimination with pivots.
+    fn c2_slopes(&self) -> Vec<DVec3> {
+        let keys = self.keys.len();
+        let last = keys - 1;
+        let h = |i: usize| self.times[i + 1] - self.times[i];
+        let secant = |i: usize| (self.keys[i + 1] - self.keys[i]) / h(i);
+        let mut rows = vec![(vec![0.0; keys], DVec3::ZERO); keys];
+        let mut inner = |row: usize, at: [usize; 3], l: usize, r: usize| {
+            let (coefficients, side) = &mut rows[row];
+            coefficients[at[0]] += 1.0 / h(l);
+            coefficients[at[1]] += 2.0 / h(l) + 2.0 / h(r);
+            coefficients[at[2]] += 1.0 / h(r);
+            *side = 3.0 * (secant(l) / h(l) + secant(r) / h(r));
+        };
+        for i in 1..last {
+            inner(i, [i - 1, i, i + 1], i - 1, i);
+        }
+        if self.ends == Ends::Loop {
+            inner(0, [last - 1, 0, 1], last - 1, 0);
+            rows[last].0[last] = 1.0;
+            rows[last].0[0] = -1.0;
+        } else {
+            for (row, other, i) in [(0, 1, 0), (last, last - 1, last - 1)] {
+                let (own, next, side) = match self.ends {
+                    Ends::Natural => (2.0, 1.0, 3.0 * secant(i)),
+                    Ends::Secant => (1.0, 0.0, secant(i)),
+                    Ends::Clamped { .. } => (1.0, 0.0, DVec3::ZERO),
+                    _ => (1.0, 1.0, 2.0 * secant(i)),
+                };
+                rows[row].0[row] = own;
+                rows[row].0[other] = next;
+                rows[row].1 = side;
+            }
+        }
+        for column in 0..keys {
+            let size = |row: &usize| rows[*row].0[column].abs();
+            let pivot = (column..keys).max_by(|a, b| size(a).total_cmp(&size(b)));
+            rows.swap(column, pivot.unwrap_or(column));
+            let (own, side) = rows[column].clone();
+            for (row, (coefficients, other)) in rows.iter_mut().enumerate() {
+                if row != column {
+                    let factor = coefficients[column] / own[column];
+                    for (to, from) in coefficients.iter_mut().zip(&own) {
+                        *to -= factor * from;
+                    }
+                    *other -= side * factor;
+                }
+            }
+        }
+        let solved =
+            |(i, (coefficients, side)): (usize, &(Vec<f64>, DVec3))| *side / coefficients[i];
+        rows.iter().enumerate().map(solved).collect()
+    }
+
+    /// Interval `i` of the cubic B-spline whose control points are the keys, by the recursion of
+    /// Cox and de Boor, with one more control point beyond each end.
+    fn b_spline(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
+        let last = self.keys.len() - 1;
+        let closed = self.ends == Ends::Loop;
+        let count = last as isize;
+        let step = |j: isize| {
+            let j = if closed {
+                j.rem_euclid(count)
+            } else {
+                j.clamp(0, count - 1)
+            };
+            self.times[j as usize + 1] - self.times[j as usize]
+        };
+        // The knots of interval `i` from three before it to two after its end.
+        let knots_of = |i: usize| {
+            let mut knots = vec![0.0; 6];
+            for j in 1..6 {
+                knots[j] = knots[j - 1] + step(i as isize - 3 + j as isize);
+            }
+            let (own, h) = (knots[2], step(i as isize));
+            knots
+                .iter()
+                .map(|knot| (knot - own) / h)
+                .collect::<Vec<_>>()
+        };
+        let value = move |knots: &[f64], points: [DVec3; 4], t: f64| de_boor(knots, points, t);
+        let key = |j: isize| {
+            let j = if closed { j.rem_euclid(count) } else { j };
+            self.keys[j as usize]
+        };
+        let beyond = |at_end: bool| -> DVec3 {
+            let (own, inner, next) = match at_end {
+                false => (0isize, 1isize, 2isize),
+                true => (count, count - 1, count - 2),
+            };
+            if closed {
+                return if at_end { key(count + 1) } else { key(-1) };
+            }
+            let (interval, t) = if at_end { (last - 1, 1.0) } else { (0, 0.0) };
+            if self.ends == Ends::Parabolic {
+                // The parabola through the last three keys, as far beyond as the last interval is.
+                let (a, b) = match at_end {
+                    false => (step(0), step(1)),
+                    true => (step(count - 1), step(count - 2)),
+                };
+                let (x, y, z) = (0.0, a, a + b);
+                let at = -a;
+                return key(own) * ((at - y) * (at - z) / ((x - y) * (x - z)))
+                    + key(inner) * ((at - x) * (at - z) / ((y - x) * (y - z)))
+                    + key(next) * ((at - x) * (at - y) / ((z - x) * (z - y)));
+            }
+            // What must vanish is linear in the point beyond.
+            let knots = knots_of(interval);
+            let own_step = if at_end {
+                key(own) - key(inner)
+            } else {
+                key(inner) - key(own)
+            };
+            let off = |beyond: DVec3| {
+                let points = match at_end {
+                    false => [beyond, key(0), key(1), key(2.min(count))],
+                    true => [key((count - 2).max(0)), key(count - 1), key(count), beyond],
+                };
+                let [_, slope, bend] = value(&knots, points, t);
+                match self.ends {
+                    Ends::Natural => bend,
+                    Ends::Secant => slope - own_step,
+                    _ => slope,
+                }
+            };
+            let (zero, one) = (off(DVec3::ZERO), off(DVec3::ONE));
+            -zero / (one - zero)
+        };
+        let point = |j: isize| match j {
+            _ if closed => key(j),
+            -1 if self.ends == Ends::Frozen => key(0) * 2.0 - key(1),
+            j if j > count && self.ends == Ends::Frozen => key(count) * 2.0 - key(count - 1),
+            -1 => beyond(false),
+            j if j > count => beyond(true),
+            j => key(j),
+        };
+        let i = i as isize;
+        let points = [-1, 0, 1, 2].map(|offset| point(i + offset));
+        let knots = knots_of(i as usize);
+        Box::new(move |t| value(&knots, points, t))
     }
 
     /// The tangents at both keys of interval `i`, per unit of its parameter.
@@ -95,4 +271,33 @@ impl VectorCurve {
             (None, None) => (whole, whole),
         }
     }
+}
+
+/// A cubic B-spline between the third and the fourth of six knots: its value and its first and
+/// second derivative (de Boor 1972).
+fn de_boor(knots: &[f64], points: [DVec3; 4], t: f64) -> [DVec3; 3] {
+    // Slopes are a spline of lower degree, whose points are the differences over the knots.
+    let derived = |points: &[DVec3], degree: usize| -> Vec<DVec3> {
+        (1..points.len())
+            .map(|j| {
+                let from = j + 2 - degree;
+                (points[j] - points[j - 1]) * degree as f64 / (knots[from + degree] - knots[from])
+            })
+            .collect()
+    };
+    let value = |points: &[DVec3], degree: usize| -> DVec3 {
+        let mut points = points.to_vec();
+        for round in 1..=degree {
+            for j in (round..=degree).rev() {
+                let from = j + 2 - degree;
+                let (low, high) = (knots[from], knots[from + degree + 1 - round]);
+                let part = (t - low) / (high - low);
+                points[j] = points[j - 1] * (1.0 - part) + points[j] * part;
+            }
+        }
+        points[degree]
+    };
+    let slopes = derived(&points, 3);
+    let bends = derived(&slopes, 2);
+    [value(&points, 3), value(&slopes, 2), value(&bends, 1)]
 }

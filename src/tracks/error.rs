@@ -88,6 +88,14 @@ pub enum TrackError {
         /// Number of values given.
         given: usize,
     },
+    /// An upward direction of a path has no length, or is not finite.
+    #[error("track {track}, point {key}: the upward direction has no length, or is not finite")]
+    NoUp {
+        /// The track's place in the set.
+        track: usize,
+        /// The point's place in the path.
+        key: usize,
+    },
     /// A value beside a rotation is NaN or infinite.
     #[error("track {track}, key {key}: the {what} is not finite")]
     DataNotFinite {

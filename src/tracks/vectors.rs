@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 use crate::tracks::check::check_times;
 use crate::tracks::error::TrackError;
@@ -17,6 +17,8 @@ pub(crate) struct VectorTrack {
     /// Tangents with which the curve arrives at each key and leaves it, units per second; empty if
     /// none were given.
     pub(crate) tangents: Vec<[Vec3; 2]>,
+    /// Upward directions at the keys of a path; empty if none were given.
+    pub(crate) ups: Vec<Option<Vec3>>,
 }
 
 /// The vectors of a set's tracks, `None` for a track without. The list may be shorter than the set.
@@ -59,6 +61,52 @@ impl TrackSet {
         tangents: &[[Vec3; 2]],
     ) -> Result<(), TrackError> {
         self.set_vectors(Channel::Translation, track, times, keys, tangents)
+    }
+
+    /// Adds a track for a body that follows a path: translation keys, at times in seconds that are
+    /// strictly increasing, and no rotation of its own. `ups` are upward directions at some keys,
+    /// one entry for each point; it may be empty. [`Engine::follow`](crate::engine::Engine::follow)
+    /// evaluates it.
+    ///
+    /// # Errors
+    /// When there is no point, the lengths differ, a number is not finite, or an upward direction
+    /// has no length.
+    pub fn push_path(
+        &mut self,
+        name: &str,
+        times: &[f64],
+        points: &[Vec3],
+        ups: &[Option<Vec3>],
+    ) -> Result<usize, TrackError> {
+        let track = self.track_count();
+        check_times(track, times, points.len())?;
+        if !ups.is_empty() && ups.len() != points.len() {
+            return Err(TrackError::DataLength {
+                track,
+                what: "upward directions",
+                keys: points.len(),
+                given: ups.len(),
+            });
+        }
+        let has_no_length = |up: &Option<Vec3>| {
+            up.is_some_and(|up| !up.is_finite() || up.as_dvec3().length() == 0.0)
+        };
+        if let Some(key) = ups.iter().position(has_no_length) {
+            return Err(TrackError::NoUp { track, key });
+        }
+        if let Some(key) = points.iter().position(|point| !point.is_finite()) {
+            return Err(TrackError::DataNotFinite {
+                track,
+                key,
+                what: "point of the path",
+            });
+        }
+        self.push(name, &times[..1], &[Quat::IDENTITY])?;
+        self.set_translations(track, times, points, &[])?;
+        if let Some(Some(path)) = self.translations.get_mut(track) {
+            Arc::make_mut(path).ups = ups.to_vec();
+        }
+        Ok(track)
     }
 
     /// Gives a track scale keys; otherwise as [`TrackSet::set_translations`].
@@ -120,6 +168,7 @@ impl TrackSet {
             times: times.to_vec(),
             keys: keys.to_vec(),
             tangents: tangents.to_vec(),
+            ups: Vec::new(),
         }));
         Ok(())
     }

@@ -13,6 +13,8 @@ pub(crate) mod matrix;
 pub(crate) mod pose_add;
 pub(crate) mod pose_blend;
 pub(crate) mod pose_mix;
+pub(crate) mod pose_smooth;
+pub(crate) mod pose_steps;
 pub(crate) mod pose_world;
 pub(crate) mod quaternion;
 pub(crate) mod self_test;

@@ -4,10 +4,10 @@ use bytemuck::Zeroable as _;
 
 use crate::shader::{Link, Probe, ROOT, Reply};
 use crate::twin::self_test::reply;
-use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
+use crate::twin::{pose_add, pose_blend, pose_mix, pose_smooth, pose_steps, pose_world};
 
 use super::random::Random;
-use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
 
 pub(super) fn self_test() -> Twin {
     with_globals("self_test", "main", |random, trial| {
@@ -86,6 +86,43 @@ pub(super) fn poses() -> Vec<Twin> {
             trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
             trial.expect(pose_blend::pose(&all, &weights, COUNT, place as usize));
             trial.global("layers", all);
+            trial.global("weights", weights);
+        }),
+        twin(
+            "poses_steps",
+            "rotation_step",
+            Random::pair,
+            |[from, to]: [[f32; 4]; 2]| pose_steps::rotation_step(from, to),
+        ),
+        with_globals("poses_steps", "pose", |random, trial| {
+            let ([own, next], are_rotations) = (random.pair(), random.below(2));
+            trial.argument(1u32);
+            trial.global("dispatch", [2u32, are_rotations]);
+            trial.global("values", [[0.0; 4], own, next]);
+            trial.output("steps");
+            trial.expect([UNTOUCHED; 4]);
+            trial.expect(pose_steps::pose(own, next, are_rotations == 1));
+        }),
+        twin(
+            "poses_smooth",
+            "turned",
+            |random: &mut Random| (random.rotation(), random.vector::<4>()),
+            |(q, v)| pose_smooth::turned(q, v),
+        ),
+        with_globals("poses_smooth", "pose", |random, trial| {
+            let weights: Vec<f32> = (0..1 + random.below(3)).map(|_| random.number()).collect();
+            let values = [random.rotation(), random.rotation()];
+            let mut steps = vec![[0.0; 4]; 2 * weights.len() + 1];
+            steps.fill_with(|| random.vector::<4>().map(|c| 0.3 * c));
+            let (place, are_rotations) = (random.below(2), random.below(2));
+            trial.argument(place);
+            trial.global("dispatch", [2, 2 * weights.len() as u32 + are_rotations]);
+            trial.output("smoothed");
+            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
+            let own = (are_rotations == 1, place as usize);
+            trial.expect(pose_smooth::pose(&values, &steps, &weights, own.0, own.1));
+            trial.global("values", values);
+            trial.global("steps", steps);
             trial.global("weights", weights);
         }),
         with_globals("poses_world", "pose", |random, trial| {

@@ -7,6 +7,7 @@ pub(crate) mod convert;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod explain;
+pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
 pub(crate) mod methods;
@@ -14,6 +15,7 @@ pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
 pub(crate) mod render;
+pub(crate) mod smooth;
 pub(crate) mod verify;
 pub(crate) mod view;
 
@@ -25,6 +27,7 @@ use crate::messages::exit::Failure;
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
     Convert(convert::Arguments),
+    Follow(Box<follow::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
@@ -33,6 +36,7 @@ pub(crate) enum Command {
     Plot(Box<plot::Arguments>),
     View(Box<view::Arguments>),
     Render(Box<render::Arguments>),
+    Smooth(Box<smooth::Arguments>),
     Bench(bench::Arguments),
     Check(check::Arguments),
     Explain(explain::Arguments),
@@ -46,6 +50,7 @@ impl Command {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
+            Self::Follow(arguments) => follow::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),
@@ -54,6 +59,7 @@ impl Command {
             Self::Plot(arguments) => plot::run(&arguments),
             Self::View(arguments) => view::run(&arguments),
             Self::Render(arguments) => render::run(&arguments),
+            Self::Smooth(arguments) => smooth::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),

@@ -1,0 +1,235 @@
+//! `tumble smooth`: motion without its noise.
+
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use tumble::{
+    Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, Smoothing,
+    SmoothingEnds, SmoothingKernel, Vectors,
+};
+use tumble_formats::format::ResultShape;
+use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::npy::ComponentOrder;
+use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
+
+use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::input::{self, Inputs};
+use crate::arguments::results::{Results, each_file};
+use crate::batch::output::Target;
+use crate::batch::room;
+use crate::batch::run::Evaluated;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+/// Smooth rotations and translations by a kernel over samples
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Kernels act on the steps from sample to sample, so that still tracks keep their bits and even
+motion stays: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
+deviation), savitzky-golay:RADIUS:ORDER. Samples are the keys where these are evenly spaced, else
+--fps says how to sample. NPY and CSV hold the rotations, motion files everything.
+
+Examples:
+  tumble smooth walk.dat --kernel gaussian:2 -o out.npy
+  tumble smooth walk.bvh --kernel savitzky-golay:4:3 -o smooth.bvh
+  tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    results: Results,
+    /// The weights: linear, cubic, box:S, tent:S, gaussian:S or savitzky-golay:RADIUS:ORDER
+    #[arg(short, long, value_name = "KERNEL", default_value = "gaussian:2")]
+    kernel: SmoothingKernel,
+    /// How often
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    passes: u32,
+    /// What lies beyond the first and the last sample
+    #[arg(long, value_name = "ENDS", default_value = "keep")]
+    ends: EndsArgument,
+    /// Sample at this rate first [default: the keys themselves]
+    #[arg(long, value_name = "FPS")]
+    fps: Option<FrameRate>,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum EndsArgument {
+    /// the end samples stay
+    Keep,
+    /// cubic: the end samples go to the parabola through the next three
+    Parabolic,
+    /// the last sample repeats the first
+    Loop,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let smoothing = Smoothing {
+        kernel: arguments.kernel,
+        ends: match arguments.ends {
+            EndsArgument::Keep => SmoothingEnds::Keep,
+            EndsArgument::Parabolic => SmoothingEnds::Parabolic,
+            EndsArgument::Loop => SmoothingEnds::Loop,
+        },
+        passes: arguments.passes,
+    };
+    smoothing
+        .check()
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let files = arguments.inputs.gather(false)?;
+    let plan = arguments.results.plan(&files)?;
+    let mut device = arguments.device.open()?;
+    let options = format!(
+        "smooth {smoothing:?} {:?} {:?}",
+        arguments.fps, arguments.inputs.reading
+    );
+    arguments.results.make(
+        &arguments.inputs,
+        &files,
+        plan,
+        options,
+        |path, loaded, target, done| {
+            let mut make = |name: &str, clips: &[&Motion], target: &Target| {
+                let started = Instant::now();
+                let samples = clips
+                    .iter()
+                    .map(|clip| smoothed(&mut device, name, clip, &smoothing, arguments.fps))
+                    .collect::<Result<Vec<_>, Failure>>()?;
+                let written = write(name, clips, &samples, &smoothing, target)?;
+                let times = samples.iter().map(|own| own.0.times.len()).sum();
+                let told = format!(
+                    "{name}: {}, {}, on {} in {} → {target}",
+                    words::count(times, "sample"),
+                    smoothing.kernel,
+                    device.label,
+                    words::duration(started.elapsed()),
+                );
+                Ok(Evaluated {
+                    written,
+                    device: device.label.clone(),
+                    told,
+                })
+            };
+            each_file(&input::name(path), (path, loaded), target, done, &mut make)
+        },
+    )
+}
+
+/// How far steps of time may differ, as a part of a step.
+const EVEN: f64 = 1e-3;
+
+/// The times of the keys, if all tracks have the same and these are evenly spaced.
+fn even_times(clip: &Motion) -> Option<Vec<f64>> {
+    let longest = clip.set.tracks().max_by_key(|track| track.times.len())?;
+    let times = longest.times;
+    let fits = |own: &[f64]| own == times || own.len() == 1;
+    let channels = [tumble::Channel::Translation, tumble::Channel::Scale];
+    let vectors = (0..clip.set.track_count())
+        .flat_map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
+    let all = clip.set.tracks().all(|track| fits(track.times))
+        && vectors.flatten().all(|keys| fits(keys.times));
+    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+    let (least, most) = (
+        steps().fold(f64::INFINITY, f64::min),
+        steps().fold(0.0, f64::max),
+    );
+    (all && (times.len() < 2 || most - least <= EVEN * most)).then(|| times.to_vec())
+}
+
+/// A clip's samples, smoothed, and the rate that they are frames of.
+fn smoothed(
+    device: &mut Opened,
+    name: &str,
+    clip: &Motion,
+    smoothing: &Smoothing,
+    fps: Option<FrameRate>,
+) -> Result<(Samples, Option<FrameRate>), Failure> {
+    let (frames, rate) = match fps {
+        Some(rate) => (Frames::rate(rate), Some(rate)),
+        None => match even_times(clip) {
+            Some(times) => (Frames::at(times), clip.rate),
+            None => {
+                let message = format!(
+                    "{name}: the keys are not evenly spaced, or not at the same times in all tracks; give --fps"
+                );
+                return Err(Failure::new(ALL_INPUTS, message));
+            }
+        },
+    };
+    room::in_memory(name, &clip.set, &frames, 6)?;
+    let methods = ChannelMethods {
+        method: None,
+        with: &|method: Method| Interpolation::from(method),
+    };
+    let tracks = clip.set.track_count();
+    let work = |engine: &Engine| {
+        let mut samples = methods.sample(engine, clip, &frames)?;
+        let layout = Layout::FrameMajor;
+        if let Some(own) = Rotations::of(&samples.rotations, tracks, layout) {
+            samples.rotations = engine.smooth(&own, smoothing)?.as_quats().to_vec();
+        }
+        continue_signs(&mut samples.rotations, tracks);
+        if let Some(own) = Vectors::of(&samples.translations, tracks, layout) {
+            let moved = engine.smooth_vectors(&own, smoothing)?;
+            samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
+        }
+        Ok::<_, Error>(samples)
+    };
+    let samples = device
+        .work(work)
+        .map_err(|error| Failure::evaluating(name, &error))?;
+    Ok((samples, rate))
+}
+
+/// Writes rotations as they come, or clips as a motion file.
+fn write(
+    name: &str,
+    clips: &[&Motion],
+    samples: &[(Samples, Option<FrameRate>)],
+    smoothing: &Smoothing,
+    target: &Target,
+) -> Result<crate::batch::place::Written, Failure> {
+    let notes = [
+        ("kernel", smoothing.kernel.to_string()),
+        ("input", name.to_owned()),
+    ];
+    let format = target.format();
+    if let ([clip], [(own, _)], Some(_)) = (clips, samples, &format.write) {
+        let tracks = clip.set.track_count();
+        let timeline = Frames::at(own.times.clone())
+            .resolve(tracks, None)
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let shape = ResultShape {
+            name,
+            set: &clip.set,
+            timeline: &timeline,
+            layout: Layout::TrackMajor,
+            order: ComponentOrder::Xyzw,
+            encoding: tumble::Encoding::F32,
+            notes: &notes,
+        };
+        let layout = target.results()?.layout.unwrap_or(Layout::TrackMajor);
+        let count = own.times.len();
+        let from = |place: usize| match layout {
+            Layout::FrameMajor => place,
+            Layout::TrackMajor => (place % count) * tracks + place / count,
+        };
+        let rotations: Vec<_> = (0..own.rotations.len())
+            .map(|place| own.rotations[from(place)])
+            .collect();
+        return target.write_whole(&ResultShape { layout, ..shape }, &rotations);
+    }
+    let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
+        .map(|(clip, (own, rate))| own.of(clip, *rate, &notes))
+        .collect();
+    let options = target.motion_options();
+    let Some(write) = format.write_motion else {
+        let message = format!(
+            "{target}: {} holds one animation; choose one with --animation",
+            format.name
+        );
+        return Err(Failure::usage(message));
+    };
+    target.write_motion(|out| write(&sampled, &options, out))
+}

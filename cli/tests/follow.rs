@@ -1,0 +1,292 @@
+//! `tumble follow` and `tumble smooth`, run as people run them.
+
+use std::fs;
+use std::path::Path;
+
+use crate::program::{run, sample_folder, succeed};
+use glam::{Quat, Vec3};
+use tumble::{
+    Device, Engine, Follow, Frames, Layout, PathSpeed, Smoothing, TrackSet, VectorMethod, method,
+};
+
+const WAY: &str =
+    "t,x,y,z,ux,uy,uz\n0,0,0,0,,,\n1,1,2,0,,,\n2.5,3,3,1,,,\n3,4,1,2,,,\n4.5,6,0,0,0,1,0\n";
+
+fn set() -> TrackSet {
+    let points = [[0, 0, 0], [1, 2, 0], [3, 3, 1], [4, 1, 2], [6, 0, 0]];
+    let points = points.map(|point| Vec3::from_array(point.map(|c| c as f32)));
+    let mut ups = [None; 5];
+    ups[4] = Some(Vec3::Y);
+    let mut set = TrackSet::new();
+    set.push_path("way", &[0.0, 1.0, 2.5, 3.0, 4.5], &points, &ups)
+        .unwrap();
+    set
+}
+
+fn place() -> tempfile::TempDir {
+    let place = sample_folder();
+    fs::create_dir(place.path().join("paths")).unwrap();
+    fs::write(place.path().join("way.csv"), WAY).unwrap();
+    fs::write(place.path().join("paths/a.csv"), WAY).unwrap();
+    fs::write(place.path().join("paths/b.csv"), "x,y,z\n0,0,0\n1,0,0\n").unwrap();
+    place
+}
+
+fn numbers(file: &Path) -> (Vec<u64>, Vec<f32>) {
+    let bytes = fs::read(file).unwrap();
+    let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+    (file.shape().to_vec(), file.into_vec::<f32>().unwrap())
+}
+
+#[test]
+fn results_are_the_library_s_bits() {
+    let place = place();
+    let line = [
+        "follow",
+        "way.csv",
+        "--fps",
+        "60",
+        "-m",
+        "c2",
+        "--speed",
+        "eased:0.2,0.3",
+        "--forward",
+        "-x",
+        "--upward",
+        "z",
+        "-o",
+        "out.npy",
+    ];
+    succeed(place.path(), &line);
+    let (shape, found) = numbers(&place.path().join("out.npy"));
+    assert_eq!(shape, [271, 1, 7]);
+    let follow = Follow {
+        method: VectorMethod::C2,
+        speed: PathSpeed::Eased {
+            start: 0.2,
+            end: 0.3,
+        },
+        axes: ["-x".parse().unwrap(), "z".parse().unwrap()],
+        ..Follow::default()
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let expected = engine
+        .follow(&set(), &follow, &Frames::fps(60), Layout::FrameMajor)
+        .unwrap();
+    for (sample, row) in found.chunks(7).enumerate() {
+        let own = expected.positions.get(0, sample).unwrap();
+        let turn = expected.rotations.get(0, sample).unwrap();
+        let all = [own.to_array().to_vec(), turn.to_array().to_vec()].concat();
+        assert_eq!(
+            row.iter().map(|c| c.to_bits()).collect::<Vec<_>>(),
+            all.iter().map(|c| c.to_bits()).collect::<Vec<_>>()
+        );
+    }
+}
+
+#[test]
+fn other_formats_hold_the_same_poses() {
+    let place = place();
+    succeed(
+        place.path(),
+        &["follow", "way.csv", "--fps", "2", "-o", "out.csv"],
+    );
+    let text = fs::read_to_string(place.path().join("out.csv")).unwrap();
+    let mut lines = text.lines();
+    let header = "frame,time,way.px,way.py,way.pz,way.x,way.y,way.z,way.w";
+    assert_eq!(lines.next(), Some(header));
+    assert!(lines.nth(2).unwrap().starts_with("2,1,1,2,0,"));
+    succeed(
+        place.path(),
+        &["follow", "way.csv", "--fps", "2", "-o", "out.glb"],
+    );
+    succeed(
+        place.path(),
+        &[
+            "eval",
+            "out.glb",
+            "--fps",
+            "2",
+            "--output",
+            "world",
+            "-o",
+            "again.npy",
+        ],
+    );
+    succeed(
+        place.path(),
+        &["follow", "way.csv", "--fps", "2", "-o", "out.npy"],
+    );
+    let (_, own) = numbers(&place.path().join("out.npy"));
+    let (shape, again) = numbers(&place.path().join("again.npy"));
+    assert_eq!(shape, [10, 1, 7]);
+    for (own, again) in own.chunks(7).zip(again.chunks(7)) {
+        let places = [own, again].map(|row| Vec3::from_slice(row));
+        assert!((places[0] - places[1]).length() < 1e-6);
+        let turns = [own, again].map(|row| Quat::from_slice(&row[3..]));
+        assert!(turns[0].dot(turns[1]).abs() > 1.0 - 1e-6);
+    }
+}
+
+#[test]
+fn paths_of_a_directory_get_a_file_each() {
+    let place = place();
+    // b.csv has no times, and the batch goes on.
+    let some = run(
+        place.path(),
+        &["follow", "paths", "-o", "poses", "--overwrite"],
+    );
+    assert_eq!(some.code, 3, "{}", some.words);
+    assert!(
+        some.words.contains("b.csv") && some.words.contains("--seconds"),
+        "{}",
+        some.words
+    );
+    assert!(place.path().join("poses/a.npy").exists());
+    assert!(!place.path().join("poses/b.npy").exists());
+    succeed(
+        place.path(),
+        &[
+            "follow",
+            "paths/b.csv",
+            "--rate",
+            "0.5",
+            "--fps",
+            "1",
+            "-o",
+            "b.npy",
+        ],
+    );
+    let (shape, _) = numbers(&place.path().join("b.npy"));
+    assert_eq!(shape, [3, 1, 7]);
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused() {
+    let place = place();
+    let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    write("none.csv", "t,x,y,z\n");
+    write("one.csv", "t,x,y,z\n0,1,2,3\n");
+    write("still.csv", "t,x,y,z\n0,1,2,3\n1,1,2,3\n");
+    write("nan.csv", "t,x,y,z\n0,1,nan,3\n");
+    write("order.csv", "t,x,y,z\n1,1,2,3\n1,2,2,3\n");
+    write("up.csv", "t,x,y,z,ux,uy,uz\n0,1,2,3,0,0,0\n");
+    write(
+        "turn.csv",
+        "t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,0,-1,0\n",
+    );
+    let refused = |code: i32, words: &str, line: &[&str]| {
+        let all = [&["follow", "-o", "out.npy"], line].concat();
+        let run = run(place.path(), &all);
+        assert_eq!(run.code, code, "{line:?}: {}", run.words);
+        assert!(run.words.contains(words), "{line:?}: {}", run.words);
+        assert!(!place.path().join("out.npy").exists(), "{line:?}");
+    };
+    refused(4, "no point", &["none.csv"]);
+    refused(4, "nan.csv:2", &["nan.csv"]);
+    refused(4, "is not after", &["order.csv"]);
+    refused(4, "no length", &["up.csv"]);
+    refused(4, "--seconds or --rate", &["paths/b.csv"]);
+    refused(4, "leave out", &["way.csv", "--seconds", "2"]);
+    refused(4, "loop", &["way.csv", "--ends", "loop"]);
+    refused(4, "ahead", &["way.csv", "--direction", "ahead:0"]);
+    refused(4, "at most 1", &["way.csv", "--speed", "eased:0.6,0.5"]);
+    refused(4, "length", &["way.csv", "--up", "0,0,0"]);
+    refused(
+        4,
+        "upward directions at its keys",
+        &["way.csv", "--frame", "fixed"],
+    );
+    refused(
+        4,
+        "faces along the path",
+        &["one.csv", "--frame", "frenet", "--direction", "ahead:1"],
+    );
+    refused(2, "no track", &["way.csv", "--direction", "at:nobody"]);
+    refused(2, "--direction", &["way.csv", "--direction", "sideways"]);
+    refused(2, "--seconds", &["paths/b.csv", "--seconds", "0"]);
+    refused(4, "axes", &["way.csv", "--forward", "y"]);
+    for (name, words) in [
+        ("one", "stands still"),
+        ("still", "stands still"),
+        ("turn", "180°"),
+    ] {
+        let out = format!("{name}.npy");
+        let run = succeed(
+            place.path(),
+            &["follow", &format!("{name}.csv"), "-o", &out],
+        );
+        assert!(run.words.contains(words), "{name}: {}", run.words);
+    }
+}
+
+#[test]
+fn smoothed_keys_are_the_library_s() {
+    let place = place();
+    succeed(
+        place.path(),
+        &[
+            "smooth", "a.dat", "--kernel", "tent:2", "--passes", "2", "-o", "out.npy",
+        ],
+    );
+    let (shape, found) = numbers(&place.path().join("out.npy"));
+    assert_eq!(shape, [2, 5, 4]);
+    let (times, keys) = crate::program::pendulum();
+    let set = TrackSet::with_shared_times(&times, &keys).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let frames = Frames::at(times);
+    let given = engine
+        .evaluate(&set, method::BESSEL_OVERHAUSER, &frames)
+        .unwrap();
+    let smoothing = Smoothing {
+        passes: 2,
+        ..Smoothing::new("tent:2".parse().unwrap())
+    };
+    let expected = engine.smooth(&given, &smoothing).unwrap();
+    for (found, expected) in found.chunks(4).zip(expected.as_quats()) {
+        assert!(Quat::from_slice(found).dot(*expected).abs() > 1.0 - 1e-6);
+    }
+    succeed(
+        place.path(),
+        &["smooth", "a.dat", "-o", "out.glb", "--fps", "30"],
+    );
+    assert!(place.path().join("out.glb").exists());
+}
+
+#[test]
+fn what_cannot_be_smoothed_is_refused() {
+    let place = place();
+    fs::write(
+        place.path().join("uneven.dat"),
+        "# 1 1\n0 1 0 0 0\n1 1 0 0 0\n3 1 0 0 0\n",
+    )
+    .unwrap();
+    for (code, words, line) in [
+        (4, "--fps", &["uneven.dat"][..]),
+        (2, "above 0", &["a.dat", "--kernel", "box:0"]),
+        (2, "order", &["a.dat", "--kernel", "savitzky-golay:2:5"]),
+        (2, "kernel", &["a.dat", "--kernel", "median:3"]),
+        (
+            2,
+            "parabolic",
+            &["a.dat", "--kernel", "linear", "--ends", "parabolic"],
+        ),
+    ] {
+        let all = [&["smooth", "-o", "out.npy"], line].concat();
+        let run = run(place.path(), &all);
+        assert_eq!(run.code, code, "{line:?}: {}", run.words);
+        assert!(run.words.contains(words), "{line:?}: {}", run.words);
+    }
+    // A kernel that is wider than the track is none the worse for it.
+    succeed(
+        place.path(),
+        &[
+            "smooth",
+            "a.dat",
+            "--kernel",
+            "gaussian:30",
+            "-o",
+            "wide.npy",
+        ],
+    );
+}

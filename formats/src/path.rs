@@ -1,0 +1,379 @@
+//! Paths that bodies follow: points in CSV with the header `[t,]x,y,z[,ux,uy,uz]`, or in NPY of shape
+//! (tracks, points, 3).
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use tumble::TrackSet;
+
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::format::ReadOptions;
+use crate::source::Source;
+use crate::text::number;
+
+/// The duration of paths whose file has no times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// From the first point to the last, seconds. Each point is passed when this part of the way
+    /// along the straight lines between the points is covered.
+    Seconds(f64),
+    /// The way along these lines that is covered in a second.
+    Rate(f64),
+}
+
+/// The points of one path.
+#[derive(Debug, Clone, Default)]
+struct Points {
+    /// Empty if the file has none.
+    times: Vec<f64>,
+    points: Vec<Vec3>,
+    ups: Vec<Option<Vec3>>,
+    /// The lines of the points in text.
+    lines: Vec<u64>,
+}
+
+/// Reads the paths of a file into a set, a track each, named `name`; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_paths(
+    path: &Path,
+    name: &str,
+    pace: Option<Pace>,
+    options: &ReadOptions,
+) -> Result<TrackSet, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let file = source.name.clone();
+    read_paths(&file, name, &source.into_bytes(options.limits.file)?, pace)
+}
+
+/// Reads the bytes of a file; `file` is what messages call it, `name` what the tracks are called.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn read_paths(
+    file: &str,
+    name: &str,
+    bytes: &[u8],
+    pace: Option<Pace>,
+) -> Result<TrackSet, Diagnostic> {
+    let paths = match bytes.starts_with(b"\x93NUMPY") {
+        true => of_array(file, bytes)?,
+        false => vec![of_text(file, bytes)?],
+    };
+    let mut set = TrackSet::new();
+    let several = paths.len() > 1;
+    for (place, mut path) in paths.into_iter().enumerate() {
+        path.give_times(file, pace)?;
+        let own = if several {
+            format!("{name}{place}")
+        } else {
+            name.to_owned()
+        };
+        let pushed = set.push_path(&own, &path.times, &path.points, &path.ups);
+        pushed.map_err(|error| Diagnostic::new(file, Code::Path, error.to_string()))?;
+    }
+    Ok(set)
+}
+
+/// Columns by their names, of which those of `t` and of the ups may be missing.
+const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
+
+fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
+    let refuse = |line: u64, code, message: String| {
+        let mut fault = Diagnostic::new(file, code, message);
+        fault.place = Some(Place::Text { line, column: 1 });
+        fault
+    };
+    let text = std::str::from_utf8(bytes)
+        .map_err(|_| Diagnostic::new(file, Code::Encoding, "this is not UTF-8; save it as text"))?;
+    let text = text.trim_start_matches('\u{feff}');
+    let mut reader = ::csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(::csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let mut record = ::csv::StringRecord::new();
+    let mut next = |record: &mut ::csv::StringRecord| {
+        let read = reader.read_record(record);
+        read.map_err(|error| Diagnostic::new(file, Code::Path, error.to_string()))
+    };
+    if !next(&mut record)? {
+        return Err(Diagnostic::new(
+            file,
+            Code::Empty,
+            "the file is empty; it begins with `t,x,y,z`",
+        ));
+    }
+    let names: Vec<String> = record.iter().map(str::to_lowercase).collect();
+    let column = |name: &str| {
+        names
+            .iter()
+            .position(|own| own == name || name == "t" && own == "time")
+    };
+    let places = NAMES.map(column);
+    let known = places.iter().flatten().count();
+    let has = |range: std::ops::Range<usize>| places[range].iter().flatten().count();
+    if has(1..4) < 3 || !matches!(has(4..7), 0 | 3) || known != names.len() {
+        let message = format!(
+            "the header is `{}`; a path has t,x,y,z,ux,uy,uz, of which t and ux,uy,uz may be missing",
+            names.join(",")
+        );
+        return Err(refuse(1, Code::Path, message));
+    }
+    let mut path = Points::default();
+    while next(&mut record)? {
+        let line = record.position().map_or(0, ::csv::Position::line);
+        if record.len() != names.len() {
+            let message = format!(
+                "{} cells where the header has {}",
+                record.len(),
+                names.len()
+            );
+            return Err(refuse(line, Code::Columns, message));
+        }
+        let number = |place: usize| -> Result<f64, Diagnostic> {
+            let cell = places[place]
+                .and_then(|column| record.get(column))
+                .unwrap_or_default();
+            let read = number::parse(cell);
+            read.map(|own| own.value)
+                .map_err(|(code, message)| refuse(line, code, message))
+        };
+        if places[0].is_some() {
+            let time = number(0)?;
+            if let Some(&before) = path.times.last()
+                && time <= before
+            {
+                let message = format!("the time {time} is not after {before}");
+                return Err(refuse(line, Code::TimeNotIncreasing, message));
+            }
+            path.times.push(time);
+        }
+        let vector = |from: usize| -> Result<DVec3, Diagnostic> {
+            Ok(DVec3::new(
+                number(from)?,
+                number(from + 1)?,
+                number(from + 2)?,
+            ))
+        };
+        path.points.push(vector(1)?.as_vec3());
+        let is_blank = |place: &Option<usize>| {
+            place
+                .and_then(|column| record.get(column))
+                .is_none_or(str::is_empty)
+        };
+        let up = match places[4..7].iter().all(is_blank) {
+            true => None,
+            false => Some(vector(4)?.as_vec3()),
+        };
+        if up.is_some_and(|up| up.as_dvec3().length() == 0.0) {
+            let message = "the upward direction has no length; leave its cells blank".to_owned();
+            return Err(refuse(line, Code::Path, message));
+        }
+        path.ups.push(up);
+        path.lines.push(line);
+    }
+    if path.points.is_empty() {
+        return Err(refuse(
+            1,
+            Code::NoKeys,
+            "there is no point behind the header".to_owned(),
+        ));
+    }
+    Ok(path)
+}
+
+fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
+    let refuse = |code, message: String| Diagnostic::new(file, code, message);
+    let array =
+        npyz::NpyFile::new(bytes).map_err(|error| refuse(Code::ArrayHeader, error.to_string()))?;
+    let shape = array.shape().to_vec();
+    let [tracks, points, 3] = shape[..] else {
+        let message = format!("the array has the shape {shape:?}; paths have (tracks, points, 3)");
+        return Err(refuse(Code::Shape, message));
+    };
+    let count = tracks
+        .checked_mul(points)
+        .and_then(|count| count.checked_mul(3));
+    if array.order() != npyz::Order::C {
+        return Err(refuse(
+            Code::Shape,
+            "the array is in Fortran's order; save it in C's".to_owned(),
+        ));
+    }
+    if count.is_none_or(|count| count > bytes.len() as u64) {
+        let message = format!("the file has not the bytes of an array of the shape {shape:?}");
+        return Err(refuse(Code::ArraySize, message));
+    }
+    if tracks == 0 || points == 0 {
+        return Err(refuse(
+            Code::NoKeys,
+            "there is no point in the array".to_owned(),
+        ));
+    }
+    let size = |error: std::io::Error| refuse(Code::ArraySize, error.to_string());
+    let numbers: Vec<f64> = match array.dtype().descr().trim_matches(['\'', '"']) {
+        "<f8" | "=f8" | ">f8" => array.into_vec::<f64>().map_err(size)?,
+        "<f4" | "=f4" | ">f4" => array
+            .into_vec::<f32>()
+            .map_err(size)?
+            .into_iter()
+            .map(f64::from)
+            .collect(),
+        other => {
+            let message = format!("the array is of {other}; points are f4 or f8");
+            return Err(refuse(Code::ElementType, message));
+        }
+    };
+    let of_track = |(track, own): (usize, &[f64])| -> Result<Points, Diagnostic> {
+        let points = own
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(|&point| DVec3::from_array(point).as_vec3());
+        let points: Vec<Vec3> = points.collect();
+        match points.iter().position(|point| !point.is_finite()) {
+            Some(point) => {
+                let message = "a coordinate is not a finite f32".to_owned();
+                Err(refuse(Code::NotFinite, message).inside(format!("[{track}, {point}]")))
+            }
+            None => Ok(Points {
+                points,
+                ..Points::default()
+            }),
+        }
+    };
+    numbers
+        .chunks(points as usize * 3)
+        .enumerate()
+        .map(of_track)
+        .collect()
+}
+
+impl Points {
+    /// Gives points without times the times at which a body passes them. Of points that repeat the
+    /// one before, that one stays.
+    fn give_times(&mut self, file: &str, pace: Option<Pace>) -> Result<(), Diagnostic> {
+        let refuse = |message: &str| Err(Diagnostic::new(file, Code::PathTimes, message));
+        let has_times = !self.times.is_empty();
+        let Some(pace) = pace else {
+            return match has_times {
+                true => Ok(()),
+                false => refuse("the path has no times; give --seconds or --rate"),
+            };
+        };
+        if has_times {
+            return refuse("the path has times of its own; leave out --seconds and --rate");
+        }
+        let given = std::mem::take(self);
+        let mut way = 0.0;
+        for (i, &point) in given.points.iter().enumerate() {
+            if let Some(before) = self.points.last() {
+                let step = (point.as_dvec3() - before.as_dvec3()).length();
+                if way + step <= way {
+                    continue;
+                }
+                way += step;
+            }
+            self.times.push(way);
+            self.points.push(point);
+            if !given.ups.is_empty() {
+                self.ups.push(given.ups[i]);
+            }
+        }
+        let second = match pace {
+            Pace::Seconds(seconds) => way / seconds,
+            Pace::Rate(rate) => rate,
+        };
+        for time in self.times.iter_mut().skip(1) {
+            *time /= second;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tumble::Channel;
+
+    fn read(text: &str, pace: Option<Pace>) -> Result<TrackSet, Diagnostic> {
+        read_paths("way.csv", "way", text.as_bytes(), pace)
+    }
+
+    #[test]
+    fn points_with_times_and_ups_are_read() {
+        let set = read("t,x,y,z,ux,uy,uz\n0,1,2,3,,,\n0.5,2,2,3,0,1,0\n", None).unwrap();
+        let path = set.vector_keys(Channel::Translation, 0).unwrap();
+        assert_eq!(path.times, [0.0, 0.5]);
+        assert_eq!(
+            path.keys,
+            [Vec3::new(1.0, 2.0, 3.0), Vec3::new(2.0, 2.0, 3.0)]
+        );
+        assert_eq!(set.track_name(0), "way");
+    }
+
+    #[test]
+    fn paths_without_times_get_them_by_their_length() {
+        let text = "x,y,z\n0,0,0\n1,0,0\n1,0,0\n1,3,0\n";
+        let times = |pace| {
+            let set = read(text, Some(pace)).unwrap();
+            set.vector_keys(Channel::Translation, 0)
+                .unwrap()
+                .times
+                .to_vec()
+        };
+        assert_eq!(times(Pace::Seconds(8.0)), [0.0, 2.0, 8.0]);
+        assert_eq!(times(Pace::Rate(2.0)), [0.0, 0.5, 2.0]);
+    }
+
+    #[test]
+    fn what_is_no_path_is_refused() {
+        let code = |text: &str, pace| read(text, pace).unwrap_err().code;
+        assert_eq!(code("", None), Code::Empty);
+        assert_eq!(code("t,x,y,z\n", None), Code::NoKeys);
+        assert_eq!(code("t,x,y\n0,0,0\n", None), Code::Path);
+        assert_eq!(code("t,x,y,z,w\n0,0,0,0,0\n", None), Code::Path);
+        assert_eq!(code("t,x,y,z\n0,0,0\n", None), Code::Columns);
+        assert_eq!(code("t,x,y,z\n0,0,NaN,0\n", None), Code::NotFinite);
+        assert_eq!(
+            code("t,x,y,z\n0,0,0,0\n0,1,0,0\n", None),
+            Code::TimeNotIncreasing
+        );
+        assert_eq!(code("t,x,y,z,ux,uy,uz\n0,0,0,0,0,0,0\n", None), Code::Path);
+        assert_eq!(code("x,y,z\n0,0,0\n", None), Code::PathTimes);
+        assert_eq!(
+            code("t,x,y,z\n0,0,0,0\n", Some(Pace::Rate(1.0))),
+            Code::PathTimes
+        );
+    }
+
+    #[test]
+    fn arrays_are_read_and_checked() {
+        use npyz::WriterBuilder;
+        let array = |shape: &[u64], numbers: &[f32]| {
+            let mut bytes = Vec::new();
+            let options = npyz::WriteOptions::<f32>::new()
+                .default_dtype()
+                .shape(shape);
+            let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
+            writer.extend(numbers.iter().copied()).unwrap();
+            writer.finish().unwrap();
+            bytes
+        };
+        let numbers: Vec<f32> = (0..12u8).map(f32::from).collect();
+        let pace = Some(Pace::Seconds(1.0));
+        let set = read_paths("a.npy", "a", &array(&[2, 2, 3], &numbers), pace).unwrap();
+        assert_eq!((set.track_count(), set.track_name(1)), (2, "a1"));
+        let refused = |bytes: &[u8]| read_paths("a.npy", "a", bytes, pace).unwrap_err().code;
+        assert_eq!(refused(&array(&[2, 3, 2], &numbers)), Code::Shape);
+        assert_eq!(refused(&array(&[0, 2, 3], &[])), Code::NoKeys);
+        let whole = array(&[2, 2, 3], &numbers);
+        assert_eq!(refused(&whole[..whole.len() - 4]), Code::ArraySize);
+        assert_eq!(
+            refused(&array(&[1, 1, 3], &[0.0, f32::NAN, 0.0])),
+            Code::NotFinite
+        );
+    }
+}

@@ -1,0 +1,303 @@
+//! The curves of translations and scales: a Hermite cubic in each component for each key interval.
+
+use glam::DVec3;
+
+use crate::curve::options::Ends;
+use crate::math::quaternion::ratio;
+use crate::method::b_spline;
+use crate::method::vector_method::VectorMethod;
+use crate::tracks::vectors::VectorTrack;
+
+/// A cubic by its ends and its slopes there, per unit of a parameter that goes from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Cubic {
+    pub(crate) start: DVec3,
+    pub(crate) leaving: DVec3,
+    pub(crate) arriving: DVec3,
+    pub(crate) end: DVec3,
+}
+
+impl Cubic {
+    /// Stands still.
+    pub(crate) fn still(at: DVec3) -> Self {
+        Self {
+            start: at,
+            leaving: DVec3::ZERO,
+            arriving: DVec3::ZERO,
+            end: at,
+        }
+    }
+
+    /// The coefficients of 1, t, t², t³.
+    pub(crate) fn powers(&self) -> [DVec3; 4] {
+        let rise = self.end - self.start;
+        [
+            self.start,
+            self.leaving,
+            rise * 3.0 - self.leaving * 2.0 - self.arriving,
+            self.leaving + self.arriving - rise * 2.0,
+        ]
+    }
+
+    fn from_powers([c0, c1, c2, c3]: [DVec3; 4]) -> Self {
+        Self {
+            start: c0,
+            leaving: c1,
+            arriving: c1 + c2 * 2.0 + c3 * 3.0,
+            end: c0 + c1 + c2 + c3,
+        }
+    }
+}
+
+/// The curves of a track's intervals.
+pub(crate) struct Curves<'a> {
+    track: &'a VectorTrack,
+    method: VectorMethod,
+    ends: Ends,
+    /// The slopes at all keys, units per second, if they depend on all keys.
+    slopes: Vec<DVec3>,
+}
+
+impl<'a> Curves<'a> {
+    pub(crate) fn new(track: &'a VectorTrack, method: VectorMethod, ends: Ends) -> Self {
+        let mut own = Self {
+            track,
+            method,
+            ends,
+            slopes: Vec::new(),
+        };
+        if method == VectorMethod::C2 && track.keys.len() > 2 {
+            own.slopes = own.c2_slopes();
+        }
+        own
+    }
+
+    /// Whether the curve passes through its keys.
+    pub(crate) fn meets_keys(&self) -> bool {
+        self.method != VectorMethod::BSpline
+    }
+
+    /// Whether an interval is held at its first key.
+    pub(crate) fn is_held(&self, i: usize) -> bool {
+        let last = self.track.keys.len() - 1;
+        let at_end = last > 1 && (i == 0 || i + 1 == last);
+        let is_frozen = self.ends == Ends::Frozen && self.use_neighbours() && at_end;
+        self.method == VectorMethod::Step || is_frozen
+    }
+
+    fn use_neighbours(&self) -> bool {
+        use VectorMethod::{BSpline, BesselOverhauser, C2, CatmullRom};
+        matches!(self.method, CatmullRom | BesselOverhauser | C2 | BSpline)
+    }
+
+    fn key(&self, i: usize) -> DVec3 {
+        self.track.keys[i].as_dvec3()
+    }
+
+    fn rise(&self, i: usize) -> DVec3 {
+        self.key(i + 1) - self.key(i)
+    }
+
+    fn duration(&self, i: usize) -> f64 {
+        self.track.times[i + 1] - self.track.times[i]
+    }
+
+    fn secant(&self, i: usize) -> DVec3 {
+        self.rise(i) * ratio(1.0, self.duration(i))
+    }
+
+    /// The curve of an interval.
+    pub(crate) fn of(&self, i: usize) -> Cubic {
+        if self.is_held(i) {
+            return Cubic::still(self.key(i));
+        }
+        if self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
+            return self.b_spline(i);
+        }
+        let [leaving, arriving] = self.slopes_of(i);
+        Cubic {
+            start: self.key(i),
+            leaving,
+            arriving,
+            end: self.key(i + 1),
+        }
+    }
+
+    /// The slopes of interval `i` at its first and its last key, per unit of its parameter.
+    fn slopes_of(&self, i: usize) -> [DVec3; 2] {
+        let last = self.track.keys.len() - 2;
+        let (rise, duration) = (self.rise(i), self.duration(i));
+        if self.method == VectorMethod::GltfCubic {
+            let tangent = |key: usize, side: usize| match self.track.tangents.get(key) {
+                Some(both) => both[side].as_dvec3() * duration,
+                None => DVec3::ZERO,
+            };
+            return [tangent(i, 1), tangent(i + 1, 0)];
+        }
+        if !self.use_neighbours() || last == 0 {
+            return [rise; 2];
+        }
+        if let [first, second, ..] = self.slopes.get(i..).unwrap_or_default() {
+            return [*first * duration, *second * duration];
+        }
+        let closed = self.ends == Ends::Loop;
+        let before = i.checked_sub(1).or(closed.then_some(last));
+        let after = (i < last).then_some(i + 1).or(closed.then_some(0));
+        let leaving = before.map(|before| self.at_key(before, i, duration));
+        let arriving = after.map(|after| self.at_key(i, after, duration));
+        match (leaving, arriving) {
+            (None, Some(arriving)) => [self.at_end(rise, arriving), arriving],
+            (Some(leaving), None) => [leaving, self.at_end(rise, leaving)],
+            (leaving, arriving) => [leaving.unwrap_or(rise), arriving.unwrap_or(rise)],
+        }
+    }
+
+    /// The slope at the key between two intervals, per unit of the parameter of an interval that
+    /// lasts `duration` seconds.
+    fn at_key(&self, before: usize, after: usize, duration: f64) -> DVec3 {
+        let (left, right) = (self.rise(before), self.rise(after));
+        if self.method == VectorMethod::CatmullRom {
+            return (left + right) * 0.5;
+        }
+        let (h, next_h) = (self.duration(before), self.duration(after));
+        let rate = (left * ratio(next_h, h) + right * ratio(h, next_h)) * ratio(1.0, h + next_h);
+        rate * duration
+    }
+
+    fn at_end(&self, rise: DVec3, other: DVec3) -> DVec3 {
+        match self.ends {
+            Ends::Natural => rise * 1.5 - other * 0.5,
+            Ends::Clamped { .. } => DVec3::ZERO,
+            Ends::Secant => rise,
+            Ends::Parabolic | Ends::Loop | Ends::Frozen => rise * 2.0 - other,
+        }
+    }
+
+    /// The slopes at the keys, units per second, with which the second derivative is continuous:
+    /// `r v₋ + 2 v + l v₊ = 3 (r d₋ + l d₊)` at each inner key, with the parts l and r that the
+    /// intervals before and after it are of both, and their secants d.
+    fn c2_slopes(&self) -> Vec<DVec3> {
+        let last = self.track.keys.len() - 1;
+        // The equation at the key between two intervals: below, diagonal, above, right side.
+        let inner = |before: usize, after: usize| {
+            let (h, next_h) = (self.duration(before), self.duration(after));
+            let (l, r) = (ratio(h, h + next_h), ratio(next_h, h + next_h));
+            let side = (self.secant(before) * r + self.secant(after) * l) * 3.0;
+            Equation([r, 2.0, l], side)
+        };
+        let mut equations: Vec<Equation> = (1..last).map(|i| inner(i - 1, i)).collect();
+        if self.ends == Ends::Loop {
+            equations.insert(0, inner(last - 1, 0));
+            return cyclic(equations);
+        }
+        let at_end = |secant: DVec3| match self.ends {
+            Ends::Natural => (2.0, 1.0, secant * 3.0),
+            Ends::Secant => (1.0, 0.0, secant),
+            Ends::Clamped { .. } => (1.0, 0.0, DVec3::ZERO),
+            Ends::Parabolic | Ends::Loop | Ends::Frozen => (1.0, 1.0, secant * 2.0),
+        };
+        let (own, next, side) = at_end(self.secant(0));
+        equations.insert(0, Equation([0.0, own, next], side));
+        let (own, next, side) = at_end(self.secant(last - 1));
+        equations.push(Equation([next, own, 0.0], side));
+        solved(&equations)
+    }
+
+    /// Interval `i` of the cubic B-spline in cumulative form, as it is for rotations: the basis and
+    /// the steps beyond the ends are the same, with sums in the place of products.
+    fn b_spline(&self, i: usize) -> Cubic {
+        let last = self.track.keys.len() - 2;
+        let closed = self.ends == Ends::Loop;
+        let own = self.rise(i);
+        let basis = b_spline::basis(b_spline::neighbours(&self.track.times, i, closed));
+        let [
+            [_, slope1, ..],
+            [_, slope2, bend2, cube2],
+            [_, _, _, value3],
+        ] = basis;
+        let before = match i.checked_sub(1).or(closed.then_some(last)) {
+            Some(before) => self.rise(before),
+            None => match self.ends {
+                Ends::Natural => own * (bend2 / slope1),
+                Ends::Clamped { .. } => own * (-slope2 / slope1),
+                Ends::Secant => own * ((1.0 - slope2) / slope1),
+                _ => self.extrapolated(i, i + 1),
+            },
+        };
+        let after = match (i < last).then_some(i + 1).or(closed.then_some(0)) {
+            Some(after) => self.rise(after),
+            None => {
+                let slope3 = 3.0 * value3;
+                let own_slope = slope2 + 2.0 * bend2 + 3.0 * cube2;
+                match self.ends {
+                    Ends::Natural => own * (-(bend2 + 3.0 * cube2) / slope3),
+                    Ends::Clamped { .. } => own * (-own_slope / slope3),
+                    Ends::Secant => own * ((1.0 - own_slope) / slope3),
+                    _ => self.extrapolated(i, i - 1),
+                }
+            }
+        };
+        let mut powers = [DVec3::ZERO; 4];
+        for (weights, step) in basis.iter().zip([before, own, after]) {
+            for (power, weight) in powers.iter_mut().zip(weights) {
+                *power += step * *weight;
+            }
+        }
+        powers[0] += self.key(i) - before;
+        Cubic::from_powers(powers)
+    }
+
+    /// One more step of the parabola through the three keys at an end.
+    fn extrapolated(&self, own: usize, next: usize) -> DVec3 {
+        let (h, next_h) = (self.duration(own), self.duration(next));
+        let change = self.rise(next) * ratio(h, next_h) - self.rise(own);
+        self.rise(own) - change * (2.0 / (1.0 + ratio(next_h, h)))
+    }
+}
+
+/// One of a system of equations: the coefficients of the unknowns before its own, its own and after
+/// it, and the right side.
+#[derive(Clone, Copy)]
+struct Equation([f64; 3], DVec3);
+
+/// Solves a system without the corners, by elimination from the first equation on.
+fn solved(equations: &[Equation]) -> Vec<DVec3> {
+    let mut above = Vec::with_capacity(equations.len());
+    let mut values: Vec<DVec3> = Vec::with_capacity(equations.len());
+    for &Equation([below, own, next], side) in equations {
+        let (factor, value) = match (above.last(), values.last()) {
+            (Some(&before), Some(&value)) => (own - below * before, side - value * below),
+            _ => (own, side),
+        };
+        above.push(next / factor);
+        values.push(value / factor);
+    }
+    for i in (1..values.len()).rev() {
+        let after = values[i];
+        values[i - 1] -= after * above[i - 1];
+    }
+    values
+}
+
+/// Solves a system whose first equation follows its last, and repeats the first unknown at the end
+/// (Sherman and Morrison 1950).
+fn cyclic(mut equations: Vec<Equation>) -> Vec<DVec3> {
+    let last = equations.len() - 1;
+    let (corner, other) = (equations[0].0[0], equations[last].0[2]);
+    let gamma = -equations[0].0[1];
+    equations[0].0[1] -= gamma;
+    equations[last].0[1] -= other * corner / gamma;
+    let values = solved(&equations);
+    for equation in &mut equations {
+        equation.1 = DVec3::ZERO;
+    }
+    equations[0].1 = DVec3::splat(gamma);
+    equations[last].1 += DVec3::splat(other);
+    let share = solved(&equations);
+    let ratio = corner / gamma;
+    let factor = (values[0] + values[last] * ratio) / (1.0 + share[0].x + share[last].x * ratio);
+    let of = |(value, share): (&DVec3, &DVec3)| *value - factor * share.x;
+    let mut all: Vec<DVec3> = values.iter().zip(&share).map(of).collect();
+    all.push(all[0]);
+    all
+}

@@ -1,0 +1,375 @@
+//! The rotations of a body along its path.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::path::carry::{Piece, about_z, around_corner, carry, least_turn, rotation};
+use crate::path::options::{Follow, FollowWarning, Frame, Twist};
+use crate::path::polynomial::Polynomial;
+use crate::path::rolls::{Rolls, is_half_turn, unwrapped, wrapped};
+use crate::path::route::{Heading, Route, Stretch, signed};
+
+/// What gives the rotations of a stretch.
+enum Turn {
+    /// A carried frame with its pieces, and the place of the rolls added to it.
+    Carried(Vec<Piece>, usize),
+    /// The x axis is this polynomial's direction. Within the given distance of the upward direction
+    /// it has none, and the axis before is kept.
+    Fixed(Option<Polynomial>, DVec3),
+    /// The x axis is this polynomial's direction: `P' × P''`, its zeros divided out.
+    Frenet(Polynomial),
+}
+
+/// The rotations along a path.
+pub(crate) struct Frames {
+    pub(crate) route: Route,
+    pub(crate) stretches: Vec<Stretch>,
+    turns: Vec<Turn>,
+    rolls: Vec<Rolls>,
+    up: DVec3,
+    body: DQuat,
+}
+
+/// The path bows less than this many steps of f32 where it counts as straight: the keys' rounding
+/// alone would give it a normal.
+const STRAIGHT: f64 = 4.0 * f32::EPSILON as f64;
+
+/// The sine of the angle to the upward direction below which a fixed frame keeps its x axis.
+const UPRIGHT: f64 = 1e-6;
+
+/// `P' × P''` below this part of its largest coefficient vanishes: about the rounding of f32 keys.
+const INFLECTED: f64 = 1e-7;
+
+impl Frames {
+    /// The rotations of a body on the `track`th path, which has upward directions at some keys.
+    pub(crate) fn new(
+        route: Route,
+        stretches: Vec<Stretch>,
+        follow: &Follow,
+        ups: &[Option<DVec3>],
+        track: usize,
+        warnings: &mut Vec<FollowWarning>,
+    ) -> Self {
+        let mut own = Self {
+            route,
+            stretches,
+            turns: Vec::new(),
+            rolls: Vec::new(),
+            up: follow.up.normalize(),
+            body: follow.body(),
+        };
+        let mut left_over = 0.0;
+        match follow.frame {
+            Frame::Fixed => own.fix(),
+            Frame::Minimal => left_over = own.carry_all(follow, ups),
+            Frame::Frenet => own.frenet(),
+        }
+        if is_half_turn(left_over) && left_over != 0.0 {
+            warnings.push(FollowWarning::HalfTurn { track });
+        }
+        own
+    }
+
+    /// The rotation on a stretch.
+    pub(crate) fn rotation(&self, stretch: usize, t: f64) -> DQuat {
+        self.unturned(stretch, t) * self.body
+    }
+
+    /// The rotation from z forward, y up.
+    fn unturned(&self, stretch: usize, t: f64) -> DQuat {
+        let own = &self.stretches[stretch];
+        let way = own.way(&self.route, t)[0];
+        match &self.turns[stretch] {
+            Turn::Carried(pieces, rolls) => {
+                let carried = rotation(&self.route, own, pieces, t);
+                let rolls = &self.rolls[*rolls];
+                let roll = match rolls.are_spread() {
+                    true => rolls.at(self.route.lengths.at(own.interval, t)),
+                    false => rolls.at(0.0),
+                };
+                if roll == 0.0 {
+                    carried
+                } else {
+                    carried * about_z(roll)
+                }
+            }
+            Turn::Fixed(x, kept) => {
+                let is_upright = self.up.cross(way).length() < UPRIGHT;
+                let near_start = t - own.from < own.to - t || x.is_none();
+                let side = match x {
+                    _ if is_upright && near_start => *kept,
+                    Some(x) => x.at(t),
+                    None => self.up.cross(way),
+                };
+                of_axes(side, way)
+            }
+            Turn::Frenet(x) => of_axes(x.at(t), way),
+        }
+    }
+
+    /// Makes the y axis as near to the upward direction as it can be.
+    fn fix(&mut self) {
+        let up = self.up;
+        let mut kept = DVec3::ZERO;
+        let mut turns = Vec::with_capacity(self.stretches.len());
+        let mut cut = Vec::with_capacity(self.stretches.len());
+        for own in std::mem::take(&mut self.stretches) {
+            let Heading::Polynomial(way) = &own.heading else {
+                let start = own.way(&self.route, own.from)[0];
+                if kept == DVec3::ZERO {
+                    kept = first_side(up, start);
+                }
+                turns.push(Turn::Fixed(None, kept));
+                kept = side_at(up, own.way(&self.route, own.to)[0], kept);
+                cut.push(own);
+                continue;
+            };
+            let side = way.map(|c| up.cross(c));
+            let tolerance = UPRIGHT * way.size();
+            let is_upright = side.size() <= tolerance;
+            let divided = match is_upright {
+                true => (Vec::new(), side),
+                false => side.without_zeros(tolerance),
+            };
+            let within = |&zero: &f64| zero > own.from && zero < own.to;
+            let mut places: Vec<f64> = divided.0.iter().copied().filter(within).collect();
+            places.extend([own.from, own.to]);
+            places.sort_by(f64::total_cmp);
+            places.dedup();
+            for pair in places.windows(2) {
+                let (from, to) = (pair[0], pair[1]);
+                let part = Stretch {
+                    from,
+                    to,
+                    ..own.clone()
+                };
+                if kept == DVec3::ZERO {
+                    kept = first_side(up, part.way(&self.route, from)[0]);
+                }
+                let x = (!is_upright).then(|| signed(&divided, 0.5 * (from + to)));
+                let end = part.way(&self.route, to)[0];
+                turns.push(Turn::Fixed(x, kept));
+                kept = match x {
+                    Some(x) => across(x.at(to), end),
+                    None => side_at(up, end, kept),
+                };
+                cut.push(part);
+            }
+        }
+        (self.stretches, self.turns) = (cut, turns);
+    }
+
+    /// Carries a frame along the whole path, and spreads what given upward directions and the end of
+    /// a closed path leave over. Returns the largest such angle.
+    fn carry_all(&mut self, follow: &Follow, ups: &[Option<DVec3>]) -> f64 {
+        let given = |key: usize| ups.get(key).copied().flatten();
+        let start = self.stretches[0].way(&self.route, self.stretches[0].from)[0];
+        let first = first_rotation(given(0).unwrap_or(self.up), start);
+        let intervals = self.route.curves.len();
+        let starts: Vec<usize> = (0..intervals)
+            .map(|interval| {
+                self.stretches
+                    .partition_point(|own| own.interval < interval)
+            })
+            .collect();
+        self.rolls.push(Rolls::default());
+        let mut points = vec![(0.0, 0.0)];
+        let mut most = 0.0f64;
+        let mut at_end = first;
+        let mut give = |points: &mut Vec<(f64, f64)>, length: f64, own: DQuat, wanted: DQuat| {
+            let angle = about_forward(own, wanted);
+            let near = points[points.len() - 1].1;
+            let angle = unwrapped(angle, near);
+            most = most.max(wrapped(angle - near).abs());
+            points.push((length, angle));
+        };
+        for stretch in 0..self.stretches.len() {
+            let way = self.stretches[stretch].way(&self.route, self.stretches[stretch].from)[0];
+            if stretch > 0 {
+                let before = &self.stretches[stretch - 1];
+                at_end = around_corner(at_end, before.way(&self.route, before.to)[0], way);
+            }
+            let interval = self.stretches[stretch].interval;
+            if stretch > 0
+                && starts[interval] == stretch
+                && let Some(up) = given(interval)
+            {
+                let length = self.route.lengths.of(interval)[0];
+                give(&mut points, length, at_end, first_rotation(up, way));
+            }
+            at_end = self.carry_one(stretch, at_end, 0);
+        }
+        let last = &self.stretches[self.stretches.len() - 1];
+        let way = last.way(&self.route, last.to)[0];
+        if let Some(up) = given(intervals) {
+            give(
+                &mut points,
+                self.route.lengths.total(),
+                at_end,
+                first_rotation(up, way),
+            );
+        }
+        if follow.is_closed() && follow.twist == Twist::Spread {
+            let arrived = around_corner(at_end, way, start);
+            give(&mut points, self.route.lengths.total(), arrived, first);
+        }
+        self.rolls[0] = Rolls::through(&points);
+        most
+    }
+
+    /// Carries a rotation along a stretch, to which some rolls are added; returns it at the end.
+    fn carry_one(&mut self, stretch: usize, start: DQuat, rolls: usize) -> DQuat {
+        let (pieces, end) = carry(&self.route, &self.stretches[stretch], start);
+        self.turns.push(Turn::Carried(pieces, rolls));
+        end
+    }
+
+    /// Frenet's frame, its half turns undone. Straight parts are carried, and turned evenly from the
+    /// frame before to the nearer of the two after.
+    fn frenet(&mut self) {
+        let normals: Vec<Option<Polynomial>> = (self.stretches.iter())
+            .map(|own| self.normal(own))
+            .collect();
+        let mut before: Option<DQuat> = None;
+        let mut stretch = 0;
+        while stretch < self.stretches.len() {
+            if let Some(mut normal) = normals[stretch] {
+                let [from, to] = self.ends(stretch);
+                let start = of_axes(normal.at(self.stretches[stretch].from), from);
+                if let Some(before) = before
+                    && (start * DVec3::Y).dot(before * DVec3::Y) < 0.0
+                {
+                    normal = normal.map(|c| -c);
+                }
+                self.turns.push(Turn::Frenet(normal));
+                before = Some(of_axes(normal.at(self.stretches[stretch].to), to));
+                stretch += 1;
+                continue;
+            }
+            let run = (stretch..self.stretches.len()).take_while(|&own| normals[own].is_none());
+            let end = stretch + run.count();
+            let mut rotation = match before {
+                Some(before) => {
+                    around_corner(before, self.ends(stretch - 1)[1], self.ends(stretch)[0])
+                }
+                None => first_rotation(self.up, self.ends(stretch)[0]),
+            };
+            let rolls = self.rolls.len();
+            self.rolls.push(Rolls::default());
+            let lengths = &self.route.lengths;
+            let [first, last] = [(stretch, false), (end - 1, true)].map(|(own, at_end)| {
+                let own = &self.stretches[own];
+                lengths.at(own.interval, if at_end { own.to } else { own.from })
+            });
+            for own in stretch..end {
+                if own > stretch {
+                    rotation = around_corner(rotation, self.ends(own - 1)[1], self.ends(own)[0]);
+                }
+                rotation = self.carry_one(own, rotation, rolls);
+            }
+            if let Some(Some(next)) = normals.get(end) {
+                let [way, _] = self.ends(end);
+                let arrived = around_corner(rotation, self.ends(end - 1)[1], way);
+                let wanted = of_axes(next.at(self.stretches[end].from), way);
+                let angle = about_forward(arrived, wanted);
+                let points = match before {
+                    // Half a turn is repaired, so that at most a quarter is left.
+                    Some(_) => {
+                        let half = std::f64::consts::PI;
+                        let nearer = angle - half * (angle / half).round();
+                        vec![(first, 0.0), (last, nearer)]
+                    }
+                    None => vec![(first, angle)],
+                };
+                self.rolls[rolls] = Rolls::through(&points);
+                rotation = rotation * about_z(points[points.len() - 1].1);
+            }
+            before = Some(rotation);
+            stretch = end;
+        }
+    }
+
+    /// The directions at both ends of a stretch.
+    fn ends(&self, stretch: usize) -> [DVec3; 2] {
+        let own = &self.stretches[stretch];
+        [own.from, own.to].map(|t| own.way(&self.route, t)[0])
+    }
+
+    /// `P' × P''` on a stretch, with the sign that it has at the start; `None` where it is straight.
+    fn normal(&self, own: &Stretch) -> Option<Polynomial> {
+        let curve = &self.route.curves[own.interval];
+        let start = curve.at(own.from);
+        let offsets: [DVec3; 8] = std::array::from_fn(|i| {
+            curve.at(own.from + (own.to - own.from) * (i + 1) as f64 / 8.0) - start
+        });
+        // The line to the farthest point: the ends of a curve that comes back may be one point.
+        let farthest = |a: &&DVec3, b: &&DVec3| a.length().total_cmp(&b.length());
+        let line = offsets
+            .iter()
+            .max_by(farthest)
+            .map_or(DVec3::ZERO, |far| far.normalize_or_zero());
+        let off = |offset: &DVec3| (offset - line * line.dot(*offset)).length();
+        let bow = offsets.iter().map(off).fold(0.0, f64::max);
+        let far = self.route.far;
+        if matches!(own.heading, Heading::Still(_)) || bow < STRAIGHT * far {
+            return None;
+        }
+        let normal = Polynomial::binormal(curve);
+        if normal.size() == 0.0 {
+            return None;
+        }
+        let divided = normal.without_zeros(INFLECTED * normal.size());
+        let start = own.from + 1e-9 * (own.to - own.from);
+        Some(signed(&divided, start))
+    }
+}
+
+/// The rotation that takes z to a direction and x as near as possible to a side.
+fn of_axes(side: DVec3, way: DVec3) -> DQuat {
+    let side = across(side, way);
+    DQuat::from_mat3(&DMat3::from_cols(side, way.cross(side), way)).normalize()
+}
+
+/// The part of a vector across a direction, of unit length.
+fn across(vector: DVec3, way: DVec3) -> DVec3 {
+    (vector - way * way.dot(vector)).normalize_or(way.any_orthonormal_vector())
+}
+
+/// The x axis of a fixed frame, or the one before where it has none.
+fn side_at(up: DVec3, way: DVec3, kept: DVec3) -> DVec3 {
+    let side = up.cross(way);
+    if side.length() < UPRIGHT {
+        across(kept, way)
+    } else {
+        side.normalize()
+    }
+}
+
+/// The first x axis: `up × way`, with another direction in the place of `up` where both are one.
+fn first_side(up: DVec3, way: DVec3) -> DVec3 {
+    let up = up.normalize();
+    let side = up.cross(way);
+    if side.length() >= UPRIGHT {
+        return side.normalize();
+    }
+    let [x, y, z] = way.abs().to_array();
+    let axis = if x <= y && x <= z {
+        DVec3::X
+    } else if y <= z {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    axis.cross(way).normalize()
+}
+
+/// The first rotation, with the y axis as near as possible to `up`.
+fn first_rotation(up: DVec3, way: DVec3) -> DQuat {
+    of_axes(first_side(up, way), way)
+}
+
+/// The angle about z of the step between two rotations that face the same way.
+fn about_forward(from: DQuat, to: DQuat) -> f64 {
+    let ways = [from, to].map(|rotation| rotation * DVec3::Z);
+    let step = (least_turn(ways[0], ways[1]) * from).conjugate() * to;
+    wrapped(2.0 * libm::atan2(step.z, step.w))
+}

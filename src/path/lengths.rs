@@ -1,0 +1,152 @@
+//! Lengths along a path, by which bodies travel at a given speed and look ahead.
+
+use crate::path::polynomial::Polynomial;
+
+/// Lengths along the intervals of a path.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lengths {
+    /// Of each interval: parameters in order, with the length from the path's start up to each.
+    marks: Vec<Vec<(f64, f64)>>,
+    /// The slopes of each interval's curve.
+    slopes: Vec<Polynomial>,
+}
+
+/// Each interval has this many marks, and one where it stops.
+const PARTS: usize = 8;
+
+/// Points and weights of Gauss-Legendre quadrature on [-1, 1], exact for polynomials of degree 9.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// The most halvings of a quadrature.
+const FINEST: u32 = 24;
+
+impl Lengths {
+    /// The lengths of curves with these slopes, which vanish at these parameters: their speed has a
+    /// corner there.
+    pub(crate) fn new(slopes: Vec<Polynomial>, stops: &[Vec<f64>]) -> Self {
+        let mut own = Self {
+            marks: Vec::with_capacity(slopes.len()),
+            slopes,
+        };
+        let mut total = 0.0;
+        for (slope, stops) in own.slopes.iter().zip(stops) {
+            let even = (1..=PARTS).map(|part| part as f64 / PARTS as f64);
+            let mut places: Vec<f64> = even.chain(stops.iter().copied()).collect();
+            places.sort_by(f64::total_cmp);
+            let mut marks = vec![(0.0, total)];
+            let mut from = 0.0;
+            for to in places {
+                if to > from {
+                    total += between(slope, from, to);
+                    marks.push((to, total));
+                    from = to;
+                }
+            }
+            own.marks.push(marks);
+        }
+        own
+    }
+
+    /// The length of the whole path.
+    pub(crate) fn total(&self) -> f64 {
+        self.marks
+            .last()
+            .map_or(0.0, |marks| marks[marks.len() - 1].1)
+    }
+
+    /// The lengths at an interval's start and end.
+    pub(crate) fn of(&self, interval: usize) -> [f64; 2] {
+        let marks = &self.marks[interval];
+        [marks[0].1, marks[marks.len() - 1].1]
+    }
+
+    /// The length up to a place.
+    pub(crate) fn at(&self, interval: usize, t: f64) -> f64 {
+        let marks = &self.marks[interval];
+        let after = marks.partition_point(|mark| mark.0 <= t).max(1);
+        let (from, length) = marks[after - 1];
+        length + between(&self.slopes[interval], from, t)
+    }
+
+    /// The interval in which a length is reached; the last one that has a length if it is beyond.
+    pub(crate) fn interval(&self, length: f64) -> usize {
+        let after = self.marks.partition_point(|marks| marks[0].1 <= length);
+        let mut own = after.saturating_sub(1);
+        while own > 0 && self.of(own)[0] == self.of(own)[1] {
+            own -= 1;
+        }
+        own
+    }
+
+    /// The parameter of an interval where a length is reached: Newton's method, or bisection where
+    /// that leaves the part which contains it.
+    pub(crate) fn parameter(&self, interval: usize, length: f64) -> f64 {
+        let marks = &self.marks[interval];
+        let after = marks.partition_point(|mark| mark.1 <= length);
+        if after == 0 || after == marks.len() {
+            return if after == 0 { 0.0 } else { 1.0 };
+        }
+        let (from, before) = marks[after - 1];
+        let (to, end) = marks[after];
+        let slope = &self.slopes[interval];
+        let (mut low, mut high) = (from, to);
+        let mut t = from + (to - from) * ((length - before) / (end - before));
+        let mut excess = before + between(slope, from, t) - length;
+        for _ in 0..60 {
+            if excess > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let newton = t - excess / slope.at(t).length().max(1e-300);
+            let next = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
+            let step = next - t;
+            if step.abs() <= 1e-15 {
+                return next;
+            }
+            excess += if step.abs() < 1e-3 * (to - from) {
+                // One quadrature is exact enough for a short step.
+                gauss(slope, t, next)
+            } else if step > 0.0 {
+                between(slope, t, next)
+            } else {
+                -between(slope, next, t)
+            };
+            t = next;
+        }
+        t
+    }
+}
+
+/// The length between two parameters: the interval is halved until both halves together agree with
+/// the whole.
+fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
+    refined(slope, from, to, gauss(slope, from, to), FINEST)
+}
+
+fn refined(slope: &Polynomial, from: f64, to: f64, whole: f64, halvings: u32) -> f64 {
+    let middle = 0.5 * (from + to);
+    let halves = [gauss(slope, from, middle), gauss(slope, middle, to)];
+    let sum = halves[0] + halves[1];
+    if halvings == 0 || (sum - whole).abs() <= 1e-14 * slope.size() {
+        return sum;
+    }
+    refined(slope, from, middle, halves[0], halvings - 1)
+        + refined(slope, middle, to, halves[1], halvings - 1)
+}
+
+fn gauss(slope: &Polynomial, from: f64, to: f64) -> f64 {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let speed = |&(at, weight): &(f64, f64)| weight * slope.at(middle + half * at).length();
+    half * GAUSS.iter().map(speed).sum::<f64>()
+}

@@ -1,0 +1,259 @@
+//! How bodies follow paths: the options, and what can be wrong with them or with a path.
+
+use glam::{DQuat, DVec3};
+
+use crate::curve::options::Ends;
+use crate::method::vector_method::VectorMethod;
+
+/// How the bodies of a set follow their paths, which are the tracks' translations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Follow {
+    /// The curve through the points.
+    pub method: VectorMethod,
+    /// Its ends. With [`Ends::Loop`] the path is closed: its last point repeats the first, and so
+    /// does its last pose.
+    pub ends: Ends,
+    /// Which way a body faces.
+    pub direction: Direction,
+    /// How it is turned about its direction.
+    pub frame: Frame,
+    /// The upward direction: at the start for [`Frame::Minimal`], everywhere for [`Frame::Fixed`].
+    pub up: DVec3,
+    /// What becomes of the turn that a closed path leaves over.
+    pub twist: Twist,
+    /// When a body is where.
+    pub speed: PathSpeed,
+    /// The axis of the body that faces forward, and the one that faces up.
+    pub axes: [BodyAxis; 2],
+}
+
+impl Default for Follow {
+    /// Along the tangent of a Bessel-Overhauser curve, without a turn about it, as keyed, with z
+    /// forward and y up.
+    fn default() -> Self {
+        Self {
+            method: VectorMethod::BesselOverhauser,
+            ends: Ends::Parabolic,
+            direction: Direction::Tangent,
+            frame: Frame::Minimal,
+            up: DVec3::Y,
+            twist: Twist::Spread,
+            speed: PathSpeed::Keys,
+            axes: [BodyAxis(2, 1.0), BodyAxis(1, 1.0)],
+        }
+    }
+}
+
+/// Which way a body on a path faces. One that stands still keeps its last direction, at the start
+/// the first to come.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Direction {
+    /// Along the path.
+    #[default]
+    Tangent,
+    /// To the point this far ahead along the path; beyond an open path's end straight on.
+    Ahead(f64),
+    /// To a point.
+    Point(DVec3),
+    /// To the body on a track of the set, which itself faces along its path.
+    Track(usize),
+}
+
+/// How a body is turned about its direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Frame {
+    /// It never turns about its direction (Bishop 1975; Wang et al. 2008).
+    #[default]
+    Minimal,
+    /// Its upward axis is as near to the upward direction as it can be.
+    Fixed,
+    /// As the path's principal normal has it, without its half turns: they are undone where the
+    /// path has an inflection and where its second derivative jumps.
+    Frenet,
+}
+
+/// What becomes of the angle by which a minimal frame is off after one round of a closed path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Twist {
+    /// It is spread evenly over the path, so that the last pose is the first.
+    #[default]
+    Spread,
+    /// It stays.
+    Free,
+}
+
+/// When a body is where on its path.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum PathSpeed {
+    /// As the key times say.
+    #[default]
+    Keys,
+    /// At one speed from the first key time to the last.
+    Constant,
+    /// From rest to rest: the speed grows over the first part of the time and falls over the last
+    /// (smoothstep), and is constant between.
+    Eased {
+        /// The part of the time in which the speed grows.
+        start: f64,
+        /// The part of the time in which it falls; both parts together are at most 1.
+        end: f64,
+    },
+}
+
+/// An axis of a body: x, y or z (0, 1 or 2) and its sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyAxis(pub(crate) usize, pub(crate) f64);
+
+impl std::str::FromStr for BodyAxis {
+    type Err = FollowError;
+
+    fn from_str(name: &str) -> Result<Self, FollowError> {
+        let (sign, letter) = match name.strip_prefix('-') {
+            Some(letter) => (-1.0, letter),
+            None => (1.0, name.strip_prefix('+').unwrap_or(name)),
+        };
+        let axis = ["x", "y", "z"].iter().position(|own| *own == letter);
+        axis.map(|axis| Self(axis, sign)).ok_or(FollowError::Axes)
+    }
+}
+
+impl BodyAxis {
+    fn vector(self) -> DVec3 {
+        DVec3::AXES[self.0 % 3] * self.1
+    }
+}
+
+impl Follow {
+    /// Refuses options that mean nothing.
+    pub(crate) fn check(&self) -> Result<(), FollowError> {
+        if !(self.up.is_finite() && self.up.length() > 0.0) {
+            return Err(FollowError::Up { up: self.up });
+        }
+        match self.direction {
+            Direction::Ahead(distance) if !(distance > 0.0 && distance.is_finite()) => {
+                return Err(FollowError::Ahead { distance });
+            }
+            Direction::Point(point) if !point.is_finite() => {
+                return Err(FollowError::Point { point });
+            }
+            Direction::Tangent => {}
+            _ if self.frame == Frame::Frenet => return Err(FollowError::FrenetAside),
+            _ => {}
+        }
+        if let PathSpeed::Eased { start, end } = self.speed {
+            let parts = [start, end].iter().all(|part| (0.0..=1.0).contains(part));
+            if !parts || start + end > 1.0 {
+                return Err(FollowError::Eased { start, end });
+            }
+        }
+        let [forward, up] = self.axes;
+        if forward.0 == up.0 {
+            return Err(FollowError::Axes);
+        }
+        Ok(())
+    }
+
+    /// The rotation from the body's own axes to z forward, y up.
+    pub(crate) fn body(&self) -> DQuat {
+        let [forward, up] = self.axes.map(BodyAxis::vector);
+        let axes = glam::DMat3::from_cols(up.cross(forward), up, forward);
+        DQuat::from_mat3(&axes).conjugate()
+    }
+
+    /// Whether paths are closed.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.ends == Ends::Loop
+    }
+}
+
+/// Why bodies cannot follow as asked. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FollowError {
+    /// The track has no translations.
+    #[error("track {track} has no path; give it translations, or push it as a path")]
+    NoPath {
+        /// The track's place in the set.
+        track: usize,
+    },
+    /// A closed path's ends are apart.
+    #[error(
+        "track {track}: the last point of the loop is {gap:e} from the first, more than a millionth of its size; repeat the first point at the end"
+    )]
+    OpenLoop {
+        /// The track's place in the set.
+        track: usize,
+        /// The distance.
+        gap: f64,
+    },
+    /// No direction.
+    #[error("the upward direction ({}, {}, {}) has no length", up.x, up.y, up.z)]
+    Up {
+        /// What was given.
+        up: DVec3,
+    },
+    /// An upward direction at a key, with a frame that has its own.
+    #[error(
+        "track {track} has upward directions at its keys, which only the minimal frame follows"
+    )]
+    UpsUnused {
+        /// The track's place in the set.
+        track: usize,
+    },
+    /// The distance must be positive.
+    #[error("the body cannot look {distance} ahead; give a distance above 0")]
+    Ahead {
+        /// What was given.
+        distance: f64,
+    },
+    /// The point is not finite.
+    #[error("the body cannot look at ({}, {}, {}); give finite numbers", point.x, point.y, point.z)]
+    Point {
+        /// What was given.
+        point: DVec3,
+    },
+    /// There is no track to look at.
+    #[error("track {track} cannot look at track {target}, which the set has not")]
+    Target {
+        /// The track's place in the set.
+        track: usize,
+        /// The track to look at.
+        target: usize,
+    },
+    /// Frenet's frame belongs to the tangent.
+    #[error("Frenet's frame faces along the path; choose another frame, or the tangent")]
+    FrenetAside,
+    /// The parts must be between 0 and 1, together too.
+    #[error(
+        "speed cannot grow over {start} and fall over {end} of the time; both parts together are at most 1"
+    )]
+    Eased {
+        /// The first part.
+        start: f64,
+        /// The last part.
+        end: f64,
+    },
+    /// Forward and upward must be different axes.
+    #[error("a body's forward and upward axes are two different ones of x, y, z, -x, -y, -z")]
+    Axes,
+}
+
+/// What is unusual about a path that is followed all the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FollowWarning {
+    /// There is no direction.
+    #[error("track {track} stands still; it looks along +z")]
+    StandsStill {
+        /// The track's place in the set.
+        track: usize,
+    },
+    /// Both ways round are equally far.
+    #[error(
+        "track {track}: the turn left over about the path is 180°; it could go either way round"
+    )]
+    HalfTurn {
+        /// The track's place in the set.
+        track: usize,
+    },
+}

@@ -1,0 +1,140 @@
+//! Vectors that are polynomials of degree 3 in a parameter from 0 to 1, and their zeros.
+
+use glam::DVec3;
+
+/// The coefficients of 1, t, t², t³.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Polynomial(pub(crate) [DVec3; 4]);
+
+/// Points in which zeros are looked for between.
+const GRID: u32 = 16;
+
+impl Polynomial {
+    pub(crate) fn at(&self, t: f64) -> DVec3 {
+        let [c0, c1, c2, c3] = self.0;
+        ((c3 * t + c2) * t + c1) * t + c0
+    }
+
+    pub(crate) fn derivative(&self) -> Self {
+        let [_, c1, c2, c3] = self.0;
+        Self([c1, c2 * 2.0, c3 * 3.0, DVec3::ZERO])
+    }
+
+    /// The largest magnitude of a coefficient's component.
+    pub(crate) fn size(&self) -> f64 {
+        let largest = |size: f64, c: &DVec3| size.max(c.abs().max_element());
+        self.0.iter().fold(0.0, largest)
+    }
+
+    pub(crate) fn map(&self, f: impl Fn(DVec3) -> DVec3) -> Self {
+        Self(self.0.map(f))
+    }
+
+    /// The cross product of two polynomials of degree 2 and 1: `P' × P''`, whose terms of degree 3
+    /// vanish.
+    pub(crate) fn binormal(position: &Self) -> Self {
+        let [_, c, b, a] = position.0;
+        let (ab, ca, cb) = (a.cross(b), c.cross(a), c.cross(b));
+        Self([cb * 2.0, ca * 6.0, ab * -6.0, DVec3::ZERO])
+    }
+
+    /// The same divided by `t - zero`.
+    fn divided(&self, zero: f64) -> Self {
+        let [_, c1, c2, c3] = self.0;
+        let q1 = c2 + c3 * zero;
+        Self([c1 + q1 * zero, q1, c3, DVec3::ZERO])
+    }
+
+    /// The zeros from 0 to 1, within a tolerance, and the polynomial divided by all of them: where
+    /// a direction vanishes, this gives the direction on either side of it, but for its sign.
+    pub(crate) fn without_zeros(&self, tolerance: f64) -> (Vec<f64>, Self) {
+        let mut rest = *self;
+        let mut zeros = Vec::new();
+        while zeros.len() < 3 {
+            let Some(zero) = rest.zero(tolerance) else {
+                break;
+            };
+            zeros.push(zero);
+            rest = rest.divided(zero);
+        }
+        (zeros, rest)
+    }
+
+    /// A zero from 0 to 1: the least of the lengths at the ends and where they have a minimum.
+    fn zero(&self, tolerance: f64) -> Option<f64> {
+        // Bernstein's coefficients that all lie on one side of a plane keep the curve there.
+        let [c0, c1, c2, c3] = self.0;
+        let control = [
+            c0,
+            c0 + c1 / 3.0,
+            c0 + (c1 * 2.0 + c2) / 3.0,
+            c0 + c1 + c2 + c3,
+        ];
+        let middle = control.iter().sum::<DVec3>();
+        let far = tolerance * middle.length();
+        if control.iter().all(|point| point.dot(middle) > far) {
+            return None;
+        }
+        let derivative = self.derivative();
+        let rises = |t: f64| self.at(t).dot(derivative.at(t)) > 0.0;
+        let mut best = if self.at(1.0).length() < self.at(0.0).length() {
+            1.0
+        } else {
+            0.0
+        };
+        let mut least = self.at(best).length();
+        let mut before = rises(0.0);
+        for i in 1..=GRID {
+            let [mut low, mut high] = [i - 1, i].map(|i| f64::from(i) / f64::from(GRID));
+            let after = rises(high);
+            if !before && after {
+                while high - low > 1e-16 {
+                    let between = 0.5 * (low + high);
+                    if between <= low || between >= high {
+                        break;
+                    }
+                    if rises(between) {
+                        high = between;
+                    } else {
+                        low = between;
+                    }
+                }
+                if self.at(high).length() < least {
+                    (best, least) = (high, self.at(high).length());
+                }
+            }
+            before = after;
+        }
+        // A zero so near to an end is the end's.
+        let snapped = [0.0, 1.0].into_iter().find(|end| (best - end).abs() < 1e-9);
+        (least <= tolerance).then_some(snapped.unwrap_or(best))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches a zero that is missed, and a rest that is not the direction beside it.
+    #[test]
+    fn zeros_are_divided_out() {
+        let way = Polynomial([DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);
+        let times = |p: &Polynomial, zero: f64| {
+            let [c0, c1, c2, _] = p.0;
+            Polynomial([c0 * -zero, c0 - c1 * zero, c1 - c2 * zero, c2])
+        };
+        for zero in [0.0, 0.3, 0.77, 1.0] {
+            let (zeros, rest) = times(&way, zero).without_zeros(1e-12);
+            assert!(
+                zeros.len() == 1 && (zeros[0] - zero).abs() < 1e-9,
+                "{zeros:?}"
+            );
+            assert!((rest.at(0.4) - way.at(0.4)).length() < 1e-9);
+        }
+        let line = Polynomial([DVec3::X, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO]);
+        let twice = times(&times(&line, 0.25), 0.25);
+        let (zeros, _) = twice.without_zeros(1e-12);
+        assert_eq!(zeros.len(), 2, "{zeros:?}");
+        assert!(way.without_zeros(1e-12).0.is_empty());
+    }
+}

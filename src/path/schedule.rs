@@ -1,0 +1,185 @@
+//! When a body is where on its path.
+
+use std::ops::Range;
+
+use crate::path::lengths::Lengths;
+use crate::path::options::PathSpeed;
+
+/// The times of a path's intervals.
+#[derive(Debug, Clone)]
+pub(crate) struct Schedule {
+    speed: PathSpeed,
+    /// The keys' own times, seconds.
+    keys: Vec<f64>,
+}
+
+impl Schedule {
+    pub(crate) fn new(speed: PathSpeed, keys: &[f64]) -> Self {
+        Self {
+            speed,
+            keys: keys.to_vec(),
+        }
+    }
+
+    /// When the path starts and ends.
+    pub(crate) fn span(&self) -> (f64, f64) {
+        (self.keys[0], self.keys[self.keys.len() - 1])
+    }
+
+    /// The time of a place in an interval.
+    pub(crate) fn time(&self, lengths: &Lengths, interval: usize, t: f64) -> f64 {
+        if self.speed == PathSpeed::Keys {
+            let (from, to) = (self.keys[interval], self.keys[interval + 1]);
+            return if t == 1.0 { to } else { from + (to - from) * t };
+        }
+        let (start, end) = self.span();
+        let part = lengths.at(interval, t) / lengths.total();
+        start + (end - start) * self.moment(part.min(1.0))
+    }
+
+    /// The parameter of an interval at a time in it.
+    pub(crate) fn parameter(&self, lengths: &Lengths, interval: usize, time: f64) -> f64 {
+        if self.speed == PathSpeed::Keys {
+            let (from, to) = (self.keys[interval], self.keys[interval + 1]);
+            return ((time - from) / (to - from)).clamp(0.0, 1.0);
+        }
+        lengths.parameter(interval, self.length(lengths, time))
+    }
+
+    /// The interval and its parameter at a time.
+    pub(crate) fn place(&self, lengths: &Lengths, time: f64) -> (usize, f64) {
+        let interval = if self.speed == PathSpeed::Keys {
+            let last = self.keys.len() - 2;
+            let after = self.keys.partition_point(|&key| key <= time);
+            after.saturating_sub(1).min(last)
+        } else {
+            lengths.interval(self.length(lengths, time))
+        };
+        (interval, self.parameter(lengths, interval, time))
+    }
+
+    /// The change of time with an interval's parameter where its curve has this speed.
+    pub(crate) fn slope(&self, lengths: &Lengths, interval: usize, t: f64, speed: f64) -> f64 {
+        let (start, end) = self.span();
+        let pace = |x: f64| match self.speed {
+            PathSpeed::Eased { start, end } => eased_speed(start, end, x),
+            _ => 1.0,
+        };
+        match self.speed {
+            PathSpeed::Keys => self.keys[interval + 1] - self.keys[interval],
+            _ => {
+                let x = self.moment(lengths.at(interval, t) / lengths.total());
+                speed * (end - start) / (lengths.total() * pace(x)).max(1e-300)
+            }
+        }
+    }
+
+    /// The times at which the speed is not smooth, inside of a range.
+    pub(crate) fn joints(&self, times: Range<f64>) -> impl Iterator<Item = f64> {
+        let (from, to) = self.span();
+        let parts = match self.speed {
+            PathSpeed::Eased { start, end } => [start, 1.0 - end],
+            _ => [0.0; 2],
+        };
+        let joints = parts.map(|part| from + (to - from) * part);
+        joints
+            .into_iter()
+            .filter(move |&time| time > times.start && time < times.end)
+    }
+
+    /// The length covered at a time.
+    fn length(&self, lengths: &Lengths, time: f64) -> f64 {
+        let (start, end) = self.span();
+        let x = ((time - start) / (end - start)).clamp(0.0, 1.0);
+        lengths.total()
+            * match self.speed {
+                PathSpeed::Eased { start, end } => eased(start, end, x),
+                _ => x,
+            }
+    }
+
+    /// The part of the time at which a part of the length is covered.
+    fn moment(&self, part: f64) -> f64 {
+        let PathSpeed::Eased { start, end } = self.speed else {
+            return part;
+        };
+        let top = 2.0 / (2.0 - start - end);
+        // In the middle the speed is constant.
+        let x = part / top + 0.5 * start;
+        if x >= start && x <= 1.0 - end {
+            return x;
+        }
+        let (mut low, mut high) = if x < start {
+            (0.0, start)
+        } else {
+            (1.0 - end, 1.0)
+        };
+        // Half of 2^-64 of the time is below the resolution of f64.
+        for _ in 0..64 {
+            let middle = 0.5 * (low + high);
+            if eased(start, end, middle) < part {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+}
+
+/// The part of the length covered at the part `x` of the time: the speed grows as smoothstep over
+/// the part `a` of the time, and falls so over the part `b`.
+fn eased(a: f64, b: f64, x: f64) -> f64 {
+    let top = 2.0 / (2.0 - a - b);
+    let rise = |part: f64, x: f64| {
+        let y = x / part;
+        top * part * (y * y * y * (1.0 - 0.5 * y))
+    };
+    if x < a {
+        rise(a, x)
+    } else if x > 1.0 - b {
+        1.0 - rise(b, 1.0 - x)
+    } else {
+        top * (x - 0.5 * a)
+    }
+}
+
+/// The derivative of [`eased`].
+fn eased_speed(a: f64, b: f64, x: f64) -> f64 {
+    let smooth = |y: f64| y * y * (3.0 - 2.0 * y);
+    let top = 2.0 / (2.0 - a - b);
+    if x < a {
+        top * smooth(x / a)
+    } else if x > 1.0 - b {
+        top * smooth((1.0 - x) / b)
+    } else {
+        top
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eased_speed_and_back() {
+        let speed = PathSpeed::Eased {
+            start: 0.2,
+            end: 0.3,
+        };
+        let schedule = Schedule::new(speed, &[0.0, 1.0]);
+        let expected = [
+            (0.1, 0.025),
+            (0.2, 2.0 / 15.0),
+            (0.5, 8.0 / 15.0),
+            (0.7, 0.8),
+            (0.9, 0.987654321),
+        ];
+        for (x, s) in expected {
+            assert!((eased(0.2, 0.3, x) - s).abs() < 1e-9);
+            assert!((schedule.moment(eased(0.2, 0.3, x)) - x).abs() < 1e-12);
+            let slope = (eased(0.2, 0.3, x + 1e-6) - eased(0.2, 0.3, x - 1e-6)) / 2e-6;
+            assert!((eased_speed(0.2, 0.3, x) - slope).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Bodies that follow the paths of a set.
+
+use crate::clip::Clip;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::uploaded::Uploaded;
+use crate::output::rotations::{Layout, Rotations, Vectors};
+use crate::path::options::{Follow, FollowWarning};
+use crate::path::prepare::PreparedPaths;
+use crate::time::frames::Frames;
+use crate::tracks::set::TrackSet;
+
+/// Where the bodies on a set's paths are at every sample, and how they are turned.
+#[derive(Debug)]
+pub struct Followed {
+    /// Positions.
+    pub positions: Vectors,
+    /// Rotations from the body's axes to the world's.
+    pub rotations: Rotations,
+    /// What is unusual about some paths.
+    pub warnings: Vec<FollowWarning>,
+}
+
+impl Engine {
+    /// Moves a body along the path of every track of a set: its translations, as
+    /// [`TrackSet::push_path`] takes them. On every device the bits are the same.
+    ///
+    /// ```
+    /// use glam::Vec3;
+    /// use tumble::{Device, Engine, Follow, Frames, Layout, TrackSet};
+    /// let mut set = TrackSet::new();
+    /// let points = [Vec3::ZERO, Vec3::new(1.0, 2.0, 0.0), Vec3::new(3.0, 3.0, 1.0)];
+    /// set.push_path("car", &[0.0, 1.0, 2.5], &points, &[])?;
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let frames = Frames::fps(60);
+    /// let found = engine.follow(&set, &Follow::default(), &frames, Layout::TrackMajor)?;
+    /// assert_eq!(found.positions.get(0, 60), Some(points[1]));
+    /// let forward = found.rotations.get(0, 60).unwrap() * Vec3::Z;
+    /// assert!((forward.length() - 1.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When a track has no path or cannot be followed as asked, the frames do not fit the set, or
+    /// the device fails.
+    pub fn follow(
+        &self,
+        set: &TrackSet,
+        follow: &Follow,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Followed, Error> {
+        let group_bytes = self.backend.group_bytes();
+        let prepared = PreparedPaths::new(set, follow, group_bytes)?;
+        let clip = |data| -> Result<Clip, Error> {
+            let uploaded = Uploaded::of_data(&self.backend, data, None)?;
+            Ok(Clip::new(self.clone(), uploaded))
+        };
+        Ok(Followed {
+            positions: clip(prepared.positions)?.samples(frames, layout)?,
+            rotations: clip(prepared.rotations)?.samples(frames, layout)?,
+            warnings: prepared.warnings,
+        })
+    }
+}

@@ -1,0 +1,309 @@
+//! Kernels: symmetric weights of unit sum over neighbouring samples.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How samples are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Smoothing {
+    /// The weights.
+    pub kernel: SmoothingKernel,
+    /// What lies beyond the first and the last sample.
+    pub ends: SmoothingEnds,
+    /// How often.
+    pub passes: u32,
+}
+
+impl Smoothing {
+    /// Once, with ends that stay.
+    #[must_use]
+    pub fn new(kernel: SmoothingKernel) -> Self {
+        Self {
+            kernel,
+            ends: SmoothingEnds::Keep,
+            passes: 1,
+        }
+    }
+}
+
+/// The weights of a sample and its neighbours: a function about the sample, integrated over the cell
+/// of each neighbour, from half a sample before it to half a sample after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SmoothingKernel {
+    /// ¼, ½, ¼.
+    Linear,
+    /// (-1, 4, 6, 4, -1)/12: cubics stay. The second sample from an end is smoothed by the cubic
+    /// through four. With fewer than four samples it is [`SmoothingKernel::Linear`].
+    Cubic,
+    /// Even weights as far as this many samples to either side.
+    Box(f64),
+    /// Weights that fall to 0 this many samples to either side.
+    Tent(f64),
+    /// Gauss' bell with this standard deviation in samples, cut at four of them.
+    Gaussian(f64),
+    /// The polynomial of this order through as many samples to either side, by least squares
+    /// (Savitzky and Golay 1964).
+    SavitzkyGolay {
+        /// Samples to either side.
+        radius: usize,
+        /// The order of the polynomial, at most twice the radius.
+        order: usize,
+    },
+}
+
+/// What lies beyond the first and the last sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum SmoothingEnds {
+    /// The steps mirrored, so that both end samples stay.
+    #[default]
+    Keep,
+    /// As [`SmoothingEnds::Keep`], but the end samples go where the parabola through the next three
+    /// is; for [`SmoothingKernel::Cubic`].
+    Parabolic,
+    /// The samples go round: the last repeats the first.
+    Loop,
+}
+
+/// Why samples cannot be smoothed as asked.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SmoothingError {
+    /// The width must be positive, and not too large.
+    #[error(
+        "a kernel cannot be {width} samples wide; give a width above 0 and up to {MOST_RADIUS}"
+    )]
+    Width {
+        /// What was given.
+        width: f64,
+    },
+    /// The polynomial would pass through all samples, or has no unique one.
+    #[error("a polynomial of order {order} through {radius} samples to either side has no unique least squares; the order is at most {}", 2 * radius)]
+    Order {
+        /// Samples to either side.
+        radius: usize,
+        /// The order.
+        order: usize,
+    },
+    /// Only the cubic kernel has ends of its own.
+    #[error("parabolic ends are the cubic kernel's; keep the ends of others")]
+    Ends,
+    /// No kernel has that name.
+    #[error(
+        "there is no kernel `{name}`; there are linear, cubic, box:S, tent:S, gaussian:S and savitzky-golay:RADIUS:ORDER"
+    )]
+    Unknown {
+        /// The name given.
+        name: String,
+    },
+}
+
+/// The most samples to either side of a kernel.
+const MOST_RADIUS: usize = 1_000_000;
+
+/// The highest order of Savitzky and Golay's polynomials for which f64 is exact enough.
+const MOST_ORDER: usize = 20;
+
+impl Smoothing {
+    /// Refuses what means nothing.
+    ///
+    /// # Errors
+    /// What it is.
+    pub fn check(&self) -> Result<(), SmoothingError> {
+        self.step_weights(usize::MAX).map(drop)
+    }
+
+    /// The weights `b_m` of the steps: `b_m = a_{m+1} + … + a_r` for the weights `a` of samples.
+    pub(crate) fn step_weights(&self, samples: usize) -> Result<Vec<f32>, SmoothingError> {
+        if self.ends == SmoothingEnds::Parabolic && self.kernel != SmoothingKernel::Cubic {
+            return Err(SmoothingError::Ends);
+        }
+        let kernel = match self.kernel {
+            SmoothingKernel::Cubic if samples < 4 => SmoothingKernel::Linear,
+            kernel => kernel,
+        };
+        let weights = kernel.weights()?;
+        let mut sum = 0.0;
+        let mut steps: Vec<f32> = weights[1..]
+            .iter()
+            .rev()
+            .map(|weight| {
+                sum += weight;
+                sum as f32
+            })
+            .collect();
+        steps.reverse();
+        Ok(steps)
+    }
+}
+
+impl SmoothingKernel {
+    /// The weights of a sample and of each neighbour on one side.
+    pub(crate) fn weights(self) -> Result<Vec<f64>, SmoothingError> {
+        let checked = |width: f64| match width > 0.0 && width <= MOST_RADIUS as f64 / 4.0 {
+            true => Ok(width),
+            false => Err(SmoothingError::Width { width }),
+        };
+        let reach = match self {
+            Self::Linear => return Ok(vec![0.5, 0.25]),
+            Self::Cubic => return Ok(vec![6.0, 4.0, -1.0].iter().map(|a| a / 12.0).collect()),
+            Self::SavitzkyGolay { radius, order } => return savitzky_golay(radius, order),
+            Self::Box(half) | Self::Tent(half) => checked(half)?,
+            Self::Gaussian(deviation) => 4.0 * checked(deviation)?,
+        };
+        let last = ((reach + 0.5).ceil() as usize).saturating_sub(1);
+        let cell = |i: usize| self.mass(i as f64 - 0.5, i as f64 + 0.5);
+        let mut weights: Vec<f64> = (0..=last).map(cell).collect();
+        let sum = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
+        for weight in &mut weights {
+            *weight /= sum;
+        }
+        Ok(weights)
+    }
+
+    /// The integral of the kernel's function from one place to another.
+    fn mass(self, from: f64, to: f64) -> f64 {
+        let up_to = |x: f64| match self {
+            Self::Tent(half) => {
+                let y = (x / half).clamp(-1.0, 1.0);
+                y - 0.5 * y * y.abs()
+            }
+            Self::Gaussian(deviation) => {
+                let y = (x / deviation).clamp(-4.0, 4.0);
+                libm::erf(y * std::f64::consts::FRAC_1_SQRT_2)
+            }
+            Self::Box(half) => (x / half).clamp(-1.0, 1.0),
+            _ => 0.0,
+        };
+        up_to(to) - up_to(from)
+    }
+}
+
+/// The weights with which the polynomial's value at the middle follows from the samples: by
+/// polynomials that are orthogonal over the samples (Gram), built by their recurrence.
+fn savitzky_golay(radius: usize, order: usize) -> Result<Vec<f64>, SmoothingError> {
+    if order > 2 * radius || order > MOST_ORDER {
+        return Err(SmoothingError::Order { radius, order });
+    }
+    if radius > MOST_RADIUS {
+        return Err(SmoothingError::Width {
+            width: radius as f64,
+        });
+    }
+    let places: Vec<f64> = (0..=2 * radius).map(|i| i as f64 - radius as f64).collect();
+    let scale = (radius as f64).max(1.0);
+    let mut weights = vec![0.0; 2 * radius + 1];
+    let mut before = vec![0.0; places.len()];
+    let mut own = vec![1.0; places.len()];
+    let mut norm_before = 1.0;
+    for degree in 0..=order {
+        let norm: f64 = own.iter().map(|value| value * value).sum();
+        let at_middle = own[radius];
+        for (weight, value) in weights.iter_mut().zip(&own) {
+            *weight += at_middle * value / norm;
+        }
+        let back = if degree == 0 { 0.0 } else { norm / norm_before };
+        let next = |i: usize| places[i] / scale * own[i] - back * before[i];
+        let next: Vec<f64> = (0..own.len()).map(next).collect();
+        before = std::mem::replace(&mut own, next);
+        norm_before = norm;
+    }
+    Ok(weights.split_off(radius))
+}
+
+impl FromStr for SmoothingKernel {
+    type Err = SmoothingError;
+
+    fn from_str(name: &str) -> Result<Self, SmoothingError> {
+        let unknown = || SmoothingError::Unknown {
+            name: name.to_owned(),
+        };
+        let parts: Vec<&str> = name.split(':').collect();
+        let number = |text: &str| text.parse::<f64>().map_err(|_| unknown());
+        let whole = |text: &str| text.parse::<usize>().map_err(|_| unknown());
+        match parts[..] {
+            ["linear"] => Ok(Self::Linear),
+            ["cubic"] => Ok(Self::Cubic),
+            ["box", half] => Ok(Self::Box(number(half)?)),
+            ["tent", half] => Ok(Self::Tent(number(half)?)),
+            ["gaussian", deviation] => Ok(Self::Gaussian(number(deviation)?)),
+            ["savitzky-golay", radius, order] => Ok(Self::SavitzkyGolay {
+                radius: whole(radius)?,
+                order: whole(order)?,
+            }),
+            _ => Err(unknown()),
+        }
+    }
+}
+
+impl fmt::Display for SmoothingKernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Linear => f.write_str("linear"),
+            Self::Cubic => f.write_str("cubic"),
+            Self::Box(half) => write!(f, "box:{half}"),
+            Self::Tent(half) => write!(f, "tent:{half}"),
+            Self::Gaussian(deviation) => write!(f, "gaussian:{deviation}"),
+            Self::SavitzkyGolay { radius, order } => write!(f, "savitzky-golay:{radius}:{order}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn assert_weights(name: &str, expected: &[f64]) {
+        let weights = name.parse::<SmoothingKernel>().unwrap().weights().unwrap();
+        assert_eq!(weights.len(), expected.len(), "{weights:?}");
+        for (found, expected) in weights.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{weights:?}");
+        }
+    }
+
+    #[test]
+    fn weights_are_integrals_over_cells() {
+        assert_weights("tent:1", &[0.75, 0.125]);
+        assert_weights("tent:2", &[7.0 / 16.0, 0.25, 1.0 / 32.0]);
+        assert_weights("box:2.25", &[2.0 / 9.0, 2.0 / 9.0, 1.0 / 6.0]);
+        assert_weights(
+            "savitzky-golay:2:2",
+            &[17.0 / 35.0, 12.0 / 35.0, -3.0 / 35.0],
+        );
+    }
+
+    /// A tent over cells of the values 2, -1 and 3, at places in the middle one.
+    #[test]
+    fn a_tent_between_samples() {
+        let tent = SmoothingKernel::Tent(1.0);
+        let at = |x: f64| {
+            let cells = [(2.0, -1.0), (-1.0, 0.0), (3.0, 1.0)];
+            cells
+                .iter()
+                .map(|(value, from)| value * tent.mass(from - x, from + 1.0 - x))
+                .sum::<f64>()
+        };
+        for (x, expected) in [(0.0, 0.5), (0.25, -0.03125), (0.5, -0.125)] {
+            assert!((at(x) - expected).abs() < 1e-12, "{x}: {}", at(x));
+        }
+    }
+
+    #[test]
+    fn kernels_that_mean_nothing_are_refused() {
+        let refused = |name: &str| {
+            let kernel: SmoothingKernel = name.parse().unwrap();
+            kernel.weights().unwrap_err()
+        };
+        for name in ["box:0", "tent:-1", "gaussian:NaN", "gaussian:inf"] {
+            assert!(
+                matches!(refused(name), SmoothingError::Width { .. }),
+                "{name}"
+            );
+        }
+        assert!(matches!(
+            refused("savitzky-golay:2:5"),
+            SmoothingError::Order { .. }
+        ));
+        assert!("median:3".parse::<SmoothingKernel>().is_err());
+    }
+}

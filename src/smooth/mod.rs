@@ -1,0 +1,5 @@
+//! Smoothing of evaluated rotations and positions: the weights of kernels, and what they make of the
+//! steps from sample to sample.
+
+pub(crate) mod kernel;
+pub(crate) mod rows;

@@ -1,0 +1,662 @@
+//! The engine against worked examples and the reference, and the same bits on every device.
+
+use super::examples::{
+    FIXED, FRENET, LOOP, MINIMAL, MINIMAL_AT_END, UP_AT_END, assert_rotation, c, following, k,
+};
+use crate::support::{Random, vulkan_engines};
+use glam::{DQuat, DVec3, Quat, Vec3};
+use tumble::reference::{self, Follower, Heading, Travel, VectorCurve, angle_between};
+use tumble::{
+    Device, Direction, Ends, Engine, EngineOptions, Error, Follow, FollowError, FollowWarning,
+    Followed, Frame, Frames, Layout, PathSpeed, TrackError, TrackSet, Twist, VectorMethod,
+    VectorWidth,
+};
+
+fn set_of(own: &Follower) -> TrackSet {
+    let mut set = TrackSet::new();
+    push(&mut set, own);
+    set
+}
+
+fn push(set: &mut TrackSet, own: &Follower) {
+    let keys: Vec<Vec3> = own.curve.keys.iter().map(|key| key.as_vec3()).collect();
+    let ups: Vec<Option<Vec3>> = own.ups.iter().map(|up| up.map(|up| up.as_vec3())).collect();
+    let track = set.push_path("", &own.curve.times, &keys, &ups).unwrap();
+    if !own.curve.tangents.is_empty() {
+        let tangents: Vec<[Vec3; 2]> = own
+            .curve
+            .tangents
+            .iter()
+            .map(|both| both.map(|one| one.as_vec3()))
+            .collect();
+        set.set_translations(track, &own.curve.times, &keys, &tangents)
+            .unwrap();
+    }
+}
+
+fn cpu() -> Engine {
+    Engine::new(Device::Cpu).unwrap()
+}
+
+fn follow_of(own: &Follower) -> Follow {
+    Follow {
+        method: own.curve.method.parse().unwrap(),
+        ends: own.curve.ends,
+        direction: match own.heading {
+            Heading::Tangent => Direction::Tangent,
+            Heading::Ahead(distance) => Direction::Ahead(distance),
+            Heading::At(point) => Direction::Point(point),
+        },
+        frame: match own.frame {
+            reference::Frame::Minimal => Frame::Minimal,
+            reference::Frame::Fixed => Frame::Fixed,
+            reference::Frame::Frenet => Frame::Frenet,
+        },
+        up: own.up,
+        twist: if own.spread {
+            Twist::Spread
+        } else {
+            Twist::Free
+        },
+        speed: match own.travel {
+            Travel::Keys => PathSpeed::Keys,
+            Travel::Constant => PathSpeed::Constant,
+            Travel::Eased(start, end) => PathSpeed::Eased { start, end },
+        },
+        ..Follow::default()
+    }
+}
+
+fn at(own: &Follower, times: &[f64]) -> Followed {
+    let frames = Frames::at(times.to_vec());
+    cpu()
+        .follow(&set_of(own), &follow_of(own), &frames, Layout::TrackMajor)
+        .unwrap()
+}
+
+fn rotation(found: &Followed, sample: usize) -> DQuat {
+    found.rotations.get(0, sample).unwrap().as_dquat()
+}
+
+#[test]
+fn examples_come_out() {
+    let own = k("bessel-overhauser", Ends::Parabolic);
+    let found = at(&own, &[1.75, 4.5]);
+    let place = found.positions.get(0, 0).unwrap();
+    assert!((place - Vec3::new(1.86875, 3.30625, 0.2375)).length() < 1e-6);
+    assert_rotation(rotation(&found, 0), MINIMAL, 3e-7);
+    assert_rotation(rotation(&found, 1), MINIMAL_AT_END, 3e-7);
+    let with = |frame| Follower {
+        frame,
+        ..own.clone()
+    };
+    assert_rotation(
+        rotation(&at(&with(reference::Frame::Fixed), &[1.75]), 0),
+        FIXED,
+        3e-7,
+    );
+    assert_rotation(
+        rotation(&at(&with(reference::Frame::Frenet), &[1.75]), 0),
+        FRENET,
+        3e-7,
+    );
+    let mut ups = vec![None; 5];
+    ups[4] = Some(DVec3::Y);
+    let given = Follower { ups, ..own };
+    assert_rotation(rotation(&at(&given, &[1.75]), 0), UP_AT_END, 3e-7);
+    let round = at(&c(), &[2.5, 0.0, 5.0]);
+    assert_rotation(rotation(&round, 0), LOOP, 3e-7);
+    assert_eq!(round.rotations.get(0, 1), round.rotations.get(0, 2));
+    let natural = at(&k("c2", Ends::Natural), &[1.75])
+        .positions
+        .get(0, 0)
+        .unwrap();
+    assert!((natural - Vec3::new(1.83366935, 3.51814516, 0.125)).length() < 1e-6);
+}
+
+/// The straight stretch between two bends: a quarter of the way it has turned by a quarter.
+#[test]
+fn frenet_s_frame_turns_evenly_on_straight_stretches() {
+    let (a, b) = (DVec3::Y, DVec3::new(0.0, -0.5, 0.75f64.sqrt()));
+    // Arcs in the planes of these normals' opposites, joined by a line along x.
+    let keys = [
+        DVec3::new(-1.0, -1.0, 0.0) * 0.0 - DVec3::X + a * -0.5,
+        DVec3::ZERO,
+        DVec3::X * 4.0,
+        DVec3::X * 5.0 - b * 0.5,
+    ];
+    let tangents = [
+        [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)],
+        [DVec3::X; 2],
+        [DVec3::X * 4.0; 2],
+        [DVec3::X - b; 2],
+    ];
+    let mut tangents = tangents.to_vec();
+    tangents[1] = [DVec3::X, DVec3::X * 4.0];
+    tangents[2] = [DVec3::X * 4.0, DVec3::X];
+    let mut own = following(VectorCurve {
+        method: "gltf-cubic",
+        ends: Ends::Parabolic,
+        times: vec![0.0, 1.0, 2.0, 3.0],
+        keys: keys.to_vec(),
+        tangents,
+    });
+    own.frame = reference::Frame::Frenet;
+    let found = at(&own, &[1.0, 1.25, 2.0]);
+    let y = |sample| rotation(&found, sample) * DVec3::Y;
+    let quarter = 15f64.to_radians();
+    let turned = DVec3::new(0.0, quarter.cos(), -quarter.sin());
+    let sign = y(0).y.signum();
+    assert!((y(0) * sign - DVec3::Y).length() < 1e-6, "{}", y(0));
+    assert!((y(1) * sign - turned).length() < 1e-6, "{}", y(1));
+    assert!((y(2) * sign + b).length() < 1e-6, "{}", y(2));
+}
+
+/// At a cusp the body makes half a turn about y; Frenet's normal and the inflection of (t, t³).
+#[test]
+fn cusps_and_inflections() {
+    let cusp = |t: f64| DVec3::new(t * t, t * t * t, 0.0);
+    let slope = |t: f64| DVec3::new(2.0 * t, 3.0 * t * t, 0.0) * 2.0;
+    let mut own = following(VectorCurve {
+        method: "gltf-cubic",
+        ends: Ends::Parabolic,
+        times: vec![0.0, 1.0],
+        keys: vec![cusp(-1.0), cusp(1.0)],
+        tangents: vec![[DVec3::ZERO, slope(-1.0)], [slope(1.0), DVec3::ZERO]],
+    });
+    own.up = DVec3::Z;
+    let found = at(&own, &[0.49, 0.4999999, 0.5000001, 0.51]);
+    for (sample, expected) in [(1, -DVec3::X), (2, DVec3::X)] {
+        let forward = rotation(&found, sample) * DVec3::Z;
+        assert!((forward - expected).length() < 1e-5, "{forward}");
+        let up = rotation(&found, sample) * DVec3::Y;
+        assert!((up - DVec3::Z).length() < 1e-6, "{up}");
+    }
+    own.travel = Travel::Constant;
+    let frames = Frames::fps(240);
+    let found = cpu()
+        .follow(&set_of(&own), &follow_of(&own), &frames, Layout::TrackMajor)
+        .unwrap();
+    let steps: Vec<f32> = (0..240)
+        .map(|i| {
+            (found.positions.get(0, i + 1).unwrap() - found.positions.get(0, i).unwrap()).length()
+        })
+        .collect();
+    // Chords of a curve, but for those next to the cusp, are nearly as long as their arcs.
+    let length = 2.8794197467 / 240.0;
+    assert!(
+        steps
+            .iter()
+            .filter(|&&step| (f64::from(step) / length - 1.0).abs() < 1e-3)
+            .count()
+            > 220
+    );
+    let slope = DVec3::new(2.0, 6.0, 0.0);
+    let bend = Follower {
+        frame: reference::Frame::Frenet,
+        ..super::examples::cubic(
+            DVec3::new(-1.0, -1.0, 0.0),
+            slope,
+            slope,
+            DVec3::new(1.0, 1.0, 0.0),
+        )
+    };
+    let found = at(&bend, &[0.25, 0.75]);
+    let axis = |sample, axis| rotation(&found, sample) * axis;
+    assert!((axis(0, DVec3::X) + DVec3::Z).length() < 1e-6);
+    assert!((axis(1, DVec3::X) + DVec3::Z).length() < 1e-6);
+    assert!((axis(1, DVec3::Y) - DVec3::new(-0.6, 0.8, 0.0)).length() < 1e-6);
+}
+
+/// Random walks that turn by up to about a right angle at each key.
+fn walk(random: &mut Random, method: &'static str, closed: bool) -> Follower {
+    let count = 3 + (random.next() % 8) as usize;
+    let mut place = random.direction() * random.between(0.0, 20.0);
+    let mut way = random.direction();
+    let mut time = random.between(-1.0, 1.0);
+    let (mut times, mut keys) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        times.push(time);
+        keys.push(place.as_vec3().as_dvec3());
+        let step = random.between(0.5, 2.0);
+        time += step * random.between(0.7, 1.4);
+        way = (way + random.direction() * 0.8).normalize();
+        place += way * step;
+    }
+    if closed {
+        let turn = |i: usize| std::f64::consts::TAU * i as f64 / count as f64;
+        for (i, key) in keys.iter_mut().enumerate() {
+            let round = DVec3::new(turn(i).cos(), turn(i).sin(), 0.0) * 5.0;
+            *key = (round + random.direction() * 0.6).as_vec3().as_dvec3();
+        }
+        keys.push(keys[0]);
+        times.push(time);
+    }
+    let ends = if closed { Ends::Loop } else { Ends::Parabolic };
+    let curve = VectorCurve {
+        method,
+        ends,
+        times,
+        keys,
+        tangents: Vec::new(),
+    };
+    let mut up = random.direction();
+    while up.dot(way).abs() > 0.9 {
+        up = random.direction();
+    }
+    Follower {
+        spread: closed,
+        up: up.as_vec3().as_dvec3(),
+        ..following(curve)
+    }
+}
+
+#[test]
+fn followers_are_the_reference_s() {
+    let mut random = Random(11);
+    let (mut squares, mut count) = (0.0, 0.0);
+    let mut most = [0.0f64; 3];
+    for round in 0..60 {
+        let method = [
+            "bessel-overhauser",
+            "c2",
+            "b-spline",
+            "catmull-rom",
+            "linear",
+        ][round % 5];
+        let mut own = walk(&mut random, method, round % 3 == 2);
+        own.frame = match round % 7 {
+            0 if method != "linear" => reference::Frame::Frenet,
+            3 => reference::Frame::Fixed,
+            _ => reference::Frame::Minimal,
+        };
+        own.heading = match round % 8 {
+            _ if own.frame == reference::Frame::Frenet => Heading::Tangent,
+            5 => Heading::Ahead(0.7),
+            6 => Heading::At(DVec3::new(40.0, 30.0, -20.0)),
+            _ => Heading::Tangent,
+        };
+        own.travel = match round % 4 {
+            1 => Travel::Constant,
+            2 => Travel::Eased(0.2, 0.3),
+            _ => Travel::Keys,
+        };
+        if own.frame == reference::Frame::Minimal && round % 5 == 1 {
+            own.ups = own.curve.keys.iter().map(|_| None).collect();
+            own.ups[1] = Some(random.direction().as_vec3().as_dvec3());
+        }
+        let walk = own.walk();
+        let times = &own.curve.times;
+        let (first, last) = (times[0], times[times.len() - 1]);
+        let samples: Vec<f64> = (0..150)
+            .map(|i| first + (last - first) * (f64::from(i) + 0.37) / 150.0)
+            .collect();
+        let found = at(&own, &samples);
+        let far = own
+            .curve
+            .keys
+            .iter()
+            .fold(0.0f64, |far, key| far.max(key.abs().max_element()));
+        for (sample, &time) in samples.iter().enumerate() {
+            if times.iter().any(|key| (key - time).abs() < 1e-6) {
+                continue;
+            }
+            let (place, expected) = walk.pose(time);
+            let off = (found.positions.get(0, sample).unwrap().as_dvec3() - place).length() / far;
+            let turned = angle_between(rotation(&found, sample), expected);
+            let aside = (rotation(&found, sample) * DVec3::Z).angle_between(expected * DVec3::Z);
+            most = [most[0].max(off), most[1], most[2].max(aside)];
+            assert!(
+                off < 2e-7,
+                "{round} {method} at {time}: position off by {off:e}"
+            );
+            // Where the point ahead passes a corner, the direction's derivative jumps, and a step of the
+            // reference's integration errs by as much.
+            let ahead = matches!(own.heading, Heading::Ahead(_));
+            let bound = if ahead && method == "linear" {
+                5e-6
+            } else {
+                1e-6
+            };
+            assert!(
+                aside < 1e-6,
+                "{round} {method} at {time}: forward off by {aside:e}"
+            );
+            assert!(
+                turned < bound,
+                "{round} {method} {:?} {:?} at {time}: {turned:e}",
+                own.frame,
+                own.heading
+            );
+            if bound == 1e-6 {
+                most[1] = most[1].max(turned);
+                squares += turned * turned;
+                count += 1.0;
+            }
+        }
+    }
+    let rms = (squares / count as f64).sqrt();
+    eprintln!(
+        "positions {:.2e}, rotations {:.2e} (rms {rms:.2e}), forward {:.2e}",
+        most[0], most[1], most[2]
+    );
+    assert!(rms < 1e-7, "{rms:e}");
+}
+
+/// Paths that ask for trouble: stops, reversals, corners, straight lines, vertical ones, one point.
+pub(super) fn trouble() -> TrackSet {
+    let mut random = Random(3);
+    let mut set = TrackSet::new();
+    for track in 0..18 {
+        let count = 1 + track % 9;
+        let mut time = random.between(-1.0, 1.0);
+        let mut place = DVec3::ZERO;
+        let (mut times, mut keys) = (Vec::new(), Vec::new());
+        for key in 0..count {
+            times.push(time);
+            keys.push(place.as_vec3());
+            time += random.pick(&[1e-4, 0.1, 1.0, 3.0]);
+            place += match (track + key) % 6 {
+                0 => DVec3::ZERO,
+                1 => DVec3::Y * random.between(-2.0, 2.0),
+                2 => -place,
+                3 => DVec3::X,
+                _ => random.direction() * random.pick(&[1e-6, 1.0, 300.0]),
+            };
+        }
+        if track % 4 == 0 && count > 1 {
+            keys[count - 1] = keys[0];
+        }
+        let ups: Vec<Option<Vec3>> = match track % 5 {
+            0 => (0..count)
+                .map(|key| (key % 2 == 1).then_some(Vec3::Z))
+                .collect(),
+            _ => Vec::new(),
+        };
+        set.push_path("", &times, &keys, &ups).unwrap();
+    }
+    set
+}
+
+fn bits(found: &Followed) -> Vec<u32> {
+    let places = found
+        .positions
+        .as_slice()
+        .iter()
+        .flat_map(|own| own.to_array());
+    let turns = found.rotations.as_quats().iter().flat_map(Quat::to_array);
+    places.chain(turns).map(f32::to_bits).collect()
+}
+
+pub(super) fn manners() -> Vec<Follow> {
+    let mut all = Vec::new();
+    let directions = [
+        Direction::Tangent,
+        Direction::Ahead(0.5),
+        Direction::Point(DVec3::ZERO),
+        Direction::Track(3),
+    ];
+    let speeds = [
+        PathSpeed::Keys,
+        PathSpeed::Constant,
+        PathSpeed::Eased {
+            start: 0.3,
+            end: 0.7,
+        },
+    ];
+    for (i, direction) in directions.into_iter().enumerate() {
+        for (j, speed) in speeds.into_iter().enumerate() {
+            for frame in [Frame::Minimal, Frame::Fixed, Frame::Frenet] {
+                if frame == Frame::Frenet && i > 0 {
+                    continue;
+                }
+                let method = VectorMethod::ALL[(i + j + all.len()) % 7];
+                all.push(Follow {
+                    method,
+                    direction,
+                    speed,
+                    frame,
+                    ..Follow::default()
+                });
+            }
+        }
+    }
+    all
+}
+
+/// The set without what this manner refuses.
+pub(super) fn taken(set: &TrackSet, follow: &Follow) -> TrackSet {
+    let mut own = TrackSet::new();
+    for track in 0..set.track_count() {
+        let keys = set
+            .vector_keys(tumble::Channel::Translation, track)
+            .unwrap();
+        let ups = match follow.frame {
+            Frame::Minimal if track % 5 == 0 => (0..keys.keys.len())
+                .map(|key| (key % 2 == 1).then_some(Vec3::Z))
+                .collect(),
+            _ => Vec::new(),
+        };
+        own.push_path("", keys.times, keys.keys, &ups).unwrap();
+    }
+    own
+}
+
+/// Every rotation is one, at every moment of every path, and all devices and widths give the same.
+#[test]
+fn the_same_bits_on_every_device() {
+    let set = trouble();
+    let frames = Frames::fps(50).between(-2.0, 9.0);
+    let mut engines = vulkan_engines(|_| {});
+    for width in VectorWidth::available() {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        engines.push(Engine::with_options(Device::Cpu, &options).unwrap());
+    }
+    for (i, follow) in manners().into_iter().enumerate() {
+        let own = taken(&set, &follow);
+        {
+            let layout = [Layout::TrackMajor, Layout::FrameMajor][i % 2];
+            let expected = cpu().follow(&own, &follow, &frames, layout).unwrap();
+            for &rotation in expected.rotations.as_quats() {
+                let norm = rotation.as_dquat().length();
+                assert!((norm - 1.0).abs() < 6e-7, "{follow:?}: {rotation:?} {norm}");
+            }
+            let expected = bits(&expected);
+            for engine in &engines {
+                assert!(
+                    bits(&engine.follow(&own, &follow, &frames, layout).unwrap()) == expected,
+                    "{follow:?}, {engine:?}"
+                );
+            }
+        }
+    }
+}
+
+/// A body looks at one that does not look back: the direction is that to where the other is at each
+/// moment.
+#[test]
+fn a_body_looks_at_another() {
+    let mut random = Random(8);
+    let own = walk(&mut random, "bessel-overhauser", false);
+    let other = walk(&mut random, "bessel-overhauser", false);
+    let away = |key: &DVec3| (*key + DVec3::splat(60.0)).as_vec3();
+    let keys: Vec<Vec3> = other.curve.keys.iter().map(away).collect();
+    let mut set = set_of(&own);
+    set.push_path("", &other.curve.times, &keys, &[]).unwrap();
+    let eased = PathSpeed::Eased {
+        start: 0.4,
+        end: 0.1,
+    };
+    for speed in [PathSpeed::Keys, PathSpeed::Constant, eased] {
+        let follow = Follow {
+            speed,
+            ..Follow::default()
+        };
+        let frames = Frames::fps(60);
+        let at = |direction| {
+            let follow = Follow {
+                direction,
+                ..follow.clone()
+            };
+            cpu().follow(&set, &follow, &frames, Layout::TrackMajor)
+        };
+        let error = at(Direction::Track(2)).unwrap_err();
+        assert!(matches!(
+            error,
+            Error::Follow(FollowError::Target {
+                track: 0,
+                target: 2
+            })
+        ));
+        let (found, plain) = (
+            at(Direction::Track(1)).unwrap(),
+            at(Direction::Tangent).unwrap(),
+        );
+        for sample in 0..found.rotations.samples() {
+            let place = |track| found.positions.get(track, sample).unwrap().as_dvec3();
+            let forward = found.rotations.get(0, sample).unwrap().as_dquat() * DVec3::Z;
+            let off = (forward - (place(1) - place(0)).normalize()).length();
+            assert!(off < 1e-6, "{speed:?} {sample}: {off:e}");
+            // The other one faces along its own path.
+            assert_eq!(
+                found.rotations.get(1, sample),
+                plain.rotations.get(1, sample)
+            );
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused() {
+    let mut set = TrackSet::new();
+    let none: Vec<f64> = Vec::new();
+    assert!(set.push_path("", &none, &[], &[]).is_err());
+    let nan = set.push_path("", &[0.0], &[Vec3::NAN], &[]).unwrap_err();
+    assert!(matches!(nan, TrackError::DataNotFinite { key: 0, .. }));
+    let order = set
+        .push_path("", &[0.0, 0.0], &[Vec3::ZERO; 2], &[])
+        .unwrap_err();
+    assert!(matches!(order, TrackError::TimeNotIncreasing { .. }));
+    let up = set
+        .push_path("", &[0.0], &[Vec3::ZERO], &[Some(Vec3::ZERO)])
+        .unwrap_err();
+    assert!(matches!(up, TrackError::NoUp { key: 0, .. }));
+    assert_eq!(set.track_count(), 0);
+
+    let standing = |keys: &[Vec3]| {
+        let mut set = TrackSet::new();
+        let times: Vec<f64> = (0..keys.len()).map(|i| i as f64).collect();
+        set.push_path("", &times, keys, &[]).unwrap();
+        let frames = Frames::at(vec![0.5]);
+        cpu()
+            .follow(&set, &Follow::default(), &frames, Layout::TrackMajor)
+            .unwrap()
+    };
+    for keys in [&[Vec3::ONE][..], &[Vec3::ONE; 4]] {
+        let found = standing(keys);
+        assert_eq!(found.warnings, [FollowWarning::StandsStill { track: 0 }]);
+        assert_eq!(found.rotations.get(0, 0), Some(Quat::IDENTITY));
+        assert_eq!(found.positions.get(0, 0), Some(Vec3::ONE));
+    }
+
+    let set = set_of(&k("bessel-overhauser", Ends::Parabolic));
+    let refused =
+        |follow: Follow| match cpu().follow(&set, &follow, &Frames::fps(1), Layout::TrackMajor) {
+            Err(Error::Follow(error)) => error,
+            other => panic!("{other:?}"),
+        };
+    let base = Follow::default;
+    assert!(matches!(
+        refused(Follow {
+            ends: Ends::Loop,
+            ..base()
+        }),
+        FollowError::OpenLoop { track: 0, .. }
+    ));
+    assert!(matches!(
+        refused(Follow {
+            up: DVec3::ZERO,
+            ..base()
+        }),
+        FollowError::Up { .. }
+    ));
+    for distance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            refused(Follow {
+                direction: Direction::Ahead(distance),
+                ..base()
+            }),
+            FollowError::Ahead { .. }
+        ));
+    }
+    let speed = PathSpeed::Eased {
+        start: 0.6,
+        end: 0.5,
+    };
+    assert!(matches!(
+        refused(Follow { speed, ..base() }),
+        FollowError::Eased { .. }
+    ));
+    let aside = Follow {
+        frame: Frame::Frenet,
+        direction: Direction::Ahead(1.0),
+        ..base()
+    };
+    assert_eq!(refused(aside), FollowError::FrenetAside);
+    let axes = ["z".parse().unwrap(), "-z".parse().unwrap()];
+    assert_eq!(refused(Follow { axes, ..base() }), FollowError::Axes);
+    let mut rotations = TrackSet::new();
+    rotations.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
+    let error = cpu().follow(&rotations, &base(), &Frames::fps(1), Layout::TrackMajor);
+    assert!(matches!(
+        error,
+        Err(Error::Follow(FollowError::NoPath { track: 0 }))
+    ));
+}
+
+/// Up along the direction is no up, and half a turn left over may go either way.
+#[test]
+fn what_is_unusual_is_said() {
+    let keys = [Vec3::ZERO, Vec3::Y, Vec3::Y * 2.0];
+    let mut set = TrackSet::new();
+    set.push_path("", &[0.0, 1.0, 2.0], &keys, &[]).unwrap();
+    let frames = Frames::at(vec![0.0, 1.5]);
+    let found = cpu()
+        .follow(&set, &Follow::default(), &frames, Layout::TrackMajor)
+        .unwrap();
+    assert!(found.warnings.is_empty());
+    let forward = found.rotations.get(0, 1).unwrap() * Vec3::Z;
+    assert!((forward - Vec3::Y).length() < 1e-6);
+    let mut set = TrackSet::new();
+    let line = [Vec3::ZERO, Vec3::X];
+    set.push_path("", &[0.0, 1.0], &line, &[Some(Vec3::Y), Some(-Vec3::Y)])
+        .unwrap();
+    let found = cpu()
+        .follow(&set, &Follow::default(), &frames, Layout::TrackMajor)
+        .unwrap();
+    assert_eq!(found.warnings, [FollowWarning::HalfTurn { track: 0 }]);
+}
+
+/// Renamed axes turn the body in its own frame.
+#[test]
+fn other_axes_face_forward() {
+    let set = set_of(&k("bessel-overhauser", Ends::Parabolic));
+    let frames = Frames::at(vec![1.75]);
+    let of = |forward: &str, up: &str| {
+        let axes = [forward.parse().unwrap(), up.parse().unwrap()];
+        let follow = Follow {
+            axes,
+            ..Follow::default()
+        };
+        cpu()
+            .follow(&set, &follow, &frames, Layout::TrackMajor)
+            .unwrap()
+            .rotations
+            .get(0, 0)
+            .unwrap()
+    };
+    let (usual, other) = (of("z", "y"), of("-x", "z"));
+    assert!((usual * Vec3::Z + other * Vec3::X).length() < 1e-6);
+    assert!((usual * Vec3::Y - other * Vec3::Z).length() < 1e-6);
+}
