@@ -109,6 +109,17 @@ pub enum RouteError {
         /// Triangles of the piece that the goal lies on.
         goal: usize,
     },
+    /// The start or the goal is not on free ground.
+    #[error(
+        "{point} is not on free ground: it is within the clearance of an obstacle (or nearer to it \
+         than the finest edge), or too steep; free ground is {distance} away"
+    )]
+    NotFree {
+        /// The start or the goal, on the surface.
+        point: DVec3,
+        /// From there to the nearest free ground.
+        distance: f64,
+    },
     /// Neither half of the cut arrives.
     #[error("the cut by the plane does not lead from start to goal; take `--by exact`")]
     NoPlaneWay,

@@ -1,5 +1,8 @@
 //! Every test of routes. `cargo test -p tumble-routes --test all numbers::` runs those of one file.
 
+mod grounds;
+mod nets;
 mod numbers;
+mod walking;
 #[path = "support/shapes.rs"]
 mod shapes;

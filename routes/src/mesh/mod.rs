@@ -2,6 +2,7 @@
 
 pub(crate) mod links;
 
+pub mod read;
 pub(crate) mod surface;
 pub(crate) mod tree;
 mod weld;

@@ -26,7 +26,7 @@ pub(super) fn weld<'a>(
     polygons: impl IntoIterator<Item = &'a [u32]>,
 ) -> Result<Welded, MeshError> {
     for (vertex, &position) in given.iter().enumerate() {
-        if !(position.abs().max_element() <= LARGEST) {
+        if !position.is_finite() || position.abs().max_element() > LARGEST {
             return Err(MeshError::NotFinite { vertex, position });
         }
     }
