@@ -102,6 +102,25 @@ impl Mesh {
 }
 
 impl Route {
+    /// The point so far along the straight lines from the start, and the unit normal there.
+    #[must_use]
+    pub fn at(&self, gone: f64) -> (DVec3, Option<DVec3>) {
+        let mut rest = gone.max(0.0);
+        let normals = |index: usize| self.normals.as_ref().map(|normals| normals[index]);
+        for (index, pair) in self.points.windows(2).enumerate() {
+            let length = pair[0].distance(pair[1]);
+            if rest <= length {
+                let part = if length > 0.0 { rest / length } else { 0.0 };
+                let ends = normals(index).zip(normals(index + 1));
+                let normal = ends.map(|(one, other)| one.lerp(other, part).normalize_or_zero());
+                return (pair[0].lerp(pair[1], part), normal);
+            }
+            rest -= length;
+        }
+        let last = self.points.len() - 1;
+        (self.points[last], normals(last))
+    }
+
     /// Of places on edges; those at the same position become one.
     pub(crate) fn new(task: &Task<'_>, way: &[Spot]) -> Self {
         let surface = &*task.surface;

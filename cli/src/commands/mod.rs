@@ -14,6 +14,7 @@ pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
 pub(crate) mod render;
+pub(crate) mod route;
 pub(crate) mod verify;
 pub(crate) mod view;
 
@@ -25,6 +26,7 @@ use crate::messages::exit::Failure;
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
     Convert(convert::Arguments),
+    Route(Box<route::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
@@ -46,6 +48,7 @@ impl Command {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
+            Self::Route(arguments) => route::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),
