@@ -10,6 +10,7 @@ mod faults;
 mod peers;
 mod plot;
 mod render;
+mod route;
 mod validation;
 mod view;
 mod view_controls;
