@@ -16,7 +16,8 @@ fn terrain(triangles: usize, roughness: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     for y in 0..width {
         for x in 0..width {
             let (u, v) = (f64::from(x), f64::from(y));
-            let hills = 9.0 * (u / 17.0).sin() * (v / 23.0).cos() + (u / 3.0).sin() * (v / 5.0).sin();
+            let hills =
+                9.0 * (u / 17.0).sin() * (v / 23.0).cos() + (u / 3.0).sin() * (v / 5.0).sin();
             positions.push(dvec3(u, v, hills + roughness * random.f64()));
         }
     }
@@ -24,7 +25,10 @@ fn terrain(triangles: usize, roughness: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     for y in 0..width - 1 {
         for x in 0..width - 1 {
             let at = |dx, dy| (y + dy) * width + x + dx;
-            faces.extend([[at(0, 0), at(1, 0), at(1, 1)], [at(0, 0), at(1, 1), at(0, 1)]]);
+            faces.extend([
+                [at(0, 0), at(1, 0), at(1, 1)],
+                [at(0, 0), at(1, 1), at(0, 1)],
+            ]);
         }
     }
     (positions, faces)
@@ -33,7 +37,9 @@ fn terrain(triangles: usize, roughness: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 /// The most memory that the process had, in bytes, where the system tells.
 fn peak() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: f64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
     Some(kibibytes * 1024.0)
 }
@@ -41,8 +47,14 @@ fn peak() -> Option<f64> {
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let given: Option<usize> = arguments.next().and_then(|text| text.parse().ok());
-    let by: By = arguments.next().and_then(|text| text.parse().ok()).unwrap_or_default();
-    let roughness: f64 = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(0.3);
+    let by: By = arguments
+        .next()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or_default();
+    let roughness: f64 = arguments
+        .next()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(0.3);
     let sizes = given.map_or(vec![10_000, 100_000], |own| vec![own]);
     for size in sizes {
         let (positions, faces) = terrain(size, roughness);
@@ -52,7 +64,11 @@ fn main() {
             Err(error) => return eprintln!("{error}"),
         };
         let built = started.elapsed();
-        println!("{} triangles, made in {:.3} s", faces.len(), built.as_secs_f64());
+        println!(
+            "{} triangles, made in {:.3} s",
+            faces.len(),
+            built.as_secs_f64()
+        );
         let width = positions.len().isqrt();
         let last = positions.len() - 1;
         // Along the diagonals of the squares, across them, and from side to side.

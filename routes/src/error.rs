@@ -62,7 +62,9 @@ pub enum MeshError {
 #[non_exhaustive]
 pub enum MeshWarning {
     /// Triangles with two equal corners.
-    #[error("{count} triangles have equal corners and are dropped; the first is of face {face} (from 0)")]
+    #[error(
+        "{count} triangles have equal corners and are dropped; the first is of face {face} (from 0)"
+    )]
     Dropped {
         /// How many.
         count: usize,
@@ -70,7 +72,9 @@ pub enum MeshWarning {
         face: usize,
     },
     /// Polygons whose corners lie in no plane.
-    #[error("{count} polygons are not flat; they are cut into triangles from their first corner on; the first is face {face} (from 0)")]
+    #[error(
+        "{count} polygons are not flat; they are cut into triangles from their first corner on; the first is face {face} (from 0)"
+    )]
     NotFlat {
         /// How many.
         count: usize,
@@ -130,10 +134,14 @@ pub enum RouteError {
     )]
     NoPlane,
     /// An edge of three faces: the cut branches.
-    #[error("a cut by a plane wants edges of at most two faces, and the mesh has edges of more; take `--by exact`")]
+    #[error(
+        "a cut by a plane wants edges of at most two faces, and the mesh has edges of more; take `--by exact`"
+    )]
     PlaneBranches,
     /// A surface with one side has no normals.
-    #[error("the surface has one side only, as a Möbius strip, and so no normals; take `--by exact`")]
+    #[error(
+        "the surface has one side only, as a Möbius strip, and so no normals; take `--by exact`"
+    )]
     OneSided,
     /// The search for the shortest way would take more memory than it may.
     #[error(

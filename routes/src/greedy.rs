@@ -27,7 +27,11 @@ pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
             }
             // The goal itself is nearest of all, also where an edge to another vertex runs on.
             let edge = (surface.positions[other as usize] - here).normalize_or_zero();
-            let cosine = if other == task.goal { 2.0 } else { edge.dot(to_goal) };
+            let cosine = if other == task.goal {
+                2.0
+            } else {
+                edge.dot(to_goal)
+            };
             let is_better = best.is_none_or(|(most, lowest)| {
                 cosine > most + SAME || (cosine >= most - SAME && other < lowest)
             });

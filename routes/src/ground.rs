@@ -127,13 +127,17 @@ impl<'a> Ground<'a> {
         let mut fates = vec![Fate::Open; triangles.len()];
         loop {
             let corners = |own: &[u32; 3]| own.map(|vertex| positions[vertex as usize]);
-            fates.par_iter_mut().zip(&triangles).for_each(|(own, triangle)| {
-                if *own == Fate::Open {
-                    *own = fate(corners(triangle));
-                }
-            });
+            fates
+                .par_iter_mut()
+                .zip(&triangles)
+                .for_each(|(own, triangle)| {
+                    if *own == Fate::Open {
+                        *own = fate(corners(triangle));
+                    }
+                });
             let is_coarse = |(own, triangle): (&Fate, &[u32; 3])| {
-                *own == Fate::Open && sides(corners(triangle)).into_iter().fold(0.0, f64::max) > finest
+                *own == Fate::Open
+                    && sides(corners(triangle)).into_iter().fold(0.0, f64::max) > finest
             };
             let coarse: Vec<bool> = fates.iter().zip(&triangles).map(is_coarse).collect();
             if !coarse.contains(&true) {
@@ -195,7 +199,10 @@ impl<'a> Ground<'a> {
 
 fn fate(obstacles: &Mesh, clearance: f64, corners: [DVec3; 3]) -> Fate {
     let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-    let radius = corners.iter().map(|own| own.distance(centre)).fold(0.0, f64::max);
+    let radius = corners
+        .iter()
+        .map(|own| own.distance(centre))
+        .fold(0.0, f64::max);
     let distance = obstacles.nearest(centre).distance(centre);
     if distance >= clearance + radius {
         Fate::Free
@@ -217,7 +224,9 @@ fn longest(positions: &[DVec3], triangle: [u32; 3]) -> usize {
     let lengths = sides(triangle.map(|vertex| positions[vertex as usize]));
     let key = |side: usize| edge(triangle[side], triangle[(side + 1) % 3]);
     let better = |one: &usize, other: &usize| {
-        lengths[*one].total_cmp(&lengths[*other]).then(key(*other).cmp(&key(*one)))
+        lengths[*one]
+            .total_cmp(&lengths[*other])
+            .then(key(*other).cmp(&key(*one)))
     };
     (0..3).max_by(better).unwrap_or(0)
 }
@@ -234,19 +243,26 @@ fn halve(
     fates: &mut Vec<Fate>,
     coarse: &[bool],
 ) {
-    let longest_sides: Vec<usize> = triangles.iter().map(|&own| longest(positions, own)).collect();
+    let longest_sides: Vec<usize> = triangles
+        .iter()
+        .map(|&own| longest(positions, own))
+        .collect();
     let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
-    let split = |positions: &mut Vec<DVec3>, middles: &mut HashMap<(u32, u32), u32>, index: usize| {
-        let (triangle, side) = (triangles[index], longest_sides[index]);
-        let (one, other) = edge(triangle[side], triangle[(side + 1) % 3]);
-        let mut is_new = false;
-        middles.entry((one, other)).or_insert_with(|| {
-            is_new = true;
-            positions.push(DVec3::midpoint(positions[one as usize], positions[other as usize]));
-            positions.len() as u32 - 1
-        });
-        is_new
-    };
+    let split =
+        |positions: &mut Vec<DVec3>, middles: &mut HashMap<(u32, u32), u32>, index: usize| {
+            let (triangle, side) = (triangles[index], longest_sides[index]);
+            let (one, other) = edge(triangle[side], triangle[(side + 1) % 3]);
+            let mut is_new = false;
+            middles.entry((one, other)).or_insert_with(|| {
+                is_new = true;
+                positions.push(DVec3::midpoint(
+                    positions[one as usize],
+                    positions[other as usize],
+                ));
+                positions.len() as u32 - 1
+            });
+            is_new
+        };
     for index in (0..coarse.len()).filter(|&index| coarse[index]) {
         split(positions, &mut middles, index);
     }

@@ -79,8 +79,12 @@ impl Placing<'_> {
     /// The vertex at a point of the surface, which is made where there is none.
     fn vertex(&mut self, at: Nearest) -> u32 {
         let corners = self.surface.triangle(at.face);
-        let longest = (0..3).map(|k| corners[k].distance(corners[(k + 1) % 3])).fold(0.0, f64::max);
-        let largest = corners.iter().fold(0.0, |most: f64, c| most.max(c.abs().max_element()));
+        let longest = (0..3)
+            .map(|k| corners[k].distance(corners[(k + 1) % 3]))
+            .fold(0.0, f64::max);
+        let largest = corners
+            .iter()
+            .fold(0.0, |most: f64, c| most.max(c.abs().max_element()));
         // Far from the origin positions themselves are rounded to more than that.
         let least = ON_EDGE.max(4.0 * f64::EPSILON * largest / longest);
         let inside: Vec<usize> = (0..3).filter(|&k| at.weights[k] > least).collect();

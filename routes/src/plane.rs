@@ -20,10 +20,12 @@ pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     let start = surface.positions[task.start as usize];
     // The distance of start and goal from the plane is 0, whatever rounding makes of it.
     let mut heights: Vec<f64> = (surface.positions.iter().zip(0..))
-        .map(|(&position, vertex)| match vertex == task.start || vertex == task.goal {
-            true => 0.0,
-            false => (position - start).dot(normal),
-        })
+        .map(
+            |(&position, vertex)| match vertex == task.start || vertex == task.goal {
+                true => 0.0,
+                false => (position - start).dot(normal),
+            },
+        )
         .collect();
     // A vertex in the plane counts as above it, so that every cut of a face has two ends. Where
     // that leads nowhere, as along a boundary, it counts as below.
@@ -36,7 +38,11 @@ pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
         let ways = cut.exits().into_iter().filter_map(|exit| cut.follow(exit));
         let length = |way: &Vec<Spot>| -> f64 {
             let points = way.iter().map(|&spot| surface.position(spot));
-            points.clone().zip(points.skip(1)).map(|(a, b)| a.distance(b)).sum()
+            points
+                .clone()
+                .zip(points.skip(1))
+                .map(|(a, b)| a.distance(b))
+                .sum()
         };
         if let Some(way) = ways.min_by(|a, b| length(a).total_cmp(&length(b))) {
             return Ok(way);
@@ -53,7 +59,11 @@ pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
 fn plane_normal(task: &Task<'_>) -> Result<DVec3, RouteError> {
     let surface = &*task.surface;
     let [start, goal] = [task.start, task.goal].map(|vertex| surface.positions[vertex as usize]);
-    let of = |vertex| surface.normal(Spot::vertex(vertex)).ok_or(RouteError::OneSided);
+    let of = |vertex| {
+        surface
+            .normal(Spot::vertex(vertex))
+            .ok_or(RouteError::OneSided)
+    };
     let (at_start, at_goal) = (of(task.start)?, of(task.goal)?);
     let chord = (goal - start).normalize_or_zero();
     [at_start + at_goal, at_start, at_goal]
@@ -111,7 +121,9 @@ impl Cut<'_> {
             if twin == NONE {
                 return None;
             }
-            half_edge = [next(twin), previous(twin)].into_iter().find(|&side| self.cuts(side))?;
+            half_edge = [next(twin), previous(twin)]
+                .into_iter()
+                .find(|&side| self.cuts(side))?;
         }
         None
     }

@@ -135,7 +135,10 @@ impl Route {
         }
         let normals: Option<Vec<DVec3>> = kept.iter().map(|&spot| surface.normal(spot)).collect();
         Self {
-            length: points.windows(2).map(|pair| pair[0].distance(pair[1])).sum(),
+            length: points
+                .windows(2)
+                .map(|pair| pair[0].distance(pair[1]))
+                .sum(),
             points,
             normals,
             off: task.off,

@@ -52,7 +52,9 @@ pub struct Plan {
 #[non_exhaustive]
 pub enum WalkerError {
     /// Its speed is not a number over 0, its radius or its start not one of 0 or more.
-    #[error("speed {speed}, radius {radius}, start {start}: give a speed over 0, and others of 0 or more")]
+    #[error(
+        "speed {speed}, radius {radius}, start {start}: give a speed over 0, and others of 0 or more"
+    )]
     Numbers {
         /// In units a second.
         speed: f64,
@@ -62,10 +64,14 @@ pub enum WalkerError {
         start: f64,
     },
     /// No waiting on the route leads past the others.
-    #[error("cannot pass: wherever it waits on its way, something comes too near; give it another way, or plan it before others")]
+    #[error(
+        "cannot pass: wherever it waits on its way, something comes too near; give it another way, or plan it before others"
+    )]
     Blocked,
     /// Its route is too long or too many others come near.
-    #[error("{stretches} stretches of the way and {others} of others are too many; simplify the tracks")]
+    #[error(
+        "{stretches} stretches of the way and {others} of others are too many; simplify the tracks"
+    )]
     TooMany {
         /// Of the route.
         stretches: usize,
@@ -83,7 +89,10 @@ const MOST_PAIRS: usize = 100_000_000;
 /// Not complete: another order, or other ways, may lead where this does not.
 #[must_use]
 pub fn plan(walkers: &[Walker], movers: &[Mover]) -> Vec<Result<Plan, WalkerError>> {
-    let mut others: Vec<(Mover, Stay)> = movers.iter().map(|own| (own.clone(), Stay::Leaves)).collect();
+    let mut others: Vec<(Mover, Stay)> = movers
+        .iter()
+        .map(|own| (own.clone(), Stay::Leaves))
+        .collect();
     let mut plans = Vec::with_capacity(walkers.len());
     for walker in walkers {
         let planned = plan_one(walker, &others);
@@ -114,7 +123,10 @@ fn plan_one(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, WalkerErr
         });
     }
     let stretches = walker.route.points.len();
-    let stretches_of_others = others.iter().map(|(own, _)| own.track.len() + 1).sum::<usize>();
+    let stretches_of_others = others
+        .iter()
+        .map(|(own, _)| own.track.len() + 1)
+        .sum::<usize>();
     if stretches.saturating_mul(stretches_of_others) > MOST_PAIRS {
         return Err(WalkerError::TooMany {
             stretches,

@@ -5,6 +5,6 @@ mod inputs;
 mod nets;
 mod numbers;
 mod properties;
-mod walking;
 #[path = "support/shapes.rs"]
 mod shapes;
+mod walking;

@@ -43,12 +43,18 @@ fn ways_round_a_disc_are_free_and_nearly_shortest() {
         let route = ground.mesh.route(from, to, By::Exact).unwrap();
         let over = route.length - shortest;
         // A step round the hole goes out by about the finest edge.
-        assert!(over > 0.0 && over < 3.0 * finest && over < before, "{finest}: {over}");
+        assert!(
+            over > 0.0 && over < 3.0 * finest && over < before,
+            "{finest}: {over}"
+        );
         before = over;
         for pair in route.points.windows(2) {
             for step in 0..=10 {
                 let point = pair[0].lerp(pair[1], f64::from(step) / 10.0);
-                assert!(rock.nearest(point).distance(point) >= 1.0 - 1e-12, "{point}");
+                assert!(
+                    rock.nearest(point).distance(point) >= 1.0 - 1e-12,
+                    "{point}"
+                );
             }
         }
     }
@@ -75,14 +81,26 @@ fn halving_leaves_no_gaps() {
     let near = |vertex: u32| positions[vertex as usize].length() < 0.1;
     for ((a, b), count) in edges {
         let is_boundary = on_rim(a) && on_rim(b) || near(a) && near(b);
-        assert!(count == 2 || is_boundary, "{} {}", positions[a as usize], positions[b as usize]);
+        assert!(
+            count == 2 || is_boundary,
+            "{} {}",
+            positions[a as usize],
+            positions[b as usize]
+        );
     }
 }
 
 #[test]
 fn steep_ground_is_closed() {
     // A roof: 45° on both sides of its ridge, and a flat yard.
-    let positions = [(0, 0, 0), (2, 0, 0), (2, 2, 2), (0, 2, 2), (0, -2, 0), (2, -2, 0)];
+    let positions = [
+        (0, 0, 0),
+        (2, 0, 0),
+        (2, 2, 2),
+        (0, 2, 2),
+        (0, -2, 0),
+        (2, -2, 0),
+    ];
     let positions = positions.map(|(x, y, z)| dvec3(f64::from(x), f64::from(y), f64::from(z)));
     let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 1], [4, 1, 0]];
     let hill = Mesh::new(&positions, &triangles).unwrap();
@@ -93,9 +111,26 @@ fn steep_ground_is_closed() {
         max_slope: Some(degrees.to_radians()),
         up: 2.0 * DVec3::Z,
     };
-    assert_eq!(Ground::new(&hill, slope(45.0)).unwrap().mesh.triangles().len(), 4);
-    assert_eq!(Ground::new(&hill, slope(44.9)).unwrap().mesh.triangles().len(), 2);
-    assert_eq!(Ground::new(&hill, slope(91.0)).unwrap_err(), GroundError::Slope);
+    assert_eq!(
+        Ground::new(&hill, slope(45.0))
+            .unwrap()
+            .mesh
+            .triangles()
+            .len(),
+        4
+    );
+    assert_eq!(
+        Ground::new(&hill, slope(44.9))
+            .unwrap()
+            .mesh
+            .triangles()
+            .len(),
+        2
+    );
+    assert_eq!(
+        Ground::new(&hill, slope(91.0)).unwrap_err(),
+        GroundError::Slope
+    );
 }
 
 #[test]
@@ -116,18 +151,41 @@ fn what_cannot_be_is_refused() {
     // A start within the clearance, and one beside the ground, which is moved onto it.
     let ground = Ground::new(&plain, clear(&rock, 0.1)).unwrap();
     let goal = dvec3(2.0, 0.0, 0.0);
-    let error = ground.route(dvec3(0.0, 0.9, 0.0), goal, By::Exact).unwrap_err();
+    let error = ground
+        .route(dvec3(0.0, 0.9, 0.0), goal, By::Exact)
+        .unwrap_err();
     assert!(matches!(error, RouteError::NotFree { .. }), "{error}");
     assert!(ground.route(goal, dvec3(0.0, 0.9, 5.0), By::Exact).is_err());
-    let route = ground.route(dvec3(-2.0, 0.0, 5.0), goal, By::Exact).unwrap();
+    let route = ground
+        .route(dvec3(-2.0, 0.0, 5.0), goal, By::Exact)
+        .unwrap();
     assert_eq!(route.off, [5.0, 0.0]);
     // A clearance that closes the whole width parts the ground.
-    let corners = [dvec3(0.0, -4.0, 0.0), dvec3(0.0, 4.0, 0.0), dvec3(0.0, 0.0, 1.0)];
+    let corners = [
+        dvec3(0.0, -4.0, 0.0),
+        dvec3(0.0, 4.0, 0.0),
+        dvec3(0.0, 0.0, 1.0),
+    ];
     let wall = Mesh::new(&corners, &[[0, 1, 2]]).unwrap();
-    let ground = Ground::new(&plain, Clear { clearance: 0.9, ..clear(&wall, 0.2) });
+    let ground = Ground::new(
+        &plain,
+        Clear {
+            clearance: 0.9,
+            ..clear(&wall, 0.2)
+        },
+    );
     let error = ground.and_then(|own| {
         let route = own.route(dvec3(-3.0, 0.0, 0.0), dvec3(3.0, 0.0, 0.0), By::Exact);
         Ok(route.unwrap_err())
     });
-    assert!(matches!(error, Ok(RouteError::OtherPiece { start: 1.., goal: 1.. })), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Ok(RouteError::OtherPiece {
+                start: 1..,
+                goal: 1..
+            })
+        ),
+        "{error:?}"
+    );
 }

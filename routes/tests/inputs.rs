@@ -22,18 +22,37 @@ fn what_is_no_mesh_is_refused() {
     assert_eq!(refused(&[], &[]), MeshError::Empty);
     assert_eq!(refused(&CORNERS, &[]), MeshError::Empty);
     let (vertex, count) = (4, 4);
-    assert_eq!(refused(&CORNERS, &[&[0, 1, 2], &[0, 1, 4]]), MeshError::Index { face: 1, vertex, count });
-    assert_eq!(refused(&CORNERS, &[&[0, 1]]), MeshError::Corners { face: 0, corners: 2 });
+    assert_eq!(
+        refused(&CORNERS, &[&[0, 1, 2], &[0, 1, 4]]),
+        MeshError::Index {
+            face: 1,
+            vertex,
+            count
+        }
+    );
+    assert_eq!(
+        refused(&CORNERS, &[&[0, 1]]),
+        MeshError::Corners {
+            face: 0,
+            corners: 2
+        }
+    );
     for bad in [f64::NAN, f64::INFINITY, 1e80] {
         let mut corners = CORNERS;
         corners[3].z = bad;
         let error = refused(&corners, &[&[0, 1, 2]]);
-        assert!(matches!(error, MeshError::NotFinite { vertex: 3, .. }), "{error}");
+        assert!(
+            matches!(error, MeshError::NotFinite { vertex: 3, .. }),
+            "{error}"
+        );
     }
     let line = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::X, DVec3::Y];
     let error = refused(&line, &[&[0, 1, 3], &[0, 1, 2]]);
     assert!(matches!(error, MeshError::Flat { face: 1, .. }), "{error}");
-    assert!(error.to_string().contains("face 1 (from 0) has no area"), "{error}");
+    assert!(
+        error.to_string().contains("face 1 (from 0) has no area"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -43,14 +62,29 @@ fn polygons_seams_and_what_is_unused() {
     let mesh = of(&positions, &[&[0, 1, 2, 3], &[1, 5, 6], &[5, 6, 7]]);
     assert_eq!(mesh.positions().len(), 4);
     assert_eq!(mesh.triangles().len(), 3);
-    assert_eq!(mesh.warnings()[0], MeshWarning::Dropped { count: 1, face: 1 });
+    assert_eq!(
+        mesh.warnings()[0],
+        MeshWarning::Dropped { count: 1, face: 1 }
+    );
     let bent = [CORNERS[0], CORNERS[1], CORNERS[2] + DVec3::Z, CORNERS[3]];
     let mesh = of(&bent, &[&[0, 1, 2, 3]]);
-    assert_eq!(mesh.warnings(), [MeshWarning::NotFlat { count: 1, face: 0 }]);
+    assert_eq!(
+        mesh.warnings(),
+        [MeshWarning::NotFlat { count: 1, face: 0 }]
+    );
     // A seam is no boundary: -0 is 0.
-    let seam = [DVec3::ZERO, DVec3::X, DVec3::Y, dvec3(-0.0, 0.0, -0.0), DVec3::Y, -DVec3::X];
+    let seam = [
+        DVec3::ZERO,
+        DVec3::X,
+        DVec3::Y,
+        dvec3(-0.0, 0.0, -0.0),
+        DVec3::Y,
+        -DVec3::X,
+    ];
     let mesh = of(&seam, &[&[0, 1, 2], &[3, 4, 5]]);
-    let route = mesh.route(dvec3(0.5, 0.2, 0.0), dvec3(-0.5, 0.2, 0.0), By::Exact).unwrap();
+    let route = mesh
+        .route(dvec3(0.5, 0.2, 0.0), dvec3(-0.5, 0.2, 0.0), By::Exact)
+        .unwrap();
     assert!((route.length - 1.0).abs() < 1e-12);
 }
 
@@ -76,7 +110,11 @@ fn moebius() -> Mesh {
     let at = |i: u32, side: f64| {
         let angle = 2.0 * PI * f64::from(i) / f64::from(count);
         let out = 2.0 + side * (angle / 2.0).cos();
-        dvec3(out * angle.cos(), out * angle.sin(), side * (angle / 2.0).sin())
+        dvec3(
+            out * angle.cos(),
+            out * angle.sin(),
+            side * (angle / 2.0).sin(),
+        )
     };
     let mut positions: Vec<DVec3> = (0..count).flat_map(|i| [at(i, -0.5), at(i, 0.5)]).collect();
     let mut quads = Vec::new();
@@ -93,7 +131,11 @@ fn moebius() -> Mesh {
 #[test]
 fn a_moebius_strip_has_ways_and_no_normals() {
     let strip = moebius();
-    assert!(strip.warnings().contains(&MeshWarning::OneSided), "{:?}", strip.warnings());
+    assert!(
+        strip.warnings().contains(&MeshWarning::OneSided),
+        "{:?}",
+        strip.warnings()
+    );
     assert!(strip.normals().is_none());
     let middle = |i: usize| strip.positions()[i].midpoint(strip.positions()[i + 1]);
     let (from, to) = (middle(0), middle(22));
@@ -123,8 +165,15 @@ fn edges_of_three_faces_are_crossed() {
         for other in 0..one {
             let (from, to) = (pages[one], pages[other] + DVec3::Y);
             let route = book.route(from, to, By::Exact).unwrap();
-            assert!((route.length - 5f64.sqrt()).abs() < 1e-12, "{}", route.length);
-            assert_eq!(book.route(from, to, By::Plane), Err(RouteError::PlaneBranches));
+            assert!(
+                (route.length - 5f64.sqrt()).abs() < 1e-12,
+                "{}",
+                route.length
+            );
+            assert_eq!(
+                book.route(from, to, By::Plane),
+                Err(RouteError::PlaneBranches)
+            );
         }
     }
 }
@@ -141,18 +190,28 @@ fn starts_and_goals() {
         let route = mesh.route(goal, goal, by).unwrap();
         assert_eq!((route.points.len(), route.length), (1, 0.0));
     }
-    let error = mesh.route(goal, dvec3(7.5, 0.5, 0.0), By::Edges).unwrap_err();
+    let error = mesh
+        .route(goal, dvec3(7.5, 0.5, 0.0), By::Edges)
+        .unwrap_err();
     assert_eq!(error, RouteError::OtherPiece { start: 4, goal: 2 });
     let error = mesh.route(DVec3::NAN, goal, By::Exact).unwrap_err();
     assert!(matches!(error, RouteError::NotFinite { .. }));
     // Both within one triangle, one on its edge, one at a corner.
-    let inside = [dvec3(0.7, 0.2, 0.0), dvec3(0.9, 0.3, 0.0), dvec3(0.5, 0.5, 0.0), dvec3(1.0, 0.0, 0.0)];
+    let inside = [
+        dvec3(0.7, 0.2, 0.0),
+        dvec3(0.9, 0.3, 0.0),
+        dvec3(0.5, 0.5, 0.0),
+        dvec3(1.0, 0.0, 0.0),
+    ];
     for from in inside {
         for to in inside {
             for by in By::ALL {
                 let route = mesh.route(from, to, by).unwrap();
                 let error = (route.length - from.distance(to)).abs();
-                assert!(error < 1e-12 || by == By::Edges || by == By::Greedy, "{from} {to} {by}");
+                assert!(
+                    error < 1e-12 || by == By::Edges || by == By::Greedy,
+                    "{from} {to} {by}"
+                );
             }
         }
     }
@@ -165,12 +224,23 @@ const OBJ: &str = "# a roof\nmtllib none.mtl\no left\nv 0 0 0\nv 1 0 1e0\nv 1 1 
 fn obj_files() {
     let mesh = Mesh::of_obj(OBJ.as_bytes()).unwrap();
     assert_eq!((mesh.positions().len(), mesh.triangles().len()), (6, 4));
-    let route = mesh.route(DVec3::ZERO, dvec3(2.0, 0.0, 0.0), By::Exact).unwrap();
+    let route = mesh
+        .route(DVec3::ZERO, dvec3(2.0, 0.0, 0.0), By::Exact)
+        .unwrap();
     assert!((route.length - 8f64.sqrt()).abs() < 1e-15);
-    for bad in ["v 0 0\n", "v 0 0 0\nf 1 2 3\n", "v a b c\n", "f 1 2\n", "\u{0}\u{ff}"] {
+    for bad in [
+        "v 0 0\n",
+        "v 0 0 0\nf 1 2 3\n",
+        "v a b c\n",
+        "f 1 2\n",
+        "\u{0}\u{ff}",
+    ] {
         assert!(Mesh::of_obj(bad.as_bytes()).is_err(), "{bad}");
     }
-    assert_eq!(Mesh::of_obj(b"v 0 0 0\n").unwrap_err(), ReadError::Mesh(MeshError::Empty));
+    assert_eq!(
+        Mesh::of_obj(b"v 0 0 0\n").unwrap_err(),
+        ReadError::Mesh(MeshError::Empty)
+    );
 }
 
 const PLY: &str = "ply\nformat ascii 1.0\ncomment roof\nelement vertex 4\nproperty float x\n\
@@ -188,11 +258,19 @@ fn binary_ply(big: bool) -> Vec<u8> {
     .into_bytes();
     for number in CORNERS.iter().flat_map(|corner| corner.to_array()) {
         let number = number as f32;
-        bytes.extend(if big { number.to_be_bytes() } else { number.to_le_bytes() });
+        bytes.extend(if big {
+            number.to_be_bytes()
+        } else {
+            number.to_le_bytes()
+        });
     }
     bytes.push(4);
     for index in 0u32..4 {
-        bytes.extend(if big { index.to_be_bytes() } else { index.to_le_bytes() });
+        bytes.extend(if big {
+            index.to_be_bytes()
+        } else {
+            index.to_le_bytes()
+        });
     }
     bytes
 }
@@ -209,11 +287,17 @@ fn ply_files() {
     for huge in ["99999999999", "18446744073709551615"] {
         let text = PLY.replace("vertex 4", &format!("vertex {huge}"));
         assert!(Mesh::of_ply(text.as_bytes()).is_err());
-        let text = PLY.replace("element face 1", &format!("element gap {huge}\nelement face 1"));
+        let text = PLY.replace(
+            "element face 1",
+            &format!("element gap {huge}\nelement face 1"),
+        );
         assert!(Mesh::of_ply(text.as_bytes()).is_err());
     }
     let negative = PLY.replace("4 0 1 2 3", "4 0 1 2 -3");
-    assert!(matches!(Mesh::of_ply(negative.as_bytes()), Err(ReadError::Ply { .. })));
+    assert!(matches!(
+        Mesh::of_ply(negative.as_bytes()),
+        Err(ReadError::Ply { .. })
+    ));
 }
 
 proptest! {

@@ -14,7 +14,11 @@ fn saddle() -> Net {
 fn bump() -> Net {
     let point = |i: u32, j: u32| {
         let is_inner = (1..3).contains(&i) && (1..3).contains(&j);
-        dvec3(f64::from(i) / 3.0, f64::from(j) / 3.0, f64::from(u8::from(is_inner)))
+        dvec3(
+            f64::from(i) / 3.0,
+            f64::from(j) / 3.0,
+            f64::from(u8::from(is_inner)),
+        )
     };
     let all = (0..4).flat_map(|i| (0..4).map(move |j| (i, j)));
     Net::new(4, 4, all.map(|(i, j)| point(i, j)).collect()).unwrap()
@@ -25,7 +29,11 @@ fn a_line_and_the_shortest_way_over_a_saddle() {
     let net = saddle();
     let (from, to) = (DVec3::ZERO, dvec3(1.0, 0.5, 0.5));
     let line = net.route(from, to, NetBy::Line).unwrap();
-    assert!((line.length - 1.252_949_347_6).abs() < 1e-10, "{}", line.length);
+    assert!(
+        (line.length - 1.252_949_347_6).abs() < 1e-10,
+        "{}",
+        line.length
+    );
     assert_eq!((line.points[0], *line.points.last().unwrap()), (from, to));
     let shortest = net.route(from, to, NetBy::Facets(200)).unwrap().length;
     assert!((shortest - 1.251_039).abs() < 1e-6, "{shortest}");
@@ -38,14 +46,24 @@ fn ways_over_a_bump() {
     assert!((top - dvec3(0.25, 0.75, 0.316_406_25)).length() < 1e-15);
     let (from, to) = (dvec3(0.0, 0.4, 0.0), dvec3(1.0, 0.4, 0.0));
     let line = net.route(from, to, NetBy::Line).unwrap();
-    assert!((line.length - 1.540_353_482_7).abs() < 1e-10, "{}", line.length);
+    assert!(
+        (line.length - 1.540_353_482_7).abs() < 1e-10,
+        "{}",
+        line.length
+    );
     let facets = net.route(from, to, NetBy::Facets(20)).unwrap();
-    assert!((facets.length - 1.367_335_344_2).abs() < 1e-10, "{}", facets.length);
+    assert!(
+        (facets.length - 1.367_335_344_2).abs() < 1e-10,
+        "{}",
+        facets.length
+    );
     // The error falls with the square of the number of facets.
-    let errors = [20, 40, 80].map(|count| {
-        1.368_25 - net.route(from, to, NetBy::Facets(count)).unwrap().length
-    });
-    assert!(errors[0] > 3.0 * errors[1] && errors[2].abs() < 1e-4, "{errors:?}");
+    let errors = [20, 40, 80]
+        .map(|count| 1.368_25 - net.route(from, to, NetBy::Facets(count)).unwrap().length);
+    assert!(
+        errors[0] > 3.0 * errors[1] && errors[2].abs() < 1e-4,
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -72,24 +90,53 @@ fn places_are_found_again() {
 #[test]
 fn a_collapsed_side() {
     let tip = DVec3::Z;
-    let points = vec![tip, tip, tip, dvec3(-1.0, 0.0, 0.0), dvec3(0.0, 2.0, 0.0), DVec3::X];
+    let points = vec![
+        tip,
+        tip,
+        tip,
+        dvec3(-1.0, 0.0, 0.0),
+        dvec3(0.0, 2.0, 0.0),
+        DVec3::X,
+    ];
     let net = Net::new(2, 3, points).unwrap();
     let found = net.nearest(tip);
-    assert!(found.uv.x.abs() < 1e-10 && found.distance < 1e-15, "{found:?}");
+    assert!(
+        found.uv.x.abs() < 1e-10 && found.distance < 1e-15,
+        "{found:?}"
+    );
     assert!((net.normal(found.uv).length() - 1.0).abs() < 1e-12);
     let route = net.route(tip, DVec3::X, NetBy::Facets(12)).unwrap();
-    assert!((route.length - 2f64.sqrt()).abs() < 1e-12, "{}", route.length);
+    assert!(
+        (route.length - 2f64.sqrt()).abs() < 1e-12,
+        "{}",
+        route.length
+    );
 }
 
 #[test]
 fn what_is_no_net_is_refused() {
     let points = vec![DVec3::ZERO; 4];
-    assert!(matches!(Net::new(1, 4, points.clone()), Err(NetError::Shape { .. })));
-    assert!(matches!(Net::new(2, 3, points.clone()), Err(NetError::Count { found: 4, .. })));
+    assert!(matches!(
+        Net::new(1, 4, points.clone()),
+        Err(NetError::Shape { .. })
+    ));
+    assert!(matches!(
+        Net::new(2, 3, points.clone()),
+        Err(NetError::Count { found: 4, .. })
+    ));
     let mut bad = points;
     bad[2].y = f64::NAN;
-    assert!(matches!(Net::new(2, 2, bad), Err(NetError::NotFinite { row: 1, column: 0, .. })));
-    let error = saddle().route(DVec3::ZERO, DVec3::X, NetBy::Facets(0)).unwrap_err();
+    assert!(matches!(
+        Net::new(2, 2, bad),
+        Err(NetError::NotFinite {
+            row: 1,
+            column: 0,
+            ..
+        })
+    ));
+    let error = saddle()
+        .route(DVec3::ZERO, DVec3::X, NetBy::Facets(0))
+        .unwrap_err();
     assert_eq!(error, NetError::Facets { facets: 0 });
     assert!(saddle().route(DVec3::NAN, DVec3::X, NetBy::Line).is_err());
 }

@@ -14,10 +14,18 @@ fn assert_length(mesh: &Mesh, from: DVec3, to: DVec3, by: By, expected: f64, bou
     for (from, to) in [(from, to), (to, from)] {
         let route = mesh.route(from, to, by).unwrap();
         let error = (route.length - expected).abs();
-        assert!(error <= bound, "{from} to {to} by {by}: {} is off by {error:e}", route.length);
+        assert!(
+            error <= bound,
+            "{from} to {to} by {by}: {} is off by {error:e}",
+            route.length
+        );
         assert!(route.points[0].distance(from) < 1e-9);
         assert!(route.points.last().unwrap().distance(to) < 1e-9);
-        let sum: f64 = route.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        let sum: f64 = route
+            .points
+            .windows(2)
+            .map(|pair| pair[0].distance(pair[1]))
+            .sum();
         assert!((sum - route.length).abs() <= 1e-12 * expected);
         // Back again greedy may go another way.
         if by == By::Greedy {
@@ -35,14 +43,29 @@ fn assert_exact(mesh: &Mesh, from: DVec3, to: DVec3, expected: f64) {
 fn cube_and_boxes() {
     let cube = cuboid(DVec3::ONE);
     assert_exact(&cube, DVec3::ZERO, DVec3::ONE, 5f64.sqrt());
-    assert_length(&cube, DVec3::ZERO, DVec3::ONE, By::Edges, 1.0 + SQRT_2, 1e-12);
-    assert_eq!(cube.route(DVec3::ZERO, DVec3::ONE, By::Plane), Err(RouteError::NoPlane));
+    assert_length(
+        &cube,
+        DVec3::ZERO,
+        DVec3::ONE,
+        By::Edges,
+        1.0 + SQRT_2,
+        1e-12,
+    );
+    assert_eq!(
+        cube.route(DVec3::ZERO, DVec3::ONE, By::Plane),
+        Err(RouteError::NoPlane)
+    );
     let room = cuboid(dvec3(30.0, 12.0, 12.0));
     assert_exact(&room, dvec3(0.0, 6.0, 11.0), dvec3(30.0, 6.0, 1.0), 40.0);
     let tower = cuboid(dvec3(1.0, 1.0, 2.0));
     assert_exact(&tower, DVec3::ZERO, dvec3(1.0, 1.0, 2.0), 8f64.sqrt());
     // Not the opposite corner is the farthest point (Kotani's ant).
-    assert_exact(&tower, DVec3::ZERO, dvec3(0.75, 0.75, 2.0), 130f64.sqrt() / 4.0);
+    assert_exact(
+        &tower,
+        DVec3::ZERO,
+        dvec3(0.75, 0.75, 2.0),
+        130f64.sqrt() / 4.0,
+    );
 }
 
 #[test]
@@ -65,7 +88,8 @@ fn polyhedra_of_equal_triangles() {
     let octahedron = deltahedron(&[axes, axes.map(|axis| -axis)].concat());
     assert_exact(&octahedron, axes[0], -axes[0], 3f64.sqrt());
     let corners = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)];
-    let corners = corners.map(|(x, y, z)| dvec3(f64::from(x), f64::from(y), f64::from(z)) / 8f64.sqrt());
+    let corners =
+        corners.map(|(x, y, z)| dvec3(f64::from(x), f64::from(y), f64::from(z)) / 8f64.sqrt());
     let tetrahedron = deltahedron(&corners);
     let middle = |a: usize, b: usize| (corners[a] + corners[b]) / 2.0;
     assert_exact(&tetrahedron, middle(0, 1), middle(2, 3), 1.0);
@@ -96,7 +120,12 @@ fn boundaries() {
     let is_hole = |x: i32, y: i32| (-1..1).contains(&x) && (-1..1).contains(&y);
     let all = (-2..2).flat_map(|x| (-2..2).map(move |y| (x, y)));
     let frame = squares(all.filter(|&(x, y)| !is_hole(x, y)));
-    assert_exact(&frame, dvec3(-2.0, 0.0, 0.0), dvec3(2.0, 0.0, 0.0), 2.0 + 2.0 * SQRT_2);
+    assert_exact(
+        &frame,
+        dvec3(-2.0, 0.0, 0.0),
+        dvec3(2.0, 0.0, 0.0),
+        2.0 + 2.0 * SQRT_2,
+    );
 }
 
 /// Computed by the exact algorithm of Mitchell, Mount and Papadimitriou.
@@ -128,7 +157,10 @@ fn terrain_of_100_vertices() {
 fn dead_ends() {
     let row = |range: std::ops::RangeInclusive<i32>, y| range.map(move |x| (x, y));
     let column = |x, range: std::ops::RangeInclusive<i32>| range.map(move |y| (x, y));
-    let u: Vec<_> = column(0, 0..=2).chain(row(1..=2, 0)).chain(column(3, 0..=2)).collect();
+    let u: Vec<_> = column(0, 0..=2)
+        .chain(row(1..=2, 0))
+        .chain(column(3, 0..=2))
+        .collect();
     let u = squares(u.into_iter().chain([(2, 2)]));
     let (from, to) = (dvec3(1.0, 3.0, 0.0), dvec3(2.0, 3.0, 0.0));
     assert_length(&u, from, to, By::Exact, 6.414_213_562_4, 1e-10);

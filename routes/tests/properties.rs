@@ -12,8 +12,13 @@ fn terrains() -> impl Strategy<Value = (Mesh, [DVec3; 3])> {
     let height = prop_oneof![Just(0.0), -2.0..2.0];
     let width = 4..9u32;
     let places = prop::array::uniform3(prop::array::uniform2(0.0..1.0));
-    (width, prop::collection::vec(height, 81), places, any::<bool>()).prop_map(
-        |(width, all, places, rounded)| {
+    (
+        width,
+        prop::collection::vec(height, 81),
+        places,
+        any::<bool>(),
+    )
+        .prop_map(|(width, all, places, rounded)| {
             let (positions, triangles) = heights(width, |x, y| all[(y * 9 + x) as usize]);
             let mesh = Mesh::new(&positions, &triangles).unwrap();
             let side = f64::from(width - 1);
@@ -22,8 +27,7 @@ fn terrains() -> impl Strategy<Value = (Mesh, [DVec3; 3])> {
                 mesh.nearest(if rounded { place.round() } else { place })
             });
             (mesh, places)
-        },
-    )
+        })
 }
 
 fn exact(mesh: &Mesh, from: DVec3, to: DVec3) -> Route {

@@ -32,19 +32,31 @@ fn gate(from: f64, to: f64) -> Mover {
 }
 
 fn place(track: &[(f64, DVec3)], time: f64) -> DVec3 {
-    let next = track.partition_point(|own| own.0 <= time).clamp(1, track.len() - 1);
+    let next = track
+        .partition_point(|own| own.0 <= time)
+        .clamp(1, track.len() - 1);
     let ((from, one), (to, other)) = (track[next - 1], track[next]);
-    if to <= from { other } else { one.lerp(other, ((time - from) / (to - from)).clamp(0.0, 1.0)) }
+    if to <= from {
+        other
+    } else {
+        one.lerp(other, ((time - from) / (to - from)).clamp(0.0, 1.0))
+    }
 }
 
 fn track(plan: &Plan) -> Vec<(f64, DVec3)> {
-    plan.times.iter().map(|&(time, _, place)| (time, place)).collect()
+    plan.times
+        .iter()
+        .map(|&(time, _, place)| (time, place))
+        .collect()
 }
 
 #[track_caller]
 fn assert_arrives(found: &Result<Plan, WalkerError>, expected: f64) {
     let arrival = found.as_ref().unwrap().arrival;
-    assert!((arrival - expected).abs() <= 1e-9, "{arrival} instead of {expected}");
+    assert!(
+        (arrival - expected).abs() <= 1e-9,
+        "{arrival} instead of {expected}"
+    );
 }
 
 #[test]
@@ -53,8 +65,14 @@ fn a_gate_is_waited_for() {
     assert_arrives(&plan(&[along_x()], &[gate(0.0, 2.0)])[0], 10.0);
     assert_arrives(&plan(&[along_x()], &[])[0], 10.0);
     // Between two gates there is time to pass, or not: it takes 2 from 4 to 6.
-    assert_arrives(&plan(&[along_x()], &[gate(3.0, 7.0), gate(9.1, 12.0)])[0], 13.0);
-    assert_arrives(&plan(&[along_x()], &[gate(3.0, 7.0), gate(8.9, 12.0)])[0], 18.0);
+    assert_arrives(
+        &plan(&[along_x()], &[gate(3.0, 7.0), gate(9.1, 12.0)])[0],
+        13.0,
+    );
+    assert_arrives(
+        &plan(&[along_x()], &[gate(3.0, 7.0), gate(8.9, 12.0)])[0],
+        18.0,
+    );
 }
 
 #[test]
@@ -75,7 +93,14 @@ fn who_comes_second_lets_the_first_pass() {
 #[test]
 fn who_cannot_pass_is_told() {
     let ends = straight(dvec3(5.0, 5.0, 0.0), dvec3(5.0, 0.0, 0.0));
-    let plans = plan(&[ends, along_x(), straight(dvec3(8.0, 3.0, 0.0), dvec3(8.0, 9.0, 0.0))], &[]);
+    let plans = plan(
+        &[
+            ends,
+            along_x(),
+            straight(dvec3(8.0, 3.0, 0.0), dvec3(8.0, 9.0, 0.0)),
+        ],
+        &[],
+    );
     assert_arrives(&plans[0], 5.0);
     // Before the first is there, the second has passed.
     assert!(plans[1].is_ok() || plans[1] == Err(WalkerError::Blocked));
@@ -110,7 +135,10 @@ fn a_start_is_waited_for_where_one_stands() {
         speed: 0.0,
         ..along_x()
     };
-    assert!(matches!(plan(&[nowhere], &[])[0], Err(WalkerError::Numbers { .. })));
+    assert!(matches!(
+        plan(&[nowhere], &[])[0],
+        Err(WalkerError::Numbers { .. })
+    ));
     let point = Walker {
         route: Route {
             points: vec![DVec3::ZERO],
@@ -131,7 +159,10 @@ fn crowds_keep_apart() {
     let walkers: Vec<Walker> = (0..12)
         .map(|_| {
             let points = vec![at(), at(), at()];
-            let length = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+            let length = points
+                .windows(2)
+                .map(|pair| pair[0].distance(pair[1]))
+                .sum();
             let route = Route {
                 points,
                 normals: None,

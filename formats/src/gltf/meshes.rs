@@ -71,7 +71,9 @@ fn shown(json: &Json<'_>, nodes: &Nodes) -> Result<Vec<bool>, Diagnostic> {
         }
         node
     };
-    Ok((0..nodes.count()).map(|node| scene.nodes.contains(&root(node))).collect())
+    Ok((0..nodes.count())
+        .map(|node| scene.nodes.contains(&root(node)))
+        .collect())
 }
 
 /// Where a node rests in the scene.
@@ -84,7 +86,8 @@ fn world(json: &Json<'_>, nodes: &Nodes, node: usize) -> Result<DMat4, Diagnosti
             Some(matrix) => DMat4::from_cols_array(&matrix),
             None => DMat4::from_scale_rotation_translation(
                 node.scale.map_or(DVec3::ONE, DVec3::from_array),
-                node.rotation.map_or(DQuat::IDENTITY, |own| DQuat::from_array(own).normalize()),
+                node.rotation
+                    .map_or(DQuat::IDENTITY, |own| DQuat::from_array(own).normalize()),
                 node.translation.map_or(DVec3::ZERO, DVec3::from_array),
             ),
         };
@@ -106,7 +109,11 @@ fn add(
     if !(4..=6).contains(&primitive.mode) {
         return Ok(());
     }
-    if primitive.extensions.get("KHR_draco_mesh_compression").is_some() {
+    if primitive
+        .extensions
+        .get("KHR_draco_mesh_compression")
+        .is_some()
+    {
         let message = "the mesh is compressed by Draco, which is not known; export it without";
         return Err(json.refuse(pointer, Code::Extension, message));
     }
@@ -123,7 +130,8 @@ fn add(
         return Err(json.refuse(pointer, Code::IndexRange, message));
     }
     let positions = numbers.chunks_exact(3).map(DVec3::from_slice);
-    all.positions.extend(positions.map(|own| place.transform_point3(own)));
+    all.positions
+        .extend(positions.map(|own| place.transform_point3(own)));
     let indices: Vec<u32> = match primitive.indices {
         None => (0..count as u32).collect(),
         Some(indices) => {
@@ -138,12 +146,17 @@ fn add(
     let corner = |index: u32| first as u32 + index;
     let mut push = |own: [u32; 3]| all.triangles.push(own.map(corner));
     match primitive.mode {
-        4 => indices.chunks_exact(3).for_each(|own| push([own[0], own[1], own[2]])),
+        4 => indices
+            .chunks_exact(3)
+            .for_each(|own| push([own[0], own[1], own[2]])),
         5 => indices.windows(3).enumerate().for_each(|(place, own)| {
             let swap = place % 2;
             push([own[0], own[1 + swap], own[2 - swap]]);
         }),
-        _ => indices.windows(2).skip(1).for_each(|own| push([indices[0], own[0], own[1]])),
+        _ => indices
+            .windows(2)
+            .skip(1)
+            .for_each(|own| push([indices[0], own[0], own[1]])),
     }
     Ok(())
 }

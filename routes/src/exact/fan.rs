@@ -60,7 +60,9 @@ impl Fan {
             if twin == NONE || twin == MANY {
                 return None;
             }
-            let own = [twin, next(twin)].into_iter().find(|&own| at(faces, own) == vertex)?;
+            let own = [twin, next(twin)]
+                .into_iter()
+                .find(|&own| at(faces, own) == vertex)?;
             let ends = [at(faces, next(own)), at(faces, previous(own))];
             Some((own, if ends[0] == end { ends[1] } else { ends[0] }))
         };
@@ -140,7 +142,10 @@ impl Fan {
         match arrival {
             Arrival::Edge(before) => {
                 let of = |wedge: &Wedge| {
-                    let ends = [at(faces, next(wedge.corner)), at(faces, previous(wedge.corner))];
+                    let ends = [
+                        at(faces, next(wedge.corner)),
+                        at(faces, previous(wedge.corner)),
+                    ];
                     match ends.contains(&before) {
                         true if wedge.first == before => Some(wedge.from),
                         true => Some(wedge.to),
@@ -152,7 +157,10 @@ impl Fan {
             Arrival::Window {
                 half_edge, angle, ..
             } => {
-                let wedge = self.wedges.iter().find(|wedge| wedge.corner / 3 == half_edge / 3)?;
+                let wedge = self
+                    .wedges
+                    .iter()
+                    .find(|wedge| wedge.corner / 3 == half_edge / 3)?;
                 match wedge.first == at(faces, half_edge) {
                     true => Some(wedge.from + angle),
                     false => Some(wedge.to - angle),
@@ -188,7 +196,10 @@ impl Fan {
         };
         let mut parts = Vec::new();
         for &(low, high) in directions {
-            let (low, high) = (low.max(wedge.from) - wedge.from, high.min(wedge.to) - wedge.from);
+            let (low, high) = (
+                low.max(wedge.from) - wedge.from,
+                high.min(wedge.to) - wedge.from,
+            );
             if low < high {
                 let (one, other) = (along(low), along(high));
                 parts.push((one.min(other), one.max(other)));

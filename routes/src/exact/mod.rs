@@ -51,7 +51,13 @@ enum Event {
 pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     let mut search = Search::new(task);
     search.run()?;
-    Ok(trace::way(&search.surface, task.start, task.goal, &search.arrivals, &search.trail))
+    Ok(trace::way(
+        &search.surface,
+        task.start,
+        task.goal,
+        &search.arrivals,
+        &search.trail,
+    ))
 }
 
 /// Of the windows that enter through a half-edge and hold the corner opposite, the shortest there.
@@ -82,7 +88,9 @@ impl<'a> Search<'a> {
     fn new(task: &'a Task<'a>) -> Self {
         let surface = &*task.surface;
         let half_edges = 3 * surface.faces.len();
-        let shapes = (0..half_edges as u32).map(|own| Shape::of(surface, own)).collect();
+        let shapes = (0..half_edges as u32)
+            .map(|own| Shape::of(surface, own))
+            .collect();
         let (lengths, before) = distances(surface, task.start);
         let same = TOLERANCE * lengths[task.goal as usize];
         let unoccupied = Occupant {
@@ -146,7 +154,8 @@ impl<'a> Search<'a> {
     fn push_vertex(&mut self, vertex: u32) {
         let bound = self.bound_at(vertex);
         if bound <= self.arrivals.length(self.goal) {
-            self.heap.push(Reverse((Distance(bound), Event::Vertex(vertex))));
+            self.heap
+                .push(Reverse((Distance(bound), Event::Vertex(vertex))));
         }
     }
 
@@ -261,7 +270,10 @@ impl<'a> Search<'a> {
             *occupant = Occupant { length, entry };
             return (true, true);
         }
-        (entry <= occupant.entry + near, entry >= occupant.entry - near)
+        (
+            entry <= occupant.entry + near,
+            entry >= occupant.entry - near,
+        )
     }
 
     /// Hands a window on to the faces beyond its edge. Its half-edge is that of the face which it
@@ -307,7 +319,8 @@ impl<'a> Search<'a> {
                 self.windows.len() as u32 - 1
             }
         };
-        self.heap.push(Reverse((Distance(bound), Event::Window(place))));
+        self.heap
+            .push(Reverse((Distance(bound), Event::Window(place))));
     }
 
     /// The least length that a way through the window to the goal can have: the goal is turned

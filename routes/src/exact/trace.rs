@@ -92,7 +92,11 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
         edges.push(known);
         let is_turned = known[0].0 != at(faces, half_edge);
         let shape = Shape::of(surface, half_edge);
-        let x = if is_turned { shape.length - shape.x } else { shape.x };
+        let x = if is_turned {
+            shape.length - shape.x
+        } else {
+            shape.x
+        };
         let along = (known[1].1 - known[0].1) / shape.length;
         target = known[0].1 + x * along + shape.y * along.perp();
         let opposite = (at(faces, previous(half_edge)), target);

@@ -108,7 +108,11 @@ impl Window {
             met.clamp(0.0, length)
         };
         let low = meets(self.low);
-        let high = if self.high >= entry { length } else { meets(self.high) };
+        let high = if self.high >= entry {
+            length
+        } else {
+            meets(self.high)
+        };
         (low < high).then(|| Self {
             half_edge: previous(self.half_edge),
             parent,
@@ -133,7 +137,11 @@ impl Window {
             let met = from_corner.perp_dot(ray) / along.perp_dot(ray);
             met.clamp(0.0, length)
         };
-        let low = if self.low <= entry { 0.0 } else { meets(self.low) };
+        let low = if self.low <= entry {
+            0.0
+        } else {
+            meets(self.low)
+        };
         let high = meets(self.high);
         (low < high).then(|| Self {
             half_edge: next(self.half_edge),

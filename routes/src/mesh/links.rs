@@ -21,12 +21,20 @@ pub(crate) struct Links {
 
 /// The corner after `corner` in its face.
 pub(crate) fn next(corner: u32) -> u32 {
-    if corner % 3 == 2 { corner - 2 } else { corner + 1 }
+    if corner % 3 == 2 {
+        corner - 2
+    } else {
+        corner + 1
+    }
 }
 
 /// The corner before `corner` in its face.
 pub(crate) fn previous(corner: u32) -> u32 {
-    if corner.is_multiple_of(3) { corner + 2 } else { corner - 1 }
+    if corner.is_multiple_of(3) {
+        corner + 2
+    } else {
+        corner - 1
+    }
 }
 
 /// The vertex at a corner.

@@ -178,12 +178,21 @@ fn normals(positions: &[DVec3], faces: &[[u32; 3]]) -> Vec<DVec3> {
     for face in faces {
         let corners = face.map(|vertex| positions[vertex as usize]);
         for k in 0..3 {
-            let (one, other) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            let (one, other) = (
+                corners[(k + 1) % 3] - corners[k],
+                corners[(k + 2) % 3] - corners[k],
+            );
             let cross = one.cross(other);
             let angle = cross.length().atan2(one.dot(other));
             sums[face[k] as usize] += angle * cross.normalize_or_zero();
         }
     }
-    let unit = |sum: DVec3| if sum.length() > 1e-12 { sum.normalize() } else { DVec3::ZERO };
+    let unit = |sum: DVec3| {
+        if sum.length() > 1e-12 {
+            sum.normalize()
+        } else {
+            DVec3::ZERO
+        }
+    };
     sums.into_iter().map(unit).collect()
 }

@@ -89,7 +89,10 @@ pub fn obj(text: &[u8]) -> Result<Polygons, ReadError> {
         let first = all.positions.len() as u32;
         let positions = mesh.positions.chunks_exact(3);
         all.positions.extend(positions.map(DVec3::from_slice));
-        let mut indices = mesh.indices.iter().map(|&index| first.saturating_add(index));
+        let mut indices = mesh
+            .indices
+            .iter()
+            .map(|&index| first.saturating_add(index));
         let arities = match mesh.face_arities.is_empty() {
             true => vec![3; mesh.indices.len() / 3],
             false => mesh.face_arities,
@@ -163,7 +166,9 @@ pub fn ply(bytes: &[u8]) -> Result<Polygons, ReadError> {
     let refuse = |reason: String| ReadError::Ply { reason };
     let parser = Parser::<Row>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
-    let header = parser.read_header(&mut reader).map_err(|error| refuse(error.to_string()))?;
+    let header = parser
+        .read_header(&mut reader)
+        .map_err(|error| refuse(error.to_string()))?;
     for (name, element) in &header.elements {
         // A row takes a byte at least, where it has anything.
         if element.count > bytes.len() || (element.properties.is_empty() && element.count > 0) {
@@ -182,11 +187,15 @@ pub fn ply(bytes: &[u8]) -> Result<Polygons, ReadError> {
     let mut polygons = Vec::with_capacity(rows("face").len());
     for (face, row) in rows("face").iter().enumerate() {
         let Some(indices) = &row.indices else {
-            return Err(refuse(format!("face {face} (from 0) has no `vertex_indices`")));
+            return Err(refuse(format!(
+                "face {face} (from 0) has no `vertex_indices`"
+            )));
         };
         let polygon: Result<Vec<u32>, _> = indices.iter().map(|&own| u32::try_from(own)).collect();
         polygons.push(polygon.map_err(|_| {
-            refuse(format!("face {face} (from 0) names a vertex below 0: {indices:?}"))
+            refuse(format!(
+                "face {face} (from 0) names a vertex below 0: {indices:?}"
+            ))
         })?);
     }
     Ok(Polygons {

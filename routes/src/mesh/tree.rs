@@ -46,7 +46,10 @@ impl Tree {
 
     fn build(&mut self, surface: &Surface, place: usize, faces: &mut [u32]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for corner in faces.iter().flat_map(|&face| surface.triangle(face as usize)) {
+        for corner in faces
+            .iter()
+            .flat_map(|&face| surface.triangle(face as usize))
+        {
             (low, high) = (low.min(corner), high.max(corner));
         }
         self.boxes[place] = (low, high);

@@ -42,7 +42,9 @@ pub(super) fn weld<'a>(
             let (face, corners) = (number, polygon.len());
             return Err(MeshError::Corners { face, corners });
         }
-        let outside = polygon.iter().find(|&&vertex| vertex as usize >= given.len());
+        let outside = polygon
+            .iter()
+            .find(|&&vertex| vertex as usize >= given.len());
         if let Some(&vertex) = outside {
             return Err(MeshError::Index {
                 face: number,
@@ -122,9 +124,13 @@ impl Welding<'_> {
 
 /// Whether the corners lie in the plane of Newell's normal.
 fn is_flat(given: &[DVec3], polygon: &[u32]) -> bool {
-    let at = |corner: usize| given[polygon[corner % polygon.len()] as usize] - given[polygon[0] as usize];
+    let at = |corner: usize| {
+        given[polygon[corner % polygon.len()] as usize] - given[polygon[0] as usize]
+    };
     let normal: DVec3 = (0..polygon.len()).map(|i| at(i).cross(at(i + 1))).sum();
     let normal = normal.normalize_or_zero();
-    let size = (0..polygon.len()).map(|i| at(i).length()).fold(0.0, f64::max);
+    let size = (0..polygon.len())
+        .map(|i| at(i).length())
+        .fold(0.0, f64::max);
     (0..polygon.len()).all(|i| at(i).dot(normal).abs() <= UNEVEN * size)
 }

@@ -46,7 +46,10 @@ pub(super) fn turn_alike(vertices: usize, faces: &mut [[u32; 3]]) -> Turned {
                 }
             }
         }
-        let count = piece.iter().filter(|&&face| against[face] == Some(true)).count();
+        let count = piece
+            .iter()
+            .filter(|&&face| against[face] == Some(true))
+            .count();
         let turn = 2 * count <= piece.len();
         turned.count += if turn { count } else { piece.len() - count };
         for face in piece {

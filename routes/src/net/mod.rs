@@ -164,8 +164,16 @@ impl Net {
     /// The largest extent of the control points along an axis.
     #[must_use]
     pub fn size(&self) -> f64 {
-        let low = self.points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = self.points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let low = self
+            .points
+            .iter()
+            .copied()
+            .fold(DVec3::INFINITY, DVec3::min);
+        let high = self
+            .points
+            .iter()
+            .copied()
+            .fold(DVec3::NEG_INFINITY, DVec3::max);
         (high - low).max_element()
     }
 
@@ -179,7 +187,10 @@ impl Net {
         }
         let part = |i: usize| i as f64 / facets as f64;
         let row = |i| (0..=facets).map(move |j| DVec2::new(part(i), part(j)));
-        let positions: Vec<DVec3> = (0..=facets).flat_map(row).map(|uv| self.vertex(uv)).collect();
+        let positions: Vec<DVec3> = (0..=facets)
+            .flat_map(row)
+            .map(|uv| self.vertex(uv))
+            .collect();
         let mut triangles = Vec::with_capacity(2 * facets * facets);
         for i in 0..facets {
             for j in 0..facets {
@@ -200,7 +211,10 @@ impl Net {
                 _ => return None,
             };
             let mut points = (0..across).map(|k| self.points[first + k * step]);
-            points.clone().all(|point| point == self.points[first]).then(|| points.next())?
+            points
+                .clone()
+                .all(|point| point == self.points[first])
+                .then(|| points.next())?
         };
         let by_u = side(uv.x, self.rows, self.columns, self.columns, 1);
         let by_v = || side(uv.y, self.columns, 1, self.rows, self.columns);
@@ -279,7 +293,10 @@ fn integral(function: &impl Fn(f64) -> f64, from: f64, to: f64, depth: u32) -> f
     ];
     let over = |from: f64, to: f64| -> f64 {
         let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
-        half * NODES.iter().map(|(node, weight)| weight * function(middle + half * node)).sum::<f64>()
+        half * NODES
+            .iter()
+            .map(|(node, weight)| weight * function(middle + half * node))
+            .sum::<f64>()
     };
     let middle = f64::midpoint(from, to);
     let (whole, halves) = (over(from, to), over(from, middle) + over(middle, to));

@@ -61,8 +61,16 @@ pub(super) fn nearest(net: &Net, point: DVec3) -> OnNet {
 
 impl Net {
     fn box_distance(&self, point: DVec3) -> f64 {
-        let low = self.points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = self.points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let low = self
+            .points
+            .iter()
+            .copied()
+            .fold(DVec3::INFINITY, DVec3::min);
+        let high = self
+            .points
+            .iter()
+            .copied()
+            .fold(DVec3::NEG_INFINITY, DVec3::max);
         (low - point).max(point - high).max(DVec3::ZERO).length()
     }
 }
@@ -158,7 +166,8 @@ fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
 fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
     let away = here.point - point;
     let slope = DVec2::new(away.dot(here.u), away.dot(here.v));
-    let is_held = |value: f64, slope: f64| value <= 0.0 && slope > 0.0 || value >= 1.0 && slope < 0.0;
+    let is_held =
+        |value: f64, slope: f64| value <= 0.0 && slope > 0.0 || value >= 1.0 && slope < 0.0;
     let (hold_u, hold_v) = (is_held(uv.x, slope.x), is_held(uv.y, slope.y));
     let (gauss_uu, gauss_vv) = (here.u.length_squared(), here.v.length_squared());
     let gauss_uv = here.u.dot(here.v);

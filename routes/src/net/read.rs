@@ -15,22 +15,36 @@ impl Net {
         let file = NpyFile::new(bytes).map_err(|error| refuse(error.to_string()))?;
         let shape = file.shape().to_vec();
         let &[rows, columns, 3] = &shape[..] else {
-            return Err(refuse(format!("its shape is {shape:?}, and that of a net (m, n, 3)")));
+            return Err(refuse(format!(
+                "its shape is {shape:?}, and that of a net (m, n, 3)"
+            )));
         };
-        let [rows, columns] = [rows, columns].map(|side| usize::try_from(side).unwrap_or(usize::MAX));
+        let [rows, columns] =
+            [rows, columns].map(|side| usize::try_from(side).unwrap_or(usize::MAX));
         // Before anything is allocated for it.
         if rows.max(columns) > MOST_POINTS {
             return Err(NetError::Shape { rows, columns });
         }
         if file.order() != Order::C {
-            return Err(refuse("it is in Fortran's order; save a C-contiguous array".to_owned()));
+            return Err(refuse(
+                "it is in Fortran's order; save a C-contiguous array".to_owned(),
+            ));
         }
         let kind = file.dtype().descr();
         let broken = |error: std::io::Error| refuse(error.to_string());
         let numbers: Vec<f64> = match kind.trim_matches('\'') {
             "<f8" => file.into_vec().map_err(broken)?,
-            "<f4" => file.into_vec::<f32>().map_err(broken)?.into_iter().map(f64::from).collect(),
-            _ => return Err(refuse(format!("it has {kind}; save it as float32 or float64"))),
+            "<f4" => file
+                .into_vec::<f32>()
+                .map_err(broken)?
+                .into_iter()
+                .map(f64::from)
+                .collect(),
+            _ => {
+                return Err(refuse(format!(
+                    "it has {kind}; save it as float32 or float64"
+                )));
+            }
         };
         let points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
         Self::new(rows, columns, points)

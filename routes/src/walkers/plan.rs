@@ -53,8 +53,14 @@ pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, Wa
         reached.push(on);
     }
     let delay = |index: usize, most: f64| {
-        let gaps = raised(&reached[index], &blocked(&regions, places[index], places[index]));
-        let gap = gaps.into_iter().rev().find(|own| own.0 <= most + same(most));
+        let gaps = raised(
+            &reached[index],
+            &blocked(&regions, places[index], places[index]),
+        );
+        let gap = gaps
+            .into_iter()
+            .rev()
+            .find(|own| own.0 <= most + same(most));
         gap.map_or(most, |own| own.0.min(most))
     };
     let last = places.len() - 1;
@@ -68,7 +74,11 @@ pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, Wa
     let mut delays = vec![(arriving, arriving); places.len()];
     let mut own = arriving;
     for index in (0..=last).rev() {
-        let before = if index == 0 { 0.0 } else { delay(index, own).min(own) };
+        let before = if index == 0 {
+            0.0
+        } else {
+            delay(index, own).min(own)
+        };
         let before = if index == last { own } else { before };
         delays[index] = (before, own);
         own = before;
@@ -83,7 +93,11 @@ fn same(delay: f64) -> f64 {
     SAME * (1.0 + delay.abs())
 }
 
-fn regions(walker: &Walker, stops: &[f64], others: &[(Mover, Stay)]) -> Vec<(DVec2, DVec2, Region)> {
+fn regions(
+    walker: &Walker,
+    stops: &[f64],
+    others: &[(Mover, Stay)],
+) -> Vec<(DVec2, DVec2, Region)> {
     let points = &walker.route.points;
     let stretch = |k: usize| Line::between((stops[k], points[k]), (stops[k + 1], points[k + 1]));
     let mut ways: Vec<Line> = (0..points.len() - 1).map(stretch).collect();
@@ -99,7 +113,8 @@ fn regions(walker: &Walker, stops: &[f64], others: &[(Mover, Stay)]) -> Vec<(DVe
         }
         for &line in &lines {
             for &way in &ways {
-                let region = Region::new(way, line, 1.0 / walker.speed, walker.radius + other.radius);
+                let region =
+                    Region::new(way, line, 1.0 / walker.speed, walker.radius + other.radius);
                 if let Some((low, high)) = region.extent(way.from, way.to)
                     && high.y >= 0.0
                 {
@@ -125,7 +140,11 @@ fn places(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
             continue;
         }
         let touches = |(low, high, _): &(DVec2, DVec2, Region)| low.x < mark && high.x > before;
-        let steps = if regions.iter().any(touches) { STEPS } else { 1 };
+        let steps = if regions.iter().any(touches) {
+            STEPS
+        } else {
+            1
+        };
         let part = (mark - before) / steps as f64;
         places.extend((1..steps).map(|step| before + step as f64 * part));
         places.push(mark);
@@ -138,7 +157,9 @@ fn places(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
 
 /// The open intervals of delays that some region holds between two places, apart and in order.
 fn blocked(regions: &[(DVec2, DVec2, Region)], from: f64, to: f64) -> Vec<Interval> {
-    let near = regions.iter().filter(|(low, high, _)| low.x <= to && high.x >= from);
+    let near = regions
+        .iter()
+        .filter(|(low, high, _)| low.x <= to && high.x >= from);
     let extents = near.filter_map(|(_, _, region)| region.extent(from, to));
     let mut all: Vec<Interval> = extents.map(|(low, high)| (low.y, high.y)).collect();
     all.retain(|own| own.1 - own.0 > same(own.0));
@@ -186,7 +207,11 @@ fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     for &(low, high) in reached {
         for gap in &gaps {
             // Rounding may leave the end of a region a little inside it.
-            let from = if low < gap.0 && gap.0 - low <= same(low) { gap.0 } else { low.max(gap.0) };
+            let from = if low < gap.0 && gap.0 - low <= same(low) {
+                gap.0
+            } else {
+                low.max(gap.0)
+            };
             let to = high.min(gap.1);
             if from <= to {
                 left.push((from, to));
@@ -200,7 +225,9 @@ fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
 fn timed(walker: &Walker, stops: &[f64], places: &[f64], delays: &[(f64, f64)]) -> Plan {
     let points = &walker.route.points;
     let at = |place: f64| {
-        let next = stops.partition_point(|&stop| stop < place).clamp(1, stops.len().max(2) - 1);
+        let next = stops
+            .partition_point(|&stop| stop < place)
+            .clamp(1, stops.len().max(2) - 1);
         match (points.get(next - 1), points.get(next)) {
             (Some(&one), Some(&other)) => {
                 let part = (place - stops[next - 1]) / (stops[next] - stops[next - 1]);
@@ -213,7 +240,9 @@ fn timed(walker: &Walker, stops: &[f64], places: &[f64], delays: &[(f64, f64)]) 
     for (index, (&place, &(before, behind))) in places.iter().zip(delays).enumerate() {
         let walked = place / walker.speed;
         let waits = behind - before > same(before);
-        let is_stop = stops.binary_search_by(|stop| stop.total_cmp(&place)).is_ok();
+        let is_stop = stops
+            .binary_search_by(|stop| stop.total_cmp(&place))
+            .is_ok();
         if waits || is_stop || index == 0 || index + 1 == places.len() {
             times.push((before + walked, place, at(place)));
         }

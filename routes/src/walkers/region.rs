@@ -111,7 +111,9 @@ impl Region {
             }
         }
         // On the bounds of the way, and on those of time: w = time - slowness * s.
-        let times = [self.from, self.to].into_iter().filter(|time| time.is_finite());
+        let times = [self.from, self.to]
+            .into_iter()
+            .filter(|time| time.is_finite());
         for s in [start, end] {
             for w in self.roots(c + s * a, b) {
                 take(DVec2::new(s, w));

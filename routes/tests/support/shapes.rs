@@ -47,7 +47,10 @@ pub(crate) fn heights(width: u32, height: impl Fn(u32, u32) -> f64) -> (Vec<DVec
     let inner = all.filter(|&(x, y)| x + 1 < width && y + 1 < width);
     let cut = |(x, y): (u32, u32)| {
         let at = |dx, dy| (y + dy) * width + x + dx;
-        [[at(0, 0), at(1, 0), at(1, 1)], [at(0, 0), at(1, 1), at(0, 1)]]
+        [
+            [at(0, 0), at(1, 0), at(1, 1)],
+            [at(0, 0), at(1, 1), at(0, 1)],
+        ]
     };
     (positions, inner.flat_map(cut).collect())
 }

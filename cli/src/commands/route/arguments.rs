@@ -91,7 +91,9 @@ impl Arguments {
             (Some(from), Some(to), None, None) => Ok(Party::of_pair([from, to])),
             (None, None, Some(file), None) => read_pairs(file),
             (None, None, None, Some(file)) => read_walkers(file),
-            _ => Err(Failure::usage("give --from and --to, --pairs, or --walkers")),
+            _ => Err(Failure::usage(
+                "give --from and --to, --pairs, or --walkers",
+            )),
         }
     }
 
@@ -112,7 +114,9 @@ fn manner(text: &str) -> Result<Manner, String> {
     match (text, text.strip_prefix("facets:").map(str::parse)) {
         ("line", _) => Ok(Manner::Net(NetBy::Line)),
         (_, Some(Ok(facets))) => Ok(Manner::Net(NetBy::Facets(facets))),
-        _ => Err("give exact, plane, greedy or edges for a mesh, line or facets:N for a net".into()),
+        _ => {
+            Err("give exact, plane, greedy or edges for a mesh, line or facets:N for a net".into())
+        }
     }
 }
 
@@ -123,7 +127,9 @@ pub(crate) fn point(text: &str) -> Result<DVec3, String> {
         Ok(&[x, y, z]) if [x, y, z].iter().all(|own: &f64| own.is_finite()) => {
             Ok(DVec3::new(x, y, z))
         }
-        _ => Err(format!("`{text}` is no point; give three numbers, such as 1,2.5,-3")),
+        _ => Err(format!(
+            "`{text}` is no point; give three numbers, such as 1,2.5,-3"
+        )),
     }
 }
 

@@ -62,7 +62,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         },
         None => None,
     };
-    let found = busy("finding ways", || find(arguments, &surface, avoided.as_ref(), &party))?;
+    let found = busy("finding ways", || {
+        find(arguments, &surface, avoided.as_ref(), &party)
+    })?;
     let outcomes = scheduled(found, &party);
     for outcome in &outcomes {
         warn_off(outcome, surface.size());
@@ -93,14 +95,18 @@ fn find(
                 up: arguments.up,
             };
             let ground = Ground::new(mesh, clear);
-            let ground = ground
-                .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
+            let ground =
+                ground.map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
             let routes = ground.routes(&party.pairs, by).into_iter();
-            routes.map(|own| own.map_err(|error| words(&error))).collect()
+            routes
+                .map(|own| own.map_err(|error| words(&error)))
+                .collect()
         }
         (Surface::Mesh(mesh), Manner::Mesh(by)) => {
             let routes = mesh.routes(&party.pairs, by).into_iter();
-            routes.map(|own| own.map_err(|error| words(&error))).collect()
+            routes
+                .map(|own| own.map_err(|error| words(&error)))
+                .collect()
         }
         (Surface::Net(_), _) if arguments.wants_ground() => {
             return Err(Failure::usage(format!(
@@ -110,7 +116,9 @@ fn find(
         (Surface::Net(net), Manner::Net(by)) => {
             let route = |&[from, to]: &[DVec3; 2]| net.route(from, to, by);
             let routes = party.pairs.par_iter().map(route);
-            routes.map(|own| own.map_err(|error| words(&error))).collect()
+            routes
+                .map(|own| own.map_err(|error| words(&error)))
+                .collect()
         }
         (Surface::Mesh(_), Manner::Net(_)) => {
             return Err(Failure::usage(format!(
@@ -230,7 +238,10 @@ fn told(
         }
         _ if failed == outcomes.len() => Err(Failure::quiet(ALL_INPUTS)),
         _ => {
-            let message = format!("{failed} of {} routes failed; the others are done", outcomes.len());
+            let message = format!(
+                "{failed} of {} routes failed; the others are done",
+                outcomes.len()
+            );
             Err(Failure::new(SOME_INPUTS, message))
         }
     }

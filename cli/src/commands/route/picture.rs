@@ -34,7 +34,10 @@ pub(super) fn draw(
     outcomes: &[Outcome],
 ) -> Result<(), Failure> {
     let name = file.display().to_string();
-    let extension = file.extension().and_then(|own| own.to_str()).unwrap_or_default();
+    let extension = file
+        .extension()
+        .and_then(|own| own.to_str())
+        .unwrap_or_default();
     let faceted;
     let mesh = match surface {
         Surface::Mesh(mesh) => mesh,
@@ -54,7 +57,11 @@ pub(super) fn draw(
             return Err(Failure::usage(message));
         }
     };
-    let place = Place::new(file, arguments.overwrite, std::slice::from_ref(&arguments.surface))?;
+    let place = Place::new(
+        file,
+        arguments.overwrite,
+        std::slice::from_ref(&arguments.surface),
+    )?;
     place.write(None, |out| out.write_all(&bytes))
 }
 
@@ -98,7 +105,10 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
          viewBox=\"0 0 {SIZE} {SIZE}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
     let edges = edges(&view, mesh);
-    let _ = writeln!(svg, "<path d=\"{edges}\" stroke=\"#b0b0b0\" stroke-width=\"0.6\" fill=\"none\"/>");
+    let _ = writeln!(
+        svg,
+        "<path d=\"{edges}\" stroke=\"#b0b0b0\" stroke-width=\"0.6\" fill=\"none\"/>"
+    );
     if let Some(rocks) = avoided {
         let mut filled = String::new();
         for own in rocks.triangles() {
@@ -109,7 +119,10 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
                 a.x, a.y, b.x, b.y, c.x, c.y
             );
         }
-        let _ = writeln!(svg, "<path d=\"{filled}\" fill=\"#606060\" fill-rule=\"nonzero\"/>");
+        let _ = writeln!(
+            svg,
+            "<path d=\"{filled}\" fill=\"#606060\" fill-rule=\"nonzero\"/>"
+        );
     }
     for (outcome, colour) in outcomes.iter().zip(COLOURS.iter().cycle()) {
         let Ok((route, _)) = &outcome.found else {
@@ -128,7 +141,10 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
         );
         for end in points.clone().take(1).chain(points.last()) {
             let (x, y) = (end.x, end.y);
-            let _ = writeln!(svg, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"{colour}\"/>");
+            let _ = writeln!(
+                svg,
+                "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"{colour}\"/>"
+            );
         }
     }
     svg.push_str("</svg>\n");
@@ -154,12 +170,17 @@ fn edges(view: &View, mesh: &Mesh) -> String {
 
 fn png(svg: &str) -> std::io::Result<Vec<u8>> {
     let other = std::io::Error::other::<Box<dyn std::error::Error + Send + Sync>>;
-    let tree = usvg::Tree::from_str(svg, &picture::svg_options()).map_err(|error| other(error.into()))?;
+    let tree =
+        usvg::Tree::from_str(svg, &picture::svg_options()).map_err(|error| other(error.into()))?;
     let size = tree.size().to_int_size();
     let (width, height) = (2 * size.width(), 2 * size.height());
     let mut pixels = tiny_skia::Pixmap::new(width, height)
         .ok_or_else(|| std::io::Error::other("the picture has no size"))?;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
+    resvg::render(
+        &tree,
+        tiny_skia::Transform::from_scale(2.0, 2.0),
+        &mut pixels.as_mut(),
+    );
     let colours: Vec<u8> = pixels
         .pixels()
         .iter()

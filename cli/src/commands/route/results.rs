@@ -28,7 +28,8 @@ impl Row {
         let row = |(index, &place): (usize, &DVec3)| Self {
             time: None,
             place,
-            normal: (route.normals.as_ref().map(|all| all[index])).filter(|own| *own != DVec3::ZERO),
+            normal: (route.normals.as_ref().map(|all| all[index]))
+                .filter(|own| *own != DVec3::ZERO),
         };
         route.points.iter().enumerate().map(row).collect()
     }
@@ -63,7 +64,11 @@ impl Results {
         } else {
             place::folder(out)?;
             let path = |name: &String| out.join(format!("{name}.csv"));
-            party.names.iter().map(|name| new(&path(name))).collect::<Result<_, _>>()?
+            party
+                .names
+                .iter()
+                .map(|name| new(&path(name)))
+                .collect::<Result<_, _>>()?
         };
         let place = match &places[..] {
             [place] if party.is_single => place.to_string(),

@@ -24,8 +24,12 @@ impl Surface {
     /// Reads a file, known by its name.
     pub(super) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
-        let refuse = |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
-        let extension = path.extension().and_then(|own| own.to_str()).unwrap_or_default();
+        let refuse =
+            |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
+        let extension = path
+            .extension()
+            .and_then(|own| own.to_str())
+            .unwrap_or_default();
         let mesh = match extension.to_lowercase().as_str() {
             "obj" => Mesh::of_obj(&bytes(path)?).map_err(|error| refuse(&error))?,
             "ply" => Mesh::of_ply(&bytes(path)?).map_err(|error| refuse(&error))?,
@@ -64,17 +68,24 @@ impl Surface {
 /// All bytes of a file; no pipe, which could have no end.
 pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     let name = path.display();
-    let refuse = |error: io::Error| {
-        Failure::new(ALL_INPUTS, format!("{name}: cannot be read: {error}"))
-    };
+    let refuse =
+        |error: io::Error| Failure::new(ALL_INPUTS, format!("{name}: cannot be read: {error}"));
     if std::fs::metadata(path).map_err(refuse)?.is_file() {
         let mut bytes = Vec::new();
         let file = File::open(path).map_err(refuse)?;
-        file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(refuse)?;
+        file.take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(refuse)?;
         if bytes.len() as u64 <= MOST_BYTES {
             return Ok(bytes);
         }
-        return Err(Failure::new(ALL_INPUTS, format!("{name}: is longer than 4 GiB; simplify it")));
+        return Err(Failure::new(
+            ALL_INPUTS,
+            format!("{name}: is longer than 4 GiB; simplify it"),
+        ));
     }
-    Err(Failure::new(ALL_INPUTS, format!("{name}: is no file; give one")))
+    Err(Failure::new(
+        ALL_INPUTS,
+        format!("{name}: is no file; give one"),
+    ))
 }

@@ -60,12 +60,15 @@ pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
             continue;
         }
         let parts = line.split(|c: char| c == ',' || c.is_whitespace());
-        let numbers: Result<Vec<f64>, _> =
-            parts.filter(|part| !part.is_empty()).map(str::parse).collect();
+        let numbers: Result<Vec<f64>, _> = parts
+            .filter(|part| !part.is_empty())
+            .map(str::parse)
+            .collect();
         match numbers.as_deref() {
             Ok(&[a, b, c, d, e, f]) => pairs.push([DVec3::new(a, b, c), DVec3::new(d, e, f)]),
             _ => {
-                let message = format!("`{line}` is no pair; give x y z of the start and of the goal");
+                let message =
+                    format!("`{line}` is no pair; give x y z of the start and of the goal");
                 return Err(refuse(path, number, &message));
             }
         }
@@ -76,7 +79,9 @@ pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
     }
     let digits = pairs.len().to_string().len();
     Ok(Party {
-        names: (1..=pairs.len()).map(|number| format!("route-{number:0digits$}")).collect(),
+        names: (1..=pairs.len())
+            .map(|number| format!("route-{number:0digits$}"))
+            .collect(),
         pairs,
         paces: None,
         movers: Vec::new(),
@@ -124,7 +129,10 @@ fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<(u64, T)>, Fail
     for record in reader.records() {
         let record = record.map_err(unreadable)?;
         let line = record.position().map_or(1, csv::Position::line);
-        rows.push((line, record.deserialize(Some(&headers)).map_err(unreadable)?));
+        rows.push((
+            line,
+            record.deserialize(Some(&headers)).map_err(unreadable)?,
+        ));
     }
     Ok(rows)
 }
@@ -150,17 +158,29 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
             continue;
         }
         let all = [row.x, row.y, row.z, row.to_x, row.to_y, row.to_z, row.speed];
-        let [Some(x), Some(y), Some(z), Some(to_x), Some(to_y), Some(to_z), Some(speed)] = all else {
+        let [
+            Some(x),
+            Some(y),
+            Some(z),
+            Some(to_x),
+            Some(to_y),
+            Some(to_z),
+            Some(speed),
+        ] = all
+        else {
             let message = "a walker has speed, x, y, z, to_x, to_y and to_z; what moves on a \
                            track of its own has track";
             return Err(refuse(path, line, message));
         };
-        party.pairs.push([DVec3::new(x, y, z), DVec3::new(to_x, to_y, to_z)]);
+        party
+            .pairs
+            .push([DVec3::new(x, y, z), DVec3::new(to_x, to_y, to_z)]);
         let name = row.name.filter(|own| !own.is_empty());
         let name = name.unwrap_or_else(|| format!("walker-{}", party.pairs.len()));
         let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
         if !name.chars().all(is_plain) || name.starts_with('.') || party.names.contains(&name) {
-            let message = format!("`{name}` names a file: give each walker a plain name of its own");
+            let message =
+                format!("`{name}` names a file: give each walker a plain name of its own");
             return Err(refuse(path, line, &message));
         }
         party.names.push(name);
@@ -172,7 +192,10 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         party.paces.get_or_insert_default().push(pace);
     }
     match party.pairs.is_empty() {
-        true => Err(Failure::new(ALL_INPUTS, format!("{}: has no walkers", path.display()))),
+        true => Err(Failure::new(
+            ALL_INPUTS,
+            format!("{}: has no walkers", path.display()),
+        )),
         false => Ok(party),
     }
 }
@@ -186,12 +209,19 @@ fn read_track(path: &Path) -> Result<Vec<(f64, DVec3)>, Failure> {
             return Err(refuse(path, line, "times and places are finite numbers"));
         }
         if track.last().is_some_and(|last| last.0 >= row.t) {
-            return Err(refuse(path, line, &format!("times increase, and {} does not", row.t)));
+            return Err(refuse(
+                path,
+                line,
+                &format!("times increase, and {} does not", row.t),
+            ));
         }
         track.push((row.t, place));
     }
     match track.is_empty() {
-        true => Err(Failure::new(ALL_INPUTS, format!("{}: has no places", path.display()))),
+        true => Err(Failure::new(
+            ALL_INPUTS,
+            format!("{}: has no places", path.display()),
+        )),
         false => Ok(track),
     }
 }
