@@ -74,7 +74,7 @@ fn a_way_over_a_hill() {
             "--from",
             "0,0,0",
             "--to",
-            "3,6,0.75",
+            "3,6,0.125",
             "--by",
             by,
             "-o",
@@ -106,7 +106,15 @@ fn a_way_over_a_hill() {
     let told = succeed(
         place,
         &[
-            "route", "hill.obj", "--from", "0,0,5", "--to", "3,6,0.75", "-o", "-", "--plot",
+            "route",
+            "hill.obj",
+            "--from",
+            "0,0,5",
+            "--to",
+            "3,6,0.125",
+            "-o",
+            "-",
+            "--plot",
             "way.png",
         ],
     );

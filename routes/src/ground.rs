@@ -268,8 +268,7 @@ fn halve(
     }
     loop {
         let mut is_done = true;
-        for index in 0..coarse.len() {
-            let own = triangles[index];
+        for (index, own) in triangles.iter().enumerate() {
             let is_cut = (0..3).any(|k| middles.contains_key(&edge(own[k], own[(k + 1) % 3])));
             if is_cut && split(positions, &mut middles, index) {
                 is_done = false;

@@ -256,7 +256,7 @@ fn binary_ply(big: bool) -> Vec<u8> {
          property list uchar uint vertex_index\nend_header\n"
     )
     .into_bytes();
-    for number in CORNERS.iter().flat_map(|corner| corner.to_array()) {
+    for number in CORNERS.iter().flat_map(DVec3::to_array) {
         let number = number as f32;
         bytes.extend(if big {
             number.to_be_bytes()

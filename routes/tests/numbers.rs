@@ -102,7 +102,11 @@ fn saddle_of_eight_triangles() {
     let rim = |i: u32| {
         let (sin, cos) = (f64::from(i) * PI / 4.0).sin_cos();
         let out = (1.0 - up * up).sqrt();
-        dvec3(out * cos, out * sin, if i % 2 == 0 { up } else { -up })
+        dvec3(
+            out * cos,
+            out * sin,
+            if i.is_multiple_of(2) { up } else { -up },
+        )
     };
     let corners: Vec<DVec3> = (0..8).map(rim).chain([DVec3::ZERO]).collect();
     let saddle = deltahedron(&corners);

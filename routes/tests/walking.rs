@@ -121,7 +121,7 @@ fn a_start_is_waited_for_where_one_stands() {
         start: 2.0,
         ..along_x()
     };
-    let plans = plan(&[late.clone()], &[]);
+    let plans = plan(std::slice::from_ref(&late), &[]);
     assert_arrives(&plans[0], 12.0);
     let times = &plans[0].as_ref().unwrap().times;
     assert_eq!((times[0].0, times[1].0, times[1].1), (0.0, 2.0, 0.0));

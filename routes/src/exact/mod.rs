@@ -29,7 +29,7 @@ use crate::places::Task;
 
 /// Windows that are kept at most, to trace the way back: 8 bytes each, and 80 for each of the few
 /// that wait; together with the mesh less than 1 GiB.
-pub(crate) const MOST_WINDOWS: usize = 80_000_000;
+pub(crate) const MOST_WINDOWS: usize = 1 << 26;
 /// Windows that wait at most.
 const MOST_WAITING: usize = 4_000_000;
 
@@ -49,10 +49,14 @@ enum Event {
 /// # Errors
 /// When it would take more windows than may be kept.
 pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
+    way_within(task, MOST_WINDOWS)
+}
+
+fn way_within(task: &Task<'_>, most: usize) -> Result<Vec<Spot>, RouteError> {
     let mut search = Search::new(task);
-    search.run()?;
+    search.run(most)?;
     Ok(trace::way(
-        &search.surface,
+        search.surface,
         task.start,
         task.goal,
         &search.arrivals,
@@ -112,7 +116,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn run(&mut self) -> Result<(), RouteError> {
+    fn run(&mut self, most: usize) -> Result<(), RouteError> {
         for vertex in 0..self.surface.positions.len() as u32 {
             if vertex == self.start || self.arrivals.is_source(vertex) {
                 self.push_vertex(vertex);
@@ -136,10 +140,10 @@ impl<'a> Search<'a> {
                 }
             }
             let waiting = self.windows.len() - self.free.len();
-            if self.trail.len() > MOST_WINDOWS || waiting > MOST_WAITING {
+            if self.trail.len() > most || waiting > MOST_WAITING {
                 return Err(RouteError::TooLarge {
                     triangles: self.surface.faces.len(),
-                    most: MOST_WINDOWS,
+                    most,
                 });
             }
         }
@@ -241,20 +245,20 @@ impl<'a> Search<'a> {
         }
         // The third test of Xin and Wang: the corner behind lies right of the rays that leave to the
         // left, and left of those that leave to the right; the window's end far from it counts.
-        if goes_left && let Some(child) = window.to_left(&shape, entry, parent) {
+        if goes_left && let Some(child) = window.through_left(&shape, entry, parent) {
             let length = self.shapes[previous(half_edge) as usize].length;
             let far = child.length + child.distance(child.low) - self.same;
             let is_behind = child.is_behind(lengths[0], lengths[2], length, self.same)
-                || lengths[1] + shape.from_right(child.low, length) < far;
+                || lengths[1] + shape.right_corner_to(child.low, length) < far;
             if !is_behind {
                 self.cross(child);
             }
         }
-        if goes_right && let Some(child) = window.to_right(&shape, entry, parent) {
+        if goes_right && let Some(child) = window.through_right(&shape, entry, parent) {
             let length = self.shapes[next(half_edge) as usize].length;
             let far = child.length + child.distance(child.high) - self.same;
             let is_behind = child.is_behind(lengths[2], lengths[1], length, self.same)
-                || lengths[0] + shape.from_left(child.high, length) < far;
+                || lengths[0] + shape.left_corner_to(child.high, length) < far;
             if !is_behind {
                 self.cross(child);
             }
@@ -331,5 +335,31 @@ impl<'a> Search<'a> {
         let goal = self.surface.positions[self.goal as usize] - from;
         let along = (to - from) / self.shapes[window.half_edge as usize].length;
         window.bound(goal.dot(along), goal.cross(along).length())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::places::place;
+
+    #[test]
+    fn too_many_windows_are_an_error_that_names_the_edges() {
+        let rim = |i: u32| {
+            let (sin, cos) = (f64::from(i) * 0.5).sin_cos();
+            dvec3(cos, sin, f64::from(i % 2))
+        };
+        let positions: Vec<_> = (0..12).map(rim).collect();
+        let faces: Vec<[u32; 3]> = (0..10).map(|i| [i, i + 1, i + 2]).collect();
+        let mesh = Mesh::new(&positions, &faces).unwrap();
+        let task = place(&mesh, rim(0), rim(11)).unwrap();
+        let error = way_within(&task, 3).unwrap_err();
+        let triangles = 10;
+        assert_eq!(error, RouteError::TooLarge { triangles, most: 3 });
+        assert!(error.to_string().contains("--by edges"), "{error}");
+        assert!(way_within(&task, 1000).is_ok());
     }
 }

@@ -37,14 +37,14 @@ impl Shape {
     }
 
     /// From the right corner to the point `along` the left edge, which is so long.
-    pub(super) fn from_right(&self, along: f64, length: f64) -> f64 {
+    pub(super) fn right_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
         (self.length - part * self.x).hypot(part * self.y)
     }
 
     /// From the left corner to the point so far along the edge from the corner opposite to the right
     /// one, which is so long.
-    pub(super) fn from_left(&self, along: f64, length: f64) -> f64 {
+    pub(super) fn left_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
         (self.x + part * (self.length - self.x)).hypot((1.0 - part) * self.y)
     }
@@ -99,7 +99,7 @@ impl Window {
 
     /// What reaches the left edge, measured from the left corner. The half-edge is that of this
     /// face.
-    pub(super) fn to_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
+    pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let length = shape.x.hypot(shape.y);
         let along = DVec2::new(shape.x, shape.y) / length;
         // The ray through a point of the edge meets the left edge so far from its start.
@@ -126,7 +126,7 @@ impl Window {
 
     /// What reaches the right edge, measured from the corner opposite. The half-edge is that of this
     /// face.
-    pub(super) fn to_right(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
+    pub(super) fn through_right(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let corner = DVec2::new(shape.x, shape.y);
         let edge = DVec2::new(shape.length, 0.0) - corner;
         let length = edge.length();

@@ -63,7 +63,7 @@ pub(super) fn weld<'a>(
                 continue;
             }
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            if !((b - a).cross(c - a).length() > FLAT * longest * longest) {
+            if (b - a).cross(c - a).length() <= FLAT * longest * longest {
                 return Err(MeshError::Flat {
                     face: number,
                     corners,
