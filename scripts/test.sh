@@ -41,7 +41,7 @@ fi
 
 # Peers to compare with, in an environment of their own (cli/tests/peers).
 peers=target/peers
-if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
+if ! "$peers/bin/python" -c 'import numpy, scipy, splines, pygeodesic' 2>/dev/null; then
     if ! python3 -c 'import venv, ensurepip' 2>/dev/null && command -v apt-get >/dev/null; then
         sudo=""
         [ "$(id -u)" -eq 0 ] || sudo="sudo"
@@ -49,12 +49,12 @@ if ! "$peers/bin/python" -c 'import numpy, scipy, splines' 2>/dev/null; then
         DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
             python3-venv >/dev/null
     fi
-    echo "installing SciPy and splines into $peers" >&2
+    echo "installing SciPy, splines and pygeodesic into $peers" >&2
     rm -rf "$peers"
     if ! { python3 -m venv "$peers" &&
         "$peers/bin/pip" install --quiet --requirement cli/tests/peers/requirements.txt; }; then
         rm -rf "$peers"
-        echo "the peers' test wants python3 with venv, and SciPy and splines from PyPI; without" >&2
+        echo "the peers' test wants python3 with venv, and SciPy, splines and pygeodesic from PyPI; without" >&2
         echo "them it says so and compares nothing (where CI is set it fails)" >&2
     fi
 fi

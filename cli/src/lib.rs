@@ -29,6 +29,7 @@ Examples:
   tumble eval walks -o results                 a directory of files; --resume goes on
   tumble check results                         are its bits still what they were?
   tumble verify chain.dat                      device = CPU, and both against f64
+  tumble route hill.obj --from 0,0,0 --to 9,5,0 -o way.csv
   tumble view chain.dat --open                 see the boxes turn
   tumble plot chain.dat -o chain.svg           see every component
   tumble devices                               what Vulkan offers here

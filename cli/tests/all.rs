@@ -12,6 +12,7 @@ mod motion;
 mod peers;
 mod plot;
 mod render;
+mod route;
 mod validation;
 mod view;
 mod view_controls;

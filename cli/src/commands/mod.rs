@@ -15,6 +15,7 @@ pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
 pub(crate) mod render;
+pub(crate) mod route;
 pub(crate) mod smooth;
 pub(crate) mod verify;
 pub(crate) mod view;
@@ -27,6 +28,7 @@ use crate::messages::exit::Failure;
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
     Convert(convert::Arguments),
+    Route(Box<route::Arguments>),
     Follow(Box<follow::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
@@ -50,6 +52,7 @@ impl Command {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
+            Self::Route(arguments) => route::run(&arguments),
             Self::Follow(arguments) => follow::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),

@@ -154,6 +154,35 @@ impl<'a> Reader<'a> {
         Ok(numbers)
     }
 
+    /// The indices of an accessor of unsigned integers, without sparse ones.
+    ///
+    /// # Errors
+    /// When it is of another type, or its bytes are missing.
+    pub(super) fn indices(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        from: &str,
+    ) -> Result<Vec<u32>, Diagnostic> {
+        let component = Component::of(accessor.component_type).filter(|own| {
+            let is_index = matches!(own, Component::U8 | Component::U16 | Component::U32);
+            is_index && accessor.kind == "SCALAR" && accessor.sparse.is_none()
+        });
+        let (Some(component), Some(view)) = (component, accessor.buffer_view) else {
+            let message = format!(
+                "accessor {index} has {} of component type {}; indices are unsigned integers in a \
+                 buffer view",
+                accessor.kind, accessor.component_type
+            );
+            return Err(self.json.refuse(from, Code::AccessorType, message));
+        };
+        let pointer = format!("/accessors/{index}");
+        let named = format!("{pointer}/bufferView");
+        let place = (view, accessor.byte_offset, accessor.count);
+        let elements = self.elements(place, (component, 1), (&pointer, &named))?;
+        Ok(elements.numbers().map(|number| number as u32).collect())
+    }
+
     /// Puts the values of a sparse accessor in the places of others.
     fn replace(
         &self,

@@ -94,15 +94,24 @@ impl<'a> Json<'a> {
             lists: Vec::new(),
         };
         for name in LISTS {
-            let array = json.member(name)?;
-            let entries = array.map(|raw| json.typed(raw, &format!("/{name}")));
-            json.lists.push(List {
-                name,
-                array,
-                entries: entries.transpose()?.unwrap_or_default(),
-            });
+            json.take_apart(name)?;
         }
         Ok(json)
+    }
+
+    /// Makes the entries of one more array known.
+    ///
+    /// # Errors
+    /// When the file has something else of this name.
+    pub(super) fn take_apart(&mut self, name: &'static str) -> Result<(), Diagnostic> {
+        let array = self.member(name)?;
+        let entries = array.map(|raw| self.typed(raw, &format!("/{name}")));
+        self.lists.push(List {
+            name,
+            array,
+            entries: entries.transpose()?.unwrap_or_default(),
+        });
+        Ok(())
     }
 
     /// A value at the top.

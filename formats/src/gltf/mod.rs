@@ -16,6 +16,7 @@ mod edits;
 mod gather;
 mod json;
 mod matrix;
+pub mod meshes;
 mod meshopt;
 mod nodes;
 mod reader;
@@ -36,6 +37,7 @@ use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::{MESHOPT, Reader};
 use crate::gltf::schema::Asset;
 use crate::source::Source;
+use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// Animations of nodes, with all else that makes a scene.
@@ -78,16 +80,26 @@ fn is_gltf(start: &[u8]) -> bool {
 /// # Errors
 /// The first fault that refuses the file; those of single animations are in [`Loaded::refused`].
 pub fn open_gltf(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut source = Source::open(path, options.pipes)?;
+    let (name, bytes, folder) = bytes_of(path, options.limits, options.pipes)?;
+    read_gltf(&name, bytes, folder, options)
+}
+
+/// What messages call a file, its bytes, and the folder where the files are that it names.
+fn bytes_of(
+    path: &Path,
+    limits: Limits,
+    pipes: bool,
+) -> Result<(String, Vec<u8>, Option<&Path>), Diagnostic> {
+    let mut source = Source::open(path, pipes)?;
     let name = source.name.clone();
     let start = source.reader.fill_buf().unwrap_or_default();
     let most = match start.starts_with(container::MAGIC) {
-        true => options.limits.file.min(LONGEST_GLB),
-        false => options.limits.file,
+        true => limits.file.min(LONGEST_GLB),
+        false => limits.file,
     };
     let bytes = source.into_bytes(most)?;
     let folder = (path.as_os_str() != "-").then(|| path.parent().unwrap_or(Path::new("")));
-    read_gltf(&name, bytes, folder, options)
+    Ok((name, bytes, folder))
 }
 
 /// Reads the bytes of a file; `name` is what messages call it, and `folder` where the files are

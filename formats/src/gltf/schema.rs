@@ -24,6 +24,40 @@ pub(super) struct Node {
     pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
+    pub(super) mesh: Option<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Scene {
+    #[serde(default)]
+    pub(super) nodes: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Mesh<'a> {
+    #[serde(borrow)]
+    pub(super) primitives: Vec<Primitive<'a>>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Primitive<'a> {
+    pub(super) attributes: Attributes,
+    pub(super) indices: Option<usize>,
+    #[serde(default = "triangles")]
+    pub(super) mode: u32,
+    #[serde(borrow, default)]
+    pub(super) extensions: Members<'a>,
+}
+
+/// The mode of a primitive that says none.
+fn triangles() -> u32 {
+    4
+}
+
+#[derive(Deserialize)]
+pub(super) struct Attributes {
+    #[serde(rename = "POSITION")]
+    pub(super) position: Option<usize>,
 }
 
 #[derive(Deserialize)]

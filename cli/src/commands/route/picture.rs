@@ -1,0 +1,192 @@
+//! The mesh from above, with its ways.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use resvg::{tiny_skia, usvg};
+use tumble_routes::mesh::Mesh;
+
+use crate::batch::place::Place;
+use crate::commands::picture;
+use crate::commands::route::Outcome;
+use crate::commands::route::arguments::Arguments;
+use crate::commands::route::surface::Surface;
+use crate::messages::exit::Failure;
+
+/// The longer side, in pixels, and the margin.
+const SIZE: f64 = 800.0;
+const MARGIN: f64 = 20.0;
+/// A net is drawn as so many facets along a side.
+const FACETS: usize = 24;
+/// Of more triangles the edges are no picture; only so many of them are drawn.
+const MOST_EDGES: usize = 60_000;
+/// Of the ways, one after another: blue, orange, green, red, purple (after Okabe and Ito).
+const COLOURS: [&str; 5] = ["#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7"];
+
+pub(super) fn draw(
+    arguments: &Arguments,
+    file: &Path,
+    surface: &Surface,
+    avoided: Option<&Mesh>,
+    outcomes: &[Outcome],
+) -> Result<(), Failure> {
+    let name = file.display().to_string();
+    let extension = file
+        .extension()
+        .and_then(|own| own.to_str())
+        .unwrap_or_default();
+    let faceted;
+    let mesh = match surface {
+        Surface::Mesh(mesh) => mesh,
+        Surface::Net(net) => {
+            faceted = net
+                .facets(FACETS)
+                .map_err(|error| Failure::usage(format!("{name}: cannot be drawn: {error}")))?;
+            &faceted
+        }
+    };
+    let svg = svg(arguments.up, mesh, avoided, outcomes);
+    let bytes = match extension.to_lowercase().as_str() {
+        "svg" => svg.into_bytes(),
+        "png" => png(&svg).map_err(|error| Failure::writing(&name, &error))?,
+        _ => {
+            let message = format!("{name}: end the picture in .svg or .png");
+            return Err(Failure::usage(message));
+        }
+    };
+    let place = Place::new(
+        file,
+        arguments.overwrite,
+        std::slice::from_ref(&arguments.surface),
+    )?;
+    place.write(None, |out| out.write_all(&bytes))
+}
+
+/// How places are seen from above.
+struct View {
+    right: DVec3,
+    down: DVec3,
+    corner: DVec2,
+    scale: f64,
+}
+
+impl View {
+    fn new(up: DVec3, mesh: &Mesh) -> Self {
+        // With z upwards x runs to the right and y away; with y upwards z runs towards the eye.
+        let other = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
+        let right = (other - other.dot(up) * up).normalize_or(DVec3::X);
+        let down = right.cross(up);
+        let flat = |place: &DVec3| DVec2::new(place.dot(right), place.dot(down));
+        let all = mesh.positions().iter().map(flat);
+        let low = all.clone().fold(DVec2::INFINITY, DVec2::min);
+        let high = all.fold(DVec2::NEG_INFINITY, DVec2::max);
+        let size = (high - low).max_element().max(f64::MIN_POSITIVE);
+        Self {
+            right,
+            down,
+            corner: low,
+            scale: (SIZE - 2.0 * MARGIN) / size,
+        }
+    }
+
+    fn at(&self, place: DVec3) -> DVec2 {
+        let flat = DVec2::new(place.dot(self.right), place.dot(self.down));
+        (flat - self.corner) * self.scale + MARGIN
+    }
+}
+
+fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> String {
+    let view = View::new(up, mesh);
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{SIZE}\" height=\"{SIZE}\" \
+         viewBox=\"0 0 {SIZE} {SIZE}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+    );
+    let edges = edges(&view, mesh);
+    let _ = writeln!(
+        svg,
+        "<path d=\"{edges}\" stroke=\"#b0b0b0\" stroke-width=\"0.6\" fill=\"none\"/>"
+    );
+    if let Some(rocks) = avoided {
+        let mut filled = String::new();
+        for own in rocks.triangles() {
+            let [a, b, c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+            let _ = write!(
+                filled,
+                "M{:.2} {:.2}L{:.2} {:.2}L{:.2} {:.2}Z",
+                a.x, a.y, b.x, b.y, c.x, c.y
+            );
+        }
+        let _ = writeln!(
+            svg,
+            "<path d=\"{filled}\" fill=\"#606060\" fill-rule=\"nonzero\"/>"
+        );
+    }
+    for (outcome, colour) in outcomes.iter().zip(COLOURS.iter().cycle()) {
+        let Ok((route, _)) = &outcome.found else {
+            continue;
+        };
+        let points = route.points.iter().map(|&point| view.at(point));
+        let mut line = String::new();
+        for point in points.clone() {
+            let step = if line.is_empty() { 'M' } else { 'L' };
+            let _ = write!(line, "{step}{:.2} {:.2}", point.x, point.y);
+        }
+        let _ = writeln!(
+            svg,
+            "<path d=\"{line}\" stroke=\"{colour}\" stroke-width=\"3\" fill=\"none\" \
+             stroke-linejoin=\"round\"/>"
+        );
+        for end in points.clone().take(1).chain(points.last()) {
+            let (x, y) = (end.x, end.y);
+            let _ = writeln!(
+                svg,
+                "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"{colour}\"/>"
+            );
+        }
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
+/// Every edge once; of large meshes every so many.
+fn edges(view: &View, mesh: &Mesh) -> String {
+    let mut known = HashSet::new();
+    let mut path = String::new();
+    let every = (3 * mesh.triangles().len() / 2).div_ceil(MOST_EDGES).max(1);
+    for own in mesh.triangles() {
+        for k in 0..3 {
+            let (one, other) = (own[k], own[(k + 1) % 3]);
+            if known.insert((one.min(other), one.max(other))) && known.len().is_multiple_of(every) {
+                let [a, b] = [one, other].map(|vertex| view.at(mesh.positions()[vertex as usize]));
+                let _ = write!(path, "M{:.2} {:.2}L{:.2} {:.2}", a.x, a.y, b.x, b.y);
+            }
+        }
+    }
+    path
+}
+
+fn png(svg: &str) -> std::io::Result<Vec<u8>> {
+    let other = std::io::Error::other::<Box<dyn std::error::Error + Send + Sync>>;
+    let tree =
+        usvg::Tree::from_str(svg, &picture::svg_options()).map_err(|error| other(error.into()))?;
+    let size = tree.size().to_int_size();
+    let (width, height) = (2 * size.width(), 2 * size.height());
+    let mut pixels = tiny_skia::Pixmap::new(width, height)
+        .ok_or_else(|| std::io::Error::other("the picture has no size"))?;
+    resvg::render(
+        &tree,
+        tiny_skia::Transform::from_scale(2.0, 2.0),
+        &mut pixels.as_mut(),
+    );
+    let colours: Vec<u8> = pixels
+        .pixels()
+        .iter()
+        .flat_map(|own| [own.red(), own.green(), own.blue()])
+        .collect();
+    let mut bytes = Vec::new();
+    picture::png(&mut bytes, width, height, &colours)?;
+    Ok(bytes)
+}

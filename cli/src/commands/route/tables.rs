@@ -1,0 +1,227 @@
+//! Lists of pairs, and of walkers.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+use tumble_routes::walkers::Mover;
+
+use crate::commands::route::surface::bytes;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+
+/// Who goes from where to where.
+pub(crate) struct Party {
+    pub(super) pairs: Vec<[DVec3; 2]>,
+    /// What messages and files call each.
+    pub(super) names: Vec<String>,
+    /// How each walks, where time counts.
+    pub(super) paces: Option<Vec<Pace>>,
+    /// What moves on tracks of its own.
+    pub(super) movers: Vec<Mover>,
+    /// Whether there is one route, for one file.
+    pub(super) is_single: bool,
+}
+
+pub(super) struct Pace {
+    pub(super) radius: f64,
+    pub(super) speed: f64,
+    pub(super) start: f64,
+}
+
+impl Party {
+    pub(super) fn of_pair(pair: [DVec3; 2]) -> Self {
+        Self {
+            pairs: vec![pair],
+            names: vec!["route".to_owned()],
+            paces: None,
+            movers: Vec::new(),
+            is_single: true,
+        }
+    }
+}
+
+fn refuse(path: &Path, line: u64, message: &str) -> Failure {
+    Failure::new(ALL_INPUTS, format!("{}:{line}: {message}", path.display()))
+}
+
+fn text(path: &Path) -> Result<String, Failure> {
+    String::from_utf8(bytes(path)?).map_err(|_| {
+        let message = format!("{}: is no UTF-8 text", path.display());
+        Failure::new(ALL_INPUTS, message)
+    })
+}
+
+/// Six numbers a line; lines with `#` in front and empty ones are skipped.
+pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
+    let mut pairs = Vec::new();
+    for (number, line) in (1..).zip(text(path)?.lines()) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let parts = line.split(|c: char| c == ',' || c.is_whitespace());
+        let numbers: Result<Vec<f64>, _> = parts
+            .filter(|part| !part.is_empty())
+            .map(str::parse)
+            .collect();
+        match numbers.as_deref() {
+            Ok(&[a, b, c, d, e, f]) => pairs.push([DVec3::new(a, b, c), DVec3::new(d, e, f)]),
+            _ => {
+                let message =
+                    format!("`{line}` is no pair; give x y z of the start and of the goal");
+                return Err(refuse(path, number, &message));
+            }
+        }
+    }
+    if pairs.is_empty() {
+        let message = format!("{}: has no pairs", path.display());
+        return Err(Failure::new(ALL_INPUTS, message));
+    }
+    let digits = pairs.len().to_string().len();
+    Ok(Party {
+        names: (1..=pairs.len())
+            .map(|number| format!("route-{number:0digits$}"))
+            .collect(),
+        pairs,
+        paces: None,
+        movers: Vec::new(),
+        is_single: false,
+    })
+}
+
+/// A row of a file of walkers.
+#[derive(Deserialize)]
+struct WalkerRow {
+    name: Option<String>,
+    radius: f64,
+    speed: Option<f64>,
+    start: Option<f64>,
+    x: Option<f64>,
+    y: Option<f64>,
+    z: Option<f64>,
+    to_x: Option<f64>,
+    to_y: Option<f64>,
+    to_z: Option<f64>,
+    track: Option<String>,
+}
+
+/// A row of a track.
+#[derive(Deserialize)]
+struct TrackRow {
+    t: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<(u64, T)>, Failure> {
+    let text = text(path)?;
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(text.as_bytes());
+    let unreadable = |error: csv::Error| {
+        let line = error.position().map_or(1, csv::Position::line);
+        refuse(path, line, &format!("cannot be read: {error}"))
+    };
+    let headers = reader.headers().map_err(unreadable)?.clone();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let line = record.position().map_or(1, csv::Position::line);
+        rows.push((
+            line,
+            record.deserialize(Some(&headers)).map_err(unreadable)?,
+        ));
+    }
+    Ok(rows)
+}
+
+pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
+    let mut party = Party {
+        pairs: Vec::new(),
+        names: Vec::new(),
+        paces: Some(Vec::new()),
+        movers: Vec::new(),
+        is_single: false,
+    };
+    for (line, row) in rows::<WalkerRow>(path)? {
+        if let Some(track) = row.track.filter(|own| !own.is_empty()) {
+            if !(row.radius >= 0.0 && row.radius.is_finite()) {
+                return Err(refuse(path, line, "a radius is a number of 0 or more"));
+            }
+            let file = path.parent().unwrap_or(Path::new("")).join(track);
+            party.movers.push(Mover {
+                track: read_track(&file)?,
+                radius: row.radius,
+            });
+            continue;
+        }
+        let all = [row.x, row.y, row.z, row.to_x, row.to_y, row.to_z, row.speed];
+        let [
+            Some(x),
+            Some(y),
+            Some(z),
+            Some(to_x),
+            Some(to_y),
+            Some(to_z),
+            Some(speed),
+        ] = all
+        else {
+            let message = "a walker has speed, x, y, z, to_x, to_y and to_z; what moves on a \
+                           track of its own has track";
+            return Err(refuse(path, line, message));
+        };
+        party
+            .pairs
+            .push([DVec3::new(x, y, z), DVec3::new(to_x, to_y, to_z)]);
+        let name = row.name.filter(|own| !own.is_empty());
+        let name = name.unwrap_or_else(|| format!("walker-{}", party.pairs.len()));
+        let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
+        if !name.chars().all(is_plain) || name.starts_with('.') || party.names.contains(&name) {
+            let message =
+                format!("`{name}` names a file: give each walker a plain name of its own");
+            return Err(refuse(path, line, &message));
+        }
+        party.names.push(name);
+        let pace = Pace {
+            radius: row.radius,
+            speed,
+            start: row.start.unwrap_or(0.0),
+        };
+        party.paces.get_or_insert_default().push(pace);
+    }
+    match party.pairs.is_empty() {
+        true => Err(Failure::new(
+            ALL_INPUTS,
+            format!("{}: has no walkers", path.display()),
+        )),
+        false => Ok(party),
+    }
+}
+
+/// Times and places: `t,x,y,z`, times increasing.
+fn read_track(path: &Path) -> Result<Vec<(f64, DVec3)>, Failure> {
+    let mut track: Vec<(f64, DVec3)> = Vec::new();
+    for (line, row) in rows::<TrackRow>(path)? {
+        let place = DVec3::new(row.x, row.y, row.z);
+        if !(place.is_finite() && row.t.is_finite()) {
+            return Err(refuse(path, line, "times and places are finite numbers"));
+        }
+        if track.last().is_some_and(|last| last.0 >= row.t) {
+            return Err(refuse(
+                path,
+                line,
+                &format!("times increase, and {} does not", row.t),
+            ));
+        }
+        track.push((row.t, place));
+    }
+    match track.is_empty() {
+        true => Err(Failure::new(
+            ALL_INPUTS,
+            format!("{}: has no places", path.display()),
+        )),
+        false => Ok(track),
+    }
+}

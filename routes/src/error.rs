@@ -1,0 +1,157 @@
+//! What is wrong with an input, in words for people.
+
+use glam::DVec3;
+use thiserror::Error;
+
+/// Why vertices and faces are no mesh.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// No face that has an area.
+    #[error("the mesh has no faces; give one with triangles or polygons")]
+    Empty,
+    /// A coordinate is NaN or infinite, or beyond 1e75, where areas are no numbers.
+    #[error("vertex {vertex} (from 0) is at {position}; coordinates must be numbers below 1e75")]
+    NotFinite {
+        /// Counted from 0.
+        vertex: usize,
+        /// Where it is said to be.
+        position: DVec3,
+    },
+    /// A face names a vertex that is not there.
+    #[error("face {face} (from 0) names vertex {vertex}, and there are {count} from 0 on")]
+    Index {
+        /// Counted from 0.
+        face: usize,
+        /// The vertex that it names.
+        vertex: u64,
+        /// The number of vertices.
+        count: usize,
+    },
+    /// A face of fewer than three corners.
+    #[error("face {face} (from 0) has {corners} corners; a face has three or more")]
+    Corners {
+        /// Counted from 0.
+        face: usize,
+        /// How many it has.
+        corners: usize,
+    },
+    /// Three different corners on a line.
+    #[error(
+        "face {face} (from 0) has no area: its corners {corners:?} lie on a line; remove it, or \
+         collapse its shortest edge"
+    )]
+    Flat {
+        /// Counted from 0.
+        face: usize,
+        /// Where its corners are.
+        corners: [DVec3; 3],
+    },
+    /// More triangles than are counted in 32 bits, three corners each.
+    #[error("the mesh has {triangles} triangles, and can have {most}; simplify it")]
+    TooMany {
+        /// How many it has.
+        triangles: usize,
+        /// How many it can have.
+        most: usize,
+    },
+}
+
+/// What is odd with a mesh that is used all the same.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MeshWarning {
+    /// Triangles with two equal corners.
+    #[error(
+        "{count} triangles have equal corners and are dropped; the first is of face {face} (from 0)"
+    )]
+    Dropped {
+        /// How many.
+        count: usize,
+        /// The face of the first, from 0.
+        face: usize,
+    },
+    /// Polygons whose corners lie in no plane.
+    #[error(
+        "{count} polygons are not flat; they are cut into triangles from their first corner on; the first is face {face} (from 0)"
+    )]
+    NotFlat {
+        /// How many.
+        count: usize,
+        /// The first, from 0.
+        face: usize,
+    },
+    /// Triangles that ran the other way round than their neighbours.
+    #[error("{count} triangles wind otherwise than their neighbours; they are turned")]
+    Turned {
+        /// How many.
+        count: usize,
+    },
+    /// A surface with one side, as a Möbius strip.
+    #[error("the surface has one side only: it has no normals")]
+    OneSided,
+}
+
+/// Why there is no route.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum RouteError {
+    /// A coordinate of the start or the goal is NaN or infinite.
+    #[error("{point} is no point; its coordinates must be finite numbers")]
+    NotFinite {
+        /// The point.
+        point: DVec3,
+    },
+    /// Start and goal lie on pieces that do not touch.
+    #[error(
+        "start and goal lie on pieces of the surface that do not touch: the start's has {start} \
+         triangles, the goal's {goal}"
+    )]
+    OtherPiece {
+        /// Triangles of the piece that the start lies on.
+        start: usize,
+        /// Triangles of the piece that the goal lies on.
+        goal: usize,
+    },
+    /// The start or the goal is not on free ground.
+    #[error(
+        "{point} is not on free ground: it is within the clearance of an obstacle (or nearer to it \
+         than the finest edge), or too steep; free ground is {distance} away"
+    )]
+    NotFree {
+        /// The start or the goal, on the surface.
+        point: DVec3,
+        /// From there to the nearest free ground.
+        distance: f64,
+    },
+    /// Neither half of the cut arrives.
+    #[error("the cut by the plane does not lead from start to goal; take `--by exact`")]
+    NoPlaneWay,
+    /// No normal tells which plane is meant.
+    #[error(
+        "no plane is given: the normals at start and goal are opposite, or run along the line \
+         between them; take `--by exact`"
+    )]
+    NoPlane,
+    /// An edge of three faces: the cut branches.
+    #[error(
+        "a cut by a plane wants edges of at most two faces, and the mesh has edges of more; take `--by exact`"
+    )]
+    PlaneBranches,
+    /// A surface with one side has no normals.
+    #[error(
+        "the surface has one side only, as a Möbius strip, and so no normals; take `--by exact`"
+    )]
+    OneSided,
+    /// The search for the shortest way would take more memory than it may.
+    #[error(
+        "the shortest way over {triangles} triangles needs more than {most} windows, about 1 GiB; \
+         simplify the mesh, or take `--by edges`"
+    )]
+    TooLarge {
+        /// Triangles of the mesh.
+        triangles: usize,
+        /// Windows that are kept at most.
+        most: usize,
+    },
+}

@@ -1,0 +1,89 @@
+//! How each vertex is reached, and which vertices ways may bend at.
+
+use std::f64::consts::TAU;
+
+use crate::exact::fan::Fan;
+use crate::mesh::links::NONE;
+use crate::mesh::surface::Surface;
+
+/// A vertex with so much less than a full angle about it can be a source too: rounding decides
+/// whether a flat one has less.
+const SLACK: f64 = 1e-9;
+
+/// How the best way so far comes to a vertex.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Arrival {
+    /// Along the edge from this vertex; from none at the start.
+    Edge(u32),
+    /// Straight on from a window.
+    Window {
+        trail: u32,
+        /// By which the window entered the face.
+        half_edge: u32,
+        /// At the vertex, from the face's left edge to where the way comes from.
+        angle: f64,
+        /// The vertex is within the window, which went on at both sides.
+        is_inside: bool,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Less than a full angle: no shortest way passes.
+    Convex,
+    /// A full angle: ways pass straight on.
+    Flat,
+    /// More than that, or on a boundary, or where surfaces meet: ways bend.
+    Source,
+}
+
+/// The best way to each vertex so far.
+pub(super) struct Arrivals {
+    lengths: Vec<f64>,
+    arrivals: Vec<Arrival>,
+    kinds: Vec<Kind>,
+}
+
+impl Arrivals {
+    /// At first the ways along edges.
+    pub(super) fn new(surface: &Surface, lengths: Vec<f64>, before: &[u32]) -> Self {
+        let kind = |vertex| {
+            let fan = Fan::about(surface, vertex);
+            match fan.is_closed() {
+                true if fan.total() < TAU - SLACK => Kind::Convex,
+                true if fan.total() <= TAU + SLACK => Kind::Flat,
+                _ => Kind::Source,
+            }
+        };
+        Self {
+            kinds: (0..lengths.len() as u32).map(kind).collect(),
+            arrivals: before.iter().map(|&vertex| Arrival::Edge(vertex)).collect(),
+            lengths,
+        }
+    }
+
+    pub(super) fn length(&self, vertex: u32) -> f64 {
+        self.lengths[vertex as usize]
+    }
+
+    pub(super) fn arrival(&self, vertex: u32) -> Arrival {
+        self.arrivals[vertex as usize]
+    }
+
+    pub(super) fn set(&mut self, vertex: u32, length: f64, arrival: Arrival) {
+        self.lengths[vertex as usize] = length;
+        self.arrivals[vertex as usize] = arrival;
+    }
+
+    /// Whether ways leave the vertex that do not pass it within a window.
+    pub(super) fn is_source(&self, vertex: u32) -> bool {
+        match self.kinds[vertex as usize] {
+            Kind::Convex => false,
+            Kind::Source => true,
+            Kind::Flat => match self.arrivals[vertex as usize] {
+                Arrival::Edge(before) => before != NONE,
+                Arrival::Window { is_inside, .. } => !is_inside,
+            },
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Windows: the straight ways from one source through one sequence of edges.
+
+use glam::DVec2;
+
+use crate::mesh::links::{next, previous};
+use crate::mesh::surface::Surface;
+
+/// A face in a plane: the half-edge from the origin along x, the corner opposite at positive y.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    /// Of the half-edge.
+    pub(super) length: f64,
+    /// Of the corner opposite.
+    pub(super) x: f64,
+    pub(super) y: f64,
+}
+
+impl Shape {
+    pub(super) fn of(surface: &Surface, half_edge: u32) -> Self {
+        let from = surface.corner(half_edge);
+        let edge = surface.corner(next(half_edge)) - from;
+        let opposite = surface.corner(previous(half_edge)) - from;
+        let length = edge.length();
+        Self {
+            length,
+            x: opposite.dot(edge) / length,
+            y: opposite.cross(edge).length() / length,
+        }
+    }
+
+    /// Where a ray from the corner opposite meets the edge, which turned by `turned` of the face's
+    /// `angle` there from the start of the edge to its end, rad.
+    pub(super) fn met_by(&self, turned: f64, angle: f64) -> f64 {
+        let start = self.x.hypot(self.y) * turned.max(0.0).sin();
+        let end = (self.length - self.x).hypot(self.y) * (angle - turned).max(0.0).sin();
+        self.length * start / (start + end)
+    }
+
+    /// From the right corner to the point `along` the left edge, which is so long.
+    pub(super) fn right_corner_to(&self, along: f64, length: f64) -> f64 {
+        let part = along / length;
+        (self.length - part * self.x).hypot(part * self.y)
+    }
+
+    /// From the left corner to the point so far along the edge from the corner opposite to the right
+    /// one, which is so long.
+    pub(super) fn left_corner_to(&self, along: f64, length: f64) -> f64 {
+        let part = along / length;
+        (self.x + part * (self.length - self.x)).hypot((1.0 - part) * self.y)
+    }
+}
+
+/// An interval of an edge, and the source that is seen through it.
+///
+/// The half-edge runs along x from the origin, the source lies at `(x, -y)`, and the window goes
+/// on towards positive y, so that the start of the half-edge is on its left.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window {
+    pub(super) half_edge: u32,
+    /// Its place in the trail is that of the window that it comes from.
+    pub(super) parent: u32,
+    pub(super) low: f64,
+    pub(super) high: f64,
+    pub(super) x: f64,
+    pub(super) y: f64,
+    /// From the start to the source.
+    pub(super) length: f64,
+}
+
+impl Window {
+    /// From the source to a point of the edge.
+    pub(super) fn distance(&self, along: f64) -> f64 {
+        (along - self.x).hypot(self.y)
+    }
+
+    /// The same, measured from the other end of its edge.
+    pub(super) fn mirrored(&self, length: f64) -> Self {
+        Self {
+            low: length - self.high,
+            high: length - self.low,
+            x: length - self.x,
+            ..*self
+        }
+    }
+
+    /// Whether each of its points is nearer by way of an end of its edge, which are `left` and
+    /// `right` from the start (Xin and Wang, 2009, the first two tests).
+    pub(super) fn is_behind(&self, left: f64, right: f64, edge: f64, same: f64) -> bool {
+        left + self.high < self.length + self.distance(self.high) - same
+            || right + edge - self.low < self.length + self.distance(self.low) - same
+    }
+
+    /// Between the left edge of the face and the way to the source, at the corner opposite.
+    pub(super) fn angle_at_corner(&self, shape: &Shape) -> f64 {
+        let corner = DVec2::new(shape.x, shape.y);
+        let source = DVec2::new(self.x, -self.y);
+        (source - corner).angle_to(-corner).abs()
+    }
+
+    /// What reaches the left edge, measured from the left corner. The half-edge is that of this
+    /// face.
+    pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
+        let length = shape.x.hypot(shape.y);
+        let along = DVec2::new(shape.x, shape.y) / length;
+        // The ray through a point of the edge meets the left edge so far from its start.
+        let meets = |point: f64| {
+            let met = point * self.y / (along.x * self.y - along.y * (point - self.x));
+            met.clamp(0.0, length)
+        };
+        let low = meets(self.low);
+        let high = if self.high >= entry {
+            length
+        } else {
+            meets(self.high)
+        };
+        (low < high).then(|| Self {
+            half_edge: previous(self.half_edge),
+            parent,
+            low,
+            high,
+            x: self.x * along.x - self.y * along.y,
+            y: self.x * along.y + self.y * along.x,
+            length: self.length,
+        })
+    }
+
+    /// What reaches the right edge, measured from the corner opposite. The half-edge is that of this
+    /// face.
+    pub(super) fn through_right(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
+        let corner = DVec2::new(shape.x, shape.y);
+        let edge = DVec2::new(shape.length, 0.0) - corner;
+        let length = edge.length();
+        let along = edge / length;
+        let from_corner = DVec2::new(self.x, -self.y) - corner;
+        let meets = |point: f64| {
+            let ray = DVec2::new(point - self.x, self.y);
+            let met = from_corner.perp_dot(ray) / along.perp_dot(ray);
+            met.clamp(0.0, length)
+        };
+        let low = if self.low <= entry {
+            0.0
+        } else {
+            meets(self.low)
+        };
+        let high = meets(self.high);
+        (low < high).then(|| Self {
+            half_edge: next(self.half_edge),
+            parent,
+            low,
+            high,
+            x: from_corner.dot(along),
+            y: -along.perp_dot(from_corner),
+            length: self.length,
+        })
+    }
+
+    /// The least length from the start through the window to a goal at `(x, y)` beyond the edge.
+    pub(super) fn bound(&self, x: f64, y: f64) -> f64 {
+        let height = self.y + y;
+        let crossing = match height > 0.0 {
+            true => self.x + (x - self.x) * self.y / height,
+            false => x,
+        };
+        let crossing = crossing.clamp(self.low, self.high);
+        self.length + self.distance(crossing) + (crossing - x).hypot(y)
+    }
+}

@@ -1,0 +1,53 @@
+//! A walk along edges, each time the one that points most nearly to the goal.
+
+use crate::mesh::surface::Spot;
+use crate::places::Task;
+
+/// Cosines nearer to each other than this are the same; the vertex with the lower number is taken.
+const SAME: f64 = 1e-12;
+
+/// The way from start to goal, which lie on one piece. No vertex is visited twice: from a dead end
+/// the walk goes back, and what it went back from is no part of the way.
+pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
+    let surface = &*task.surface;
+    let goal = surface.positions[task.goal as usize];
+    let mut visited = vec![false; surface.positions.len()];
+    visited[task.start as usize] = true;
+    let mut way = vec![task.start];
+    while let Some(&vertex) = way.last() {
+        if vertex == task.goal {
+            break;
+        }
+        let here = surface.positions[vertex as usize];
+        let to_goal = (goal - here).normalize_or_zero();
+        let mut best: Option<(f64, u32)> = None;
+        for other in surface.links.neighbours(&surface.faces, vertex) {
+            if visited[other as usize] {
+                continue;
+            }
+            // The goal itself is nearest of all, also where an edge to another vertex runs on.
+            let edge = (surface.positions[other as usize] - here).normalize_or_zero();
+            let cosine = if other == task.goal {
+                2.0
+            } else {
+                edge.dot(to_goal)
+            };
+            let is_better = best.is_none_or(|(most, lowest)| {
+                cosine > most + SAME || (cosine >= most - SAME && other < lowest)
+            });
+            if is_better {
+                best = Some((cosine, other));
+            }
+        }
+        match best {
+            Some((_, other)) => {
+                visited[other as usize] = true;
+                way.push(other);
+            }
+            None => {
+                way.pop();
+            }
+        }
+    }
+    way.into_iter().map(Spot::vertex).collect()
+}

@@ -1,0 +1,302 @@
+//! Ground with holes where obstacles stand, and where it is too steep.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::error::{MeshError, RouteError};
+use crate::mesh::Mesh;
+use crate::route::{By, Route};
+
+/// Triangles that halving may make.
+pub const MOST_TRIANGLES: usize = 4_000_000;
+
+/// A point is on free ground when that is nearer than this part of the mesh's size.
+const ON_GROUND: f64 = 1e-9;
+
+/// What is kept clear of.
+#[derive(Debug, Clone, Copy)]
+pub struct Clear<'a> {
+    /// The obstacles, which stand still. Their surfaces count: ground within them is cut off by the
+    /// hole about it.
+    pub obstacles: Option<&'a Mesh>,
+    /// How far every point of a way stays from them, in the unit of the mesh.
+    pub clearance: f64,
+    /// Triangles at the edge of a hole are halved until their longest edge is at most so long.
+    pub finest: f64,
+    /// The steepest slope, rad, against `up`.
+    pub max_slope: Option<f64>,
+    /// The direction upwards; of any length but 0.
+    pub up: DVec3,
+}
+
+/// Why there is no free ground.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum GroundError {
+    /// The clearance is negative, or no number.
+    #[error("the clearance is {clearance}; give a number of 0 or more")]
+    Clearance {
+        /// What was given.
+        clearance: f64,
+    },
+    /// The finest edge is not a number over 0.
+    #[error("the finest edge is {finest}; give a number over 0")]
+    Finest {
+        /// What was given.
+        finest: f64,
+    },
+    /// The slope is not between 0 and a quarter turn, or there is no direction upwards.
+    #[error("slopes are from 0 to 90 degrees against a direction that is not 0")]
+    Slope,
+    /// Halving to the finest edge makes too many triangles.
+    #[error("more than {MOST_TRIANGLES} triangles at a finest edge of {finest}; give a longer one")]
+    TooFine {
+        /// What was given.
+        finest: f64,
+    },
+    /// Nothing is free.
+    #[error("no ground is free: all of it is within the clearance, or too steep")]
+    Nothing,
+    /// What is left is no mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// What is free of a mesh.
+#[derive(Debug, Clone)]
+pub struct Ground<'a> {
+    whole: &'a Mesh,
+    /// The triangles on which every point is clear of all obstacles.
+    pub mesh: Mesh,
+    /// How many triangles there were after halving, free or not.
+    pub triangles: usize,
+}
+
+/// What becomes of a triangle.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Free,
+    Closed,
+    /// Partly both, as far as one can tell.
+    Open,
+}
+
+impl<'a> Ground<'a> {
+    /// Cuts holes into a mesh. A triangle stays when the distance of its centre from the obstacles
+    /// is at least the clearance and its own radius together, so that all of its points are clear;
+    /// ways on what is left are free by construction, and shortest up to the finest edge.
+    ///
+    /// Triangles at the edge of a hole are halved at their longest edges, together with their
+    /// neighbours there, so that no vertex lies within an edge (Rivara, 1984).
+    ///
+    /// # Errors
+    /// When an option is no number, or nothing is left.
+    pub fn new(mesh: &'a Mesh, clear: Clear<'_>) -> Result<Self, GroundError> {
+        let Clear {
+            clearance, finest, ..
+        } = clear;
+        if !(clearance >= 0.0 && clearance.is_finite()) {
+            return Err(GroundError::Clearance { clearance });
+        }
+        if !(finest > 0.0 && finest.is_finite()) {
+            return Err(GroundError::Finest { finest });
+        }
+        let up = clear.up.try_normalize().ok_or(GroundError::Slope)?;
+        let least_up = match clear.max_slope {
+            None => 0.0,
+            Some(slope) if (0.0..=std::f64::consts::FRAC_PI_2).contains(&slope) => slope.cos(),
+            Some(_) => return Err(GroundError::Slope),
+        };
+        let is_level = |[a, b, c]: [DVec3; 3]| {
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            normal.dot(up).abs() >= least_up - 1e-12
+        };
+        let fate = |corners: [DVec3; 3]| match clear.obstacles {
+            Some(obstacles) => fate(obstacles, clearance, corners),
+            None => Fate::Free,
+        };
+        let mut positions = mesh.positions().to_vec();
+        let level = mesh.triangles().iter().copied();
+        let mut triangles: Vec<[u32; 3]> = level
+            .filter(|own| is_level(own.map(|vertex| positions[vertex as usize])))
+            .collect();
+        // Halves of a triangle that is free are free, and so for one that is closed.
+        let mut fates = vec![Fate::Open; triangles.len()];
+        loop {
+            let corners = |own: &[u32; 3]| own.map(|vertex| positions[vertex as usize]);
+            fates
+                .par_iter_mut()
+                .zip(&triangles)
+                .for_each(|(own, triangle)| {
+                    if *own == Fate::Open {
+                        *own = fate(corners(triangle));
+                    }
+                });
+            let is_coarse = |(own, triangle): (&Fate, &[u32; 3])| {
+                *own == Fate::Open
+                    && sides(corners(triangle)).into_iter().fold(0.0, f64::max) > finest
+            };
+            let coarse: Vec<bool> = fates.iter().zip(&triangles).map(is_coarse).collect();
+            if !coarse.contains(&true) {
+                break;
+            }
+            halve(&mut positions, &mut triangles, &mut fates, &coarse);
+            if triangles.len() > MOST_TRIANGLES {
+                return Err(GroundError::TooFine { finest });
+            }
+        }
+        let count = triangles.len();
+        let free = triangles.into_iter().zip(fates);
+        let free: Vec<[u32; 3]> = free
+            .filter(|&(_, own)| own == Fate::Free)
+            .map(|(own, _)| own)
+            .collect();
+        if free.is_empty() {
+            return Err(GroundError::Nothing);
+        }
+        Ok(Self {
+            whole: mesh,
+            mesh: Mesh::new(&positions, &free)?,
+            triangles: count,
+        })
+    }
+
+    /// The route between the points of the whole mesh that are nearest to `from` and `to`, over what
+    /// is free.
+    ///
+    /// # Errors
+    /// When one of them is not free, or as [`Mesh::route`].
+    pub fn route(&self, from: DVec3, to: DVec3, by: By) -> Result<Route, RouteError> {
+        let mut off = [0.0; 2];
+        let mut ends = [from, to];
+        for (end, off) in ends.iter_mut().zip(&mut off) {
+            let given = *end;
+            if !given.is_finite() {
+                return Err(RouteError::NotFinite { point: given });
+            }
+            *end = self.whole.nearest(given);
+            *off = end.distance(given);
+            let distance = self.mesh.nearest(*end).distance(*end);
+            if distance > ON_GROUND * self.whole.size() {
+                let point = *end;
+                return Err(RouteError::NotFree { point, distance });
+            }
+        }
+        let route = self.mesh.route(ends[0], ends[1], by)?;
+        Ok(Route { off, ..route })
+    }
+
+    /// The routes of many pairs, each on a thread of its own.
+    #[must_use]
+    pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
+        let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
+        pairs.par_iter().map(route).collect()
+    }
+}
+
+fn fate(obstacles: &Mesh, clearance: f64, corners: [DVec3; 3]) -> Fate {
+    let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let radius = corners
+        .iter()
+        .map(|own| own.distance(centre))
+        .fold(0.0, f64::max);
+    let distance = obstacles.nearest(centre).distance(centre);
+    if distance >= clearance + radius {
+        Fate::Free
+    } else if distance + radius < clearance {
+        Fate::Closed
+    } else {
+        Fate::Open
+    }
+}
+
+/// The lengths of the sides, each from a corner to the next.
+fn sides([a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    [a.distance(b), b.distance(c), c.distance(a)]
+}
+
+/// The longest side; of equal ones that between the lowest vertices, so that both triangles at an
+/// edge agree.
+fn longest(positions: &[DVec3], triangle: [u32; 3]) -> usize {
+    let lengths = sides(triangle.map(|vertex| positions[vertex as usize]));
+    let key = |side: usize| edge(triangle[side], triangle[(side + 1) % 3]);
+    let better = |one: &usize, other: &usize| {
+        lengths[*one]
+            .total_cmp(&lengths[*other])
+            .then(key(*other).cmp(&key(*one)))
+    };
+    (0..3).max_by(better).unwrap_or(0)
+}
+
+fn edge(one: u32, other: u32) -> (u32, u32) {
+    (one.min(other), one.max(other))
+}
+
+/// Halves the coarse triangles at their longest edges. Where an edge of another triangle is halved
+/// by that, so is its longest one, and so on.
+fn halve(
+    positions: &mut Vec<DVec3>,
+    triangles: &mut Vec<[u32; 3]>,
+    fates: &mut Vec<Fate>,
+    coarse: &[bool],
+) {
+    let longest_sides: Vec<usize> = triangles
+        .iter()
+        .map(|&own| longest(positions, own))
+        .collect();
+    let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+    let split =
+        |positions: &mut Vec<DVec3>, middles: &mut HashMap<(u32, u32), u32>, index: usize| {
+            let (triangle, side) = (triangles[index], longest_sides[index]);
+            let (one, other) = edge(triangle[side], triangle[(side + 1) % 3]);
+            let mut is_new = false;
+            middles.entry((one, other)).or_insert_with(|| {
+                is_new = true;
+                positions.push(DVec3::midpoint(
+                    positions[one as usize],
+                    positions[other as usize],
+                ));
+                positions.len() as u32 - 1
+            });
+            is_new
+        };
+    for index in (0..coarse.len()).filter(|&index| coarse[index]) {
+        split(positions, &mut middles, index);
+    }
+    loop {
+        let mut is_done = true;
+        for (index, own) in triangles.iter().enumerate() {
+            let is_cut = (0..3).any(|k| middles.contains_key(&edge(own[k], own[(k + 1) % 3])));
+            if is_cut && split(positions, &mut middles, index) {
+                is_done = false;
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    for index in 0..coarse.len() {
+        let triangle = triangles[index];
+        let middle = |one, other| middles.get(&edge(one, other)).copied();
+        let side = longest_sides[index];
+        let [a, b, c] = [0, 1, 2].map(|k| triangle[(side + k) % 3]);
+        // The longest edge a-b first, then what is left of the others.
+        let Some(ab) = middle(a, b) else { continue };
+        let mut parts = Vec::with_capacity(4);
+        match middle(b, c) {
+            Some(bc) => parts.extend([[ab, b, bc], [ab, bc, c]]),
+            None => parts.push([ab, b, c]),
+        }
+        match middle(c, a) {
+            Some(ca) => parts.extend([[ab, c, ca], [ab, ca, a]]),
+            None => parts.push([ab, c, a]),
+        }
+        let fate = fates[index];
+        triangles[index] = parts[0];
+        triangles.extend(&parts[1..]);
+        fates.extend(parts[1..].iter().map(|_| fate));
+    }
+}

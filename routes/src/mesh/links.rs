@@ -1,0 +1,126 @@
+//! What lies beside what: the other side of each edge, and the corners at each vertex.
+
+/// There is nothing: an edge is on the boundary.
+pub(crate) const NONE: u32 = u32::MAX;
+/// There is more than one: an edge of three faces or more.
+pub(crate) const MANY: u32 = u32::MAX - 1;
+
+/// The neighbourhood of the triangles of a mesh.
+///
+/// A *half-edge* `3f + k` runs from corner `k` of face `f` to the next; the corner opposite is
+/// `k + 2` modulo 3. The same number names the corner `k` of face `f`.
+#[derive(Debug, Clone)]
+pub(crate) struct Links {
+    /// For each half-edge the one of the other face on the same edge, [`NONE`] or [`MANY`].
+    twins: Vec<u32>,
+    /// Where the corners of each vertex begin in `corners`; one more than there are vertices.
+    starts: Vec<u32>,
+    /// The corners, vertex by vertex.
+    corners: Vec<u32>,
+}
+
+/// The corner after `corner` in its face.
+pub(crate) fn next(corner: u32) -> u32 {
+    if corner % 3 == 2 {
+        corner - 2
+    } else {
+        corner + 1
+    }
+}
+
+/// The corner before `corner` in its face.
+pub(crate) fn previous(corner: u32) -> u32 {
+    if corner.is_multiple_of(3) {
+        corner + 2
+    } else {
+        corner - 1
+    }
+}
+
+/// The vertex at a corner.
+pub(crate) fn at(faces: &[[u32; 3]], corner: u32) -> u32 {
+    faces[(corner / 3) as usize][(corner % 3) as usize]
+}
+
+impl Links {
+    pub(crate) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
+        let mut starts = vec![0u32; vertices + 1];
+        for &vertex in faces.as_flattened() {
+            starts[vertex as usize + 1] += 1;
+        }
+        for vertex in 0..vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let mut ends = starts.clone();
+        let mut corners = vec![0; 3 * faces.len()];
+        for (corner, &vertex) in (0u32..).zip(faces.as_flattened()) {
+            let end = &mut ends[vertex as usize];
+            corners[*end as usize] = corner;
+            *end += 1;
+        }
+        let mut links = Self {
+            twins: Vec::new(),
+            starts,
+            corners,
+        };
+        links.twins = (0..3 * faces.len() as u32)
+            .map(|half_edge| links.find_twin(faces, half_edge))
+            .collect();
+        links
+    }
+
+    fn find_twin(&self, faces: &[[u32; 3]], half_edge: u32) -> u32 {
+        let mut twin = NONE;
+        for other in self.on_edge(faces, half_edge) {
+            if other != half_edge {
+                twin = if twin == NONE { other } else { MANY };
+            }
+        }
+        twin
+    }
+
+    /// The half-edges of all faces on the edge of this one, itself among them. They are searched at
+    /// the end of the edge with fewer corners, so that the hub of a fan costs nothing.
+    pub(crate) fn on_edge<'a>(
+        &'a self,
+        faces: &'a [[u32; 3]],
+        half_edge: u32,
+    ) -> impl Iterator<Item = u32> + 'a {
+        let (mut pivot, mut other) = (at(faces, half_edge), at(faces, next(half_edge)));
+        if self.corners(pivot).len() > self.corners(other).len() {
+            (pivot, other) = (other, pivot);
+        }
+        self.corners(pivot).iter().filter_map(move |&corner| {
+            if at(faces, next(corner)) == other {
+                Some(corner)
+            } else {
+                let before = previous(corner);
+                (at(faces, before) == other).then_some(before)
+            }
+        })
+    }
+
+    pub(crate) fn twin(&self, half_edge: u32) -> u32 {
+        self.twins[half_edge as usize]
+    }
+
+    pub(crate) fn twins(&self) -> &[u32] {
+        &self.twins
+    }
+
+    /// The corners at a vertex.
+    pub(crate) fn corners(&self, vertex: u32) -> &[u32] {
+        let vertex = vertex as usize;
+        &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
+
+    /// The vertices that share an edge with this one; those inside the surface come twice.
+    pub(crate) fn neighbours<'a>(
+        &'a self,
+        faces: &'a [[u32; 3]],
+        vertex: u32,
+    ) -> impl Iterator<Item = u32> + 'a {
+        let both = |&corner: &u32| [at(faces, next(corner)), at(faces, previous(corner))];
+        self.corners(vertex).iter().flat_map(both)
+    }
+}

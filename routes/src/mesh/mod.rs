@@ -1,0 +1,198 @@
+//! Meshes: what is read is checked, welded, cut into triangles and wound alike.
+
+pub(crate) mod links;
+
+pub mod read;
+pub(crate) mod surface;
+pub(crate) mod tree;
+mod weld;
+mod windings;
+
+use glam::DVec3;
+
+use crate::error::{MeshError, MeshWarning};
+use crate::mesh::links::Links;
+use crate::mesh::surface::Surface;
+use crate::mesh::tree::Tree;
+use crate::mesh::weld::Welded;
+
+/// The most triangles of a mesh: corners are counted in 32 bits.
+pub const MOST_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
+
+/// A surface of triangles, on which routes are found.
+///
+/// Vertices at equal positions are one. Faces wind alike within each piece, the way that most of
+/// them had.
+#[derive(Debug, Clone)]
+pub struct Mesh {
+    pub(crate) surface: Surface,
+    pub(crate) tree: Tree,
+    /// The largest extent along an axis.
+    pub(crate) size: f64,
+    pub(crate) has_branches: bool,
+    /// For each vertex the piece that it belongs to.
+    pub(crate) pieces: Vec<u32>,
+    /// For each piece its triangles.
+    pub(crate) piece_sizes: Vec<usize>,
+    warnings: Vec<MeshWarning>,
+}
+
+impl Mesh {
+    /// Of positions and triangles, each three of the positions.
+    ///
+    /// # Errors
+    /// When there are no triangles, an index or a position is none, or a triangle has no area.
+    pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
+        Self::of_polygons(positions, triangles.iter().map(<[u32; 3]>::as_slice))
+    }
+
+    /// Of positions and polygons, each some of the positions in their order round it. A polygon is
+    /// cut into triangles from its first corner on.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`].
+    pub fn of_polygons<'a>(
+        positions: &[DVec3],
+        polygons: impl IntoIterator<Item = &'a [u32]>,
+    ) -> Result<Self, MeshError> {
+        let Welded {
+            positions,
+            mut faces,
+            mut warnings,
+        } = weld::weld(positions, polygons)?;
+        let turned = windings::turn_alike(positions.len(), &mut faces);
+        if turned.count > 0 {
+            let count = turned.count;
+            warnings.push(MeshWarning::Turned { count });
+        }
+        if turned.is_one_sided {
+            warnings.push(MeshWarning::OneSided);
+        }
+        let links = Links::new(positions.len(), &faces);
+        let has_branches = links.twins().contains(&links::MANY);
+        let (pieces, piece_sizes) = pieces(positions.len(), &faces);
+        let normals = (!turned.is_one_sided).then(|| normals(&positions, &faces));
+        let mut surface = Surface {
+            positions,
+            faces,
+            normals,
+            links,
+        };
+        let tree = Tree::new(&surface);
+        let size = tree.extent();
+        surface.positions.shrink_to_fit();
+        Ok(Self {
+            surface,
+            tree,
+            size,
+            has_branches,
+            pieces,
+            piece_sizes,
+            warnings,
+        })
+    }
+
+    /// What was odd with the input.
+    #[must_use]
+    pub fn warnings(&self) -> &[MeshWarning] {
+        &self.warnings
+    }
+
+    /// The vertices that triangles use, each position once.
+    #[must_use]
+    pub fn positions(&self) -> &[DVec3] {
+        &self.surface.positions
+    }
+
+    /// The triangles, as three of [`Mesh::positions`] each.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.surface.faces
+    }
+
+    /// The unit normal at each vertex: the mean of its faces', weighted by their angles there.
+    /// `None` where the surface has one side.
+    #[must_use]
+    pub fn normals(&self) -> Option<&[DVec3]> {
+        self.surface.normals.as_deref()
+    }
+
+    /// The largest extent along an axis.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.size
+    }
+
+    /// The triangles of each piece of the surface; pieces share no vertex.
+    #[must_use]
+    pub fn pieces(&self) -> &[usize] {
+        &self.piece_sizes
+    }
+
+    /// The point of the surface that is nearest to `point`.
+    #[must_use]
+    pub fn nearest(&self, point: DVec3) -> DVec3 {
+        self.tree.nearest(&self.surface, point).point
+    }
+}
+
+/// The piece of each vertex, and the triangles of each piece.
+fn pieces(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<usize>) {
+    let mut parents: Vec<u32> = (0..vertices as u32).collect();
+    fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
+        while parents[vertex as usize] != vertex {
+            let above = parents[parents[vertex as usize] as usize];
+            parents[vertex as usize] = above;
+            vertex = above;
+        }
+        vertex
+    }
+    for &[a, b, c] in faces {
+        let root_a = root(&mut parents, a);
+        for other in [b, c] {
+            let other = root(&mut parents, other);
+            parents[other as usize] = root_a;
+        }
+    }
+    let mut numbers = vec![u32::MAX; vertices];
+    let mut sizes = Vec::new();
+    let mut pieces = Vec::with_capacity(vertices);
+    for vertex in 0..vertices as u32 {
+        let root = root(&mut parents, vertex) as usize;
+        if numbers[root] == u32::MAX {
+            numbers[root] = sizes.len() as u32;
+            sizes.push(0);
+        }
+        pieces.push(numbers[root]);
+    }
+    for face in faces {
+        sizes[pieces[face[0] as usize] as usize] += 1;
+    }
+    (pieces, sizes)
+}
+
+/// The normals of the vertices, weighted by the faces' angles there: they do not depend on how flat
+/// parts are cut into triangles (Thürmer and Wüthrich, 1998).
+fn normals(positions: &[DVec3], faces: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; positions.len()];
+    for face in faces {
+        let corners = face.map(|vertex| positions[vertex as usize]);
+        for k in 0..3 {
+            let (one, other) = (
+                corners[(k + 1) % 3] - corners[k],
+                corners[(k + 2) % 3] - corners[k],
+            );
+            let cross = one.cross(other);
+            let angle = cross.length().atan2(one.dot(other));
+            sums[face[k] as usize] += angle * cross.normalize_or_zero();
+        }
+    }
+    let unit = |sum: DVec3| {
+        if sum.length() > 1e-12 {
+            sum.normalize()
+        } else {
+            DVec3::ZERO
+        }
+    };
+    sums.into_iter().map(unit).collect()
+}

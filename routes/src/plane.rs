@@ -1,0 +1,130 @@
+//! The cut of the surface by a plane through start and goal.
+
+use glam::DVec3;
+
+use crate::error::RouteError;
+use crate::mesh::links::{NONE, at, next, previous};
+use crate::mesh::surface::{Spot, Surface};
+use crate::places::Task;
+
+/// A direction is along another when the sine of the angle between them is below this.
+const ALONG: f64 = 1e-9;
+
+/// The shorter of the two halves of the cut, where they lead from start to goal.
+///
+/// # Errors
+/// When no plane is given, or neither half arrives.
+pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
+    let surface = &*task.surface;
+    let normal = plane_normal(task)?;
+    let start = surface.positions[task.start as usize];
+    // The distance of start and goal from the plane is 0, whatever rounding makes of it.
+    let mut heights: Vec<f64> = (surface.positions.iter().zip(0..))
+        .map(
+            |(&position, vertex)| match vertex == task.start || vertex == task.goal {
+                true => 0.0,
+                false => (position - start).dot(normal),
+            },
+        )
+        .collect();
+    // A vertex in the plane counts as above it, so that every cut of a face has two ends. Where
+    // that leads nowhere, as along a boundary, it counts as below.
+    for _ in 0..2 {
+        let cut = Cut {
+            task,
+            surface,
+            heights: &heights,
+        };
+        let ways = cut.exits().into_iter().filter_map(|exit| cut.follow(exit));
+        let length = |way: &Vec<Spot>| -> f64 {
+            let points = way.iter().map(|&spot| surface.position(spot));
+            points
+                .clone()
+                .zip(points.skip(1))
+                .map(|(a, b)| a.distance(b))
+                .sum()
+        };
+        if let Some(way) = ways.min_by(|a, b| length(a).total_cmp(&length(b))) {
+            return Ok(way);
+        }
+        for height in &mut heights {
+            *height = -*height;
+        }
+    }
+    Err(RouteError::NoPlaneWay)
+}
+
+/// The unit normal of the plane: it runs through both points and along the sum of their normals;
+/// where that tells nothing along the start's, then along the goal's.
+fn plane_normal(task: &Task<'_>) -> Result<DVec3, RouteError> {
+    let surface = &*task.surface;
+    let [start, goal] = [task.start, task.goal].map(|vertex| surface.positions[vertex as usize]);
+    let of = |vertex| {
+        surface
+            .normal(Spot::vertex(vertex))
+            .ok_or(RouteError::OneSided)
+    };
+    let (at_start, at_goal) = (of(task.start)?, of(task.goal)?);
+    let chord = (goal - start).normalize_or_zero();
+    [at_start + at_goal, at_start, at_goal]
+        .into_iter()
+        .map(|up| chord.cross(up))
+        .find(|normal| normal.length() > ALONG)
+        .map(DVec3::normalize)
+        .ok_or(RouteError::NoPlane)
+}
+
+struct Cut<'a> {
+    task: &'a Task<'a>,
+    surface: &'a Surface,
+    heights: &'a [f64],
+}
+
+impl Cut<'_> {
+    fn is_above(&self, vertex: u32) -> bool {
+        self.heights[vertex as usize] >= 0.0
+    }
+
+    /// The plane passes between the ends of this edge.
+    fn cuts(&self, half_edge: u32) -> bool {
+        let faces = &self.surface.faces;
+        self.is_above(at(faces, half_edge)) != self.is_above(at(faces, next(half_edge)))
+    }
+
+    /// The half-edges through which the cut leaves the faces about the start.
+    fn exits(&self) -> Vec<u32> {
+        let corners = self.surface.links.corners(self.task.start).iter();
+        let opposite = corners.map(|&corner| next(corner));
+        opposite.filter(|&half_edge| self.cuts(half_edge)).collect()
+    }
+
+    /// Follows the cut from one face to the next, until it comes to the goal, to a boundary or back
+    /// to where it was.
+    fn follow(&self, exit: u32) -> Option<Vec<Spot>> {
+        let faces = &self.surface.faces;
+        let mut way = vec![Spot::vertex(self.task.start)];
+        let mut half_edge = exit;
+        // The cut passes each face once.
+        for _ in 0..=faces.len() {
+            let (from, to) = (at(faces, half_edge), at(faces, next(half_edge)));
+            if from == self.task.goal || to == self.task.goal {
+                way.push(Spot::vertex(self.task.goal));
+                return Some(way);
+            }
+            let (low, high) = (self.heights[from as usize], self.heights[to as usize]);
+            way.push(Spot {
+                from,
+                to,
+                fraction: low / (low - high),
+            });
+            let twin = self.surface.links.twin(half_edge);
+            if twin == NONE {
+                return None;
+            }
+            half_edge = [next(twin), previous(twin)]
+                .into_iter()
+                .find(|&side| self.cuts(side))?;
+        }
+        None
+    }
+}

@@ -1,0 +1,147 @@
+//! Routes: from one point of a mesh to another.
+
+use std::fmt;
+use std::str::FromStr;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::error::RouteError;
+use crate::mesh::Mesh;
+use crate::mesh::surface::Spot;
+use crate::places::{Task, place};
+use crate::{edges, exact, greedy, plane};
+
+/// How a route is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum By {
+    /// The shortest way over the surface.
+    #[default]
+    Exact,
+    /// The cut of the surface by the plane through start and goal and along their normals.
+    Plane,
+    /// Along edges, each time the one that points most nearly to the goal.
+    Greedy,
+    /// The shortest way along edges.
+    Edges,
+}
+
+impl By {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Exact, Self::Plane, Self::Greedy, Self::Edges];
+
+    /// `exact`, `plane`, `greedy` or `edges`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Plane => "plane",
+            Self::Greedy => "greedy",
+            Self::Edges => "edges",
+        }
+    }
+}
+
+impl fmt::Display for By {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for By {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|by| by.name() == text);
+        found.ok_or_else(|| format!("`{text}` is none of exact, plane, greedy, edges"))
+    }
+}
+
+/// A way over a surface: straight from each point to the next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Route {
+    /// From the start to the goal, in the unit of the mesh. One point where the two are the same.
+    pub points: Vec<DVec3>,
+    /// The unit normal of the surface at each point, 0 where the normals of its faces cancel out;
+    /// `None` where the surface has one side.
+    pub normals: Option<Vec<DVec3>>,
+    /// The length over the surface, in the unit of the mesh.
+    pub length: f64,
+    /// How far start and goal were from the surface.
+    pub off: [f64; 2],
+}
+
+impl Mesh {
+    /// The route between the points of the surface that are nearest to `from` and `to`.
+    ///
+    /// # Errors
+    /// When a point is none, no way leads from one to the other, or `by` finds none.
+    pub fn route(&self, from: DVec3, to: DVec3, by: By) -> Result<Route, RouteError> {
+        if by == By::Plane && self.has_branches {
+            return Err(RouteError::PlaneBranches);
+        }
+        let task = place(self, from, to)?;
+        if task.start == task.goal {
+            return Ok(Route::new(&task, &[Spot::vertex(task.start)]));
+        }
+        let way = match by {
+            By::Exact => exact::way(&task)?,
+            By::Plane => plane::way(&task)?,
+            By::Greedy => greedy::way(&task),
+            By::Edges => edges::way(&task),
+        };
+        Ok(Route::new(&task, &way))
+    }
+
+    /// The routes of many pairs, each on a thread of its own. Each takes the memory of one alone.
+    #[must_use]
+    pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
+        let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
+        pairs.par_iter().map(route).collect()
+    }
+}
+
+impl Route {
+    /// The point so far along the straight lines from the start, and the unit normal there.
+    #[must_use]
+    pub fn at(&self, gone: f64) -> (DVec3, Option<DVec3>) {
+        let mut rest = gone.max(0.0);
+        let normals = |index: usize| self.normals.as_ref().map(|normals| normals[index]);
+        for (index, pair) in self.points.windows(2).enumerate() {
+            let length = pair[0].distance(pair[1]);
+            if rest <= length {
+                let part = if length > 0.0 { rest / length } else { 0.0 };
+                let ends = normals(index).zip(normals(index + 1));
+                let normal = ends.map(|(one, other)| one.lerp(other, part).normalize_or_zero());
+                return (pair[0].lerp(pair[1], part), normal);
+            }
+            rest -= length;
+        }
+        let last = self.points.len() - 1;
+        (self.points[last], normals(last))
+    }
+
+    /// Of places on edges; those at the same position become one.
+    pub(crate) fn new(task: &Task<'_>, way: &[Spot]) -> Self {
+        let surface = &*task.surface;
+        let mut points: Vec<DVec3> = Vec::with_capacity(way.len());
+        let mut kept: Vec<Spot> = Vec::with_capacity(way.len());
+        for &spot in way {
+            let point = surface.position(spot);
+            if points.last() != Some(&point) {
+                points.push(point);
+                kept.push(spot);
+            }
+        }
+        let normals: Option<Vec<DVec3>> = kept.iter().map(|&spot| surface.normal(spot)).collect();
+        Self {
+            length: points
+                .windows(2)
+                .map(|pair| pair[0].distance(pair[1]))
+                .sum(),
+            points,
+            normals,
+            off: task.off,
+        }
+    }
+}

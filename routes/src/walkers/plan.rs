@@ -1,0 +1,255 @@
+//! The staircase with the least delay.
+
+use glam::DVec2;
+
+use crate::walkers::region::{Line, Region};
+use crate::walkers::{Mover, Plan, Walker, WalkerError};
+
+/// What a mover does after its last time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stay {
+    Leaves,
+    Remains,
+}
+
+/// Between places where the obstacles change the way is cut into so many steps; one waits at their
+/// ends alone.
+const STEPS: usize = 16;
+/// Delays nearer than this part to each other are the same: regions that touch leave no gap.
+const SAME: f64 = 1e-10;
+
+/// A closed interval of delays.
+type Interval = (f64, f64);
+
+pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, WalkerError> {
+    let points = &walker.route.points;
+    let mut gone = 0.0;
+    let mut stops = vec![0.0];
+    for pair in points.windows(2) {
+        gone += pair[0].distance(pair[1]);
+        stops.push(gone);
+    }
+    let regions = regions(walker, &stops, others);
+    let places = places(&stops, &regions);
+    // The delays with which one can come to each place.
+    let mut reached: Vec<Vec<Interval>> = vec![vec![(0.0, 0.0)]];
+    for (index, &place) in places.iter().enumerate() {
+        let mut from = raised(&reached[index], &blocked(&regions, place, place));
+        if index == 0 {
+            // Until it sets out it stands where it is.
+            from.retain_mut(|own| {
+                own.0 = own.0.max(walker.start);
+                own.0 <= own.1
+            });
+        }
+        let Some(&next) = places.get(index + 1) else {
+            reached.push(from);
+            break;
+        };
+        let on = without(&from, &blocked(&regions, place, next));
+        if on.is_empty() {
+            return Err(WalkerError::Blocked);
+        }
+        reached.push(on);
+    }
+    let delay = |index: usize, most: f64| {
+        let gaps = raised(
+            &reached[index],
+            &blocked(&regions, places[index], places[index]),
+        );
+        let gap = gaps
+            .into_iter()
+            .rev()
+            .find(|own| own.0 <= most + same(most));
+        gap.map_or(most, |own| own.0.min(most))
+    };
+    let last = places.len() - 1;
+    let arriving = reached[last].first().map(|own| own.0);
+    let Some(arriving) = arriving.filter(|_| !reached[last + 1].is_empty()) else {
+        return Err(WalkerError::Blocked);
+    };
+    // Alone on one point there is nothing to walk.
+    let arriving = if last == 0 { walker.start } else { arriving };
+    // From the goal back: with each delay one has come from the least in its gap.
+    let mut delays = vec![(arriving, arriving); places.len()];
+    let mut own = arriving;
+    for index in (0..=last).rev() {
+        let before = if index == 0 {
+            0.0
+        } else {
+            delay(index, own).min(own)
+        };
+        let before = if index == last { own } else { before };
+        delays[index] = (before, own);
+        own = before;
+    }
+    if last == 0 {
+        delays[0] = (0.0, arriving);
+    }
+    Ok(timed(walker, &stops, &places, &delays))
+}
+
+fn same(delay: f64) -> f64 {
+    SAME * (1.0 + delay.abs())
+}
+
+fn regions(
+    walker: &Walker,
+    stops: &[f64],
+    others: &[(Mover, Stay)],
+) -> Vec<(DVec2, DVec2, Region)> {
+    let points = &walker.route.points;
+    let stretch = |k: usize| Line::between((stops[k], points[k]), (stops[k + 1], points[k + 1]));
+    let mut ways: Vec<Line> = (0..points.len() - 1).map(stretch).collect();
+    if ways.is_empty() {
+        ways.push(Line::standing(0.0, 0.0, points[0]));
+    }
+    let mut regions = Vec::new();
+    for (other, stay) in others {
+        let pairs = other.track.windows(2);
+        let mut lines: Vec<Line> = pairs.map(|pair| Line::between(pair[0], pair[1])).collect();
+        if let (Some(&(time, place)), Stay::Remains) = (other.track.last(), stay) {
+            lines.push(Line::standing(time, f64::INFINITY, place));
+        }
+        for &line in &lines {
+            for &way in &ways {
+                let region =
+                    Region::new(way, line, 1.0 / walker.speed, walker.radius + other.radius);
+                if let Some((low, high)) = region.extent(way.from, way.to)
+                    && high.y >= 0.0
+                {
+                    regions.push((low, high, region));
+                }
+            }
+        }
+    }
+    regions
+}
+
+/// Where one may wait: at the points of the way, where obstacles begin and end, and between.
+fn places(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
+    let end = stops[stops.len() - 1];
+    let ends = regions.iter().flat_map(|(low, high, _)| [low.x, high.x]);
+    let mut marks: Vec<f64> = stops.iter().copied().chain(ends).collect();
+    marks.sort_by(f64::total_cmp);
+    let mut places = vec![0.0];
+    for mark in marks {
+        let mark = mark.clamp(0.0, end);
+        let before = places[places.len() - 1];
+        if mark - before <= 1e-12 * end {
+            continue;
+        }
+        let touches = |(low, high, _): &(DVec2, DVec2, Region)| low.x < mark && high.x > before;
+        let steps = if regions.iter().any(touches) {
+            STEPS
+        } else {
+            1
+        };
+        let part = (mark - before) / steps as f64;
+        places.extend((1..steps).map(|step| before + step as f64 * part));
+        places.push(mark);
+    }
+    if let Some(last) = places.last_mut().filter(|_| end > 0.0) {
+        *last = end;
+    }
+    places
+}
+
+/// The open intervals of delays that some region holds between two places, apart and in order.
+fn blocked(regions: &[(DVec2, DVec2, Region)], from: f64, to: f64) -> Vec<Interval> {
+    let near = regions
+        .iter()
+        .filter(|(low, high, _)| low.x <= to && high.x >= from);
+    let extents = near.filter_map(|(_, _, region)| region.extent(from, to));
+    let mut all: Vec<Interval> = extents.map(|(low, high)| (low.y, high.y)).collect();
+    all.retain(|own| own.1 - own.0 > same(own.0));
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut apart: Vec<Interval> = Vec::with_capacity(all.len());
+    for own in all {
+        match apart.last_mut() {
+            Some(last) if own.0 <= last.1 + same(last.1) => last.1 = last.1.max(own.1),
+            _ => apart.push(own),
+        }
+    }
+    apart
+}
+
+/// The intervals between blocked ones, from 0 on.
+fn gaps(blocked: &[Interval]) -> Vec<Interval> {
+    let mut gaps = Vec::with_capacity(blocked.len() + 1);
+    let mut from = 0.0;
+    for &(low, high) in blocked {
+        if low >= from {
+            gaps.push((from, low));
+        }
+        from = f64::max(from, high);
+    }
+    if from < f64::INFINITY {
+        gaps.push((from, f64::INFINITY));
+    }
+    gaps
+}
+
+/// By waiting: in each gap all from the least that is reached.
+fn raised(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
+    let raise = |(low, high): Interval| {
+        let within = |own: &&Interval| own.1 >= low - same(low) && own.0 <= high + same(high);
+        let least = reached.iter().find(within)?.0;
+        Some((least.clamp(low, high), high))
+    };
+    gaps(blocked).into_iter().filter_map(raise).collect()
+}
+
+/// By walking: what is reached, without what is blocked.
+fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
+    let gaps = gaps(blocked);
+    let mut left = Vec::new();
+    for &(low, high) in reached {
+        for gap in &gaps {
+            // Rounding may leave the end of a region a little inside it.
+            let from = if low < gap.0 && gap.0 - low <= same(low) {
+                gap.0
+            } else {
+                low.max(gap.0)
+            };
+            let to = high.min(gap.1);
+            if from <= to {
+                left.push((from, to));
+            }
+        }
+    }
+    left
+}
+
+/// When one is where.
+fn timed(walker: &Walker, stops: &[f64], places: &[f64], delays: &[(f64, f64)]) -> Plan {
+    let points = &walker.route.points;
+    let at = |place: f64| {
+        let next = stops
+            .partition_point(|&stop| stop < place)
+            .clamp(1, stops.len().max(2) - 1);
+        match (points.get(next - 1), points.get(next)) {
+            (Some(&one), Some(&other)) => {
+                let part = (place - stops[next - 1]) / (stops[next] - stops[next - 1]);
+                one.lerp(other, part.clamp(0.0, 1.0))
+            }
+            _ => points[0],
+        }
+    };
+    let mut times: Vec<(f64, f64, glam::DVec3)> = Vec::new();
+    for (index, (&place, &(before, behind))) in places.iter().zip(delays).enumerate() {
+        let walked = place / walker.speed;
+        let waits = behind - before > same(before);
+        let is_stop = stops
+            .binary_search_by(|stop| stop.total_cmp(&place))
+            .is_ok();
+        if waits || is_stop || index == 0 || index + 1 == places.len() {
+            times.push((before + walked, place, at(place)));
+        }
+        if waits {
+            times.push((behind + walked, place, at(place)));
+        }
+    }
+    let arrival = times.last().map_or(0.0, |last| last.0);
+    Plan { times, arrival }
+}

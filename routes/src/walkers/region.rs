@@ -1,0 +1,158 @@
+//! Where two bodies on straight stretches touch, in the way gone and the delay.
+
+use glam::{DVec2, DVec3, Vec2Swizzles};
+
+/// Distances within this part of the sum of radii are equal to it: bodies may touch.
+const TOUCH: f64 = 1e-12;
+
+/// The obstacle of one stretch of another body on one stretch of a way: all (s, w) at which the
+/// distance is below `reach`, a convex region.
+#[derive(Debug, Clone)]
+pub(super) struct Region {
+    /// The distance is that of `offset + along * s + by_delay * w` from the origin.
+    offset: DVec3,
+    along: DVec3,
+    by_delay: DVec3,
+    reach: f64,
+    /// Of the other's stretch, seconds.
+    from: f64,
+    to: f64,
+    /// Seconds for each unit of the way.
+    slowness: f64,
+    /// The ends of the way's stretch.
+    pub(super) start: f64,
+    pub(super) end: f64,
+}
+
+/// A body on a straight stretch: where it is at a parameter, and how that changes with it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    /// At the parameter 0.
+    pub(super) origin: DVec3,
+    pub(super) rate: DVec3,
+}
+
+impl Line {
+    pub(super) fn between((from, one): (f64, DVec3), (to, other): (f64, DVec3)) -> Self {
+        let rate = (other - one) / (to - from);
+        let rate = if rate.is_finite() { rate } else { DVec3::ZERO };
+        Self {
+            from,
+            to,
+            origin: one - from * rate,
+            rate,
+        }
+    }
+
+    pub(super) fn standing(from: f64, to: f64, at: DVec3) -> Self {
+        Self {
+            from,
+            to,
+            origin: at,
+            rate: DVec3::ZERO,
+        }
+    }
+}
+
+impl Region {
+    /// Of a stretch of the way, which is walked at 1 / `slowness`, and one of another body.
+    pub(super) fn new(way: Line, other: Line, slowness: f64, reach: f64) -> Self {
+        Self {
+            offset: way.origin - other.origin,
+            along: way.rate - slowness * other.rate,
+            by_delay: -other.rate,
+            reach: reach * (1.0 - TOUCH),
+            from: other.from,
+            to: other.to,
+            slowness,
+            start: way.from,
+            end: way.to,
+        }
+    }
+
+    /// The least and the largest s and w of the region between two places of the way; `None` where
+    /// it is empty there.
+    ///
+    /// A linear function is extreme on a convex region where its boundary turns that way, or in one
+    /// of its corners: the curve's with the lines that bound it, or those with each other.
+    pub(super) fn extent(&self, start: f64, end: f64) -> Option<(DVec2, DVec2)> {
+        let (start, end) = (start.max(self.start), end.min(self.end));
+        if start > end {
+            return None;
+        }
+        let slack = TOUCH * (self.reach + self.offset.length() + self.along.length() * end.abs());
+        let mut found: Option<(DVec2, DVec2)> = None;
+        let mut take = |point: DVec2| {
+            let time = point.y + self.slowness * point.x;
+            let is_within = point.is_finite()
+                && point.x >= start - TOUCH * (1.0 + start.abs())
+                && point.x <= end + TOUCH * (1.0 + end.abs())
+                && time >= self.from - TOUCH * (1.0 + self.from.abs())
+                && (self.to == f64::INFINITY || time <= self.to + TOUCH * (1.0 + self.to.abs()))
+                && self.distance(point) <= self.reach + slack;
+            if is_within {
+                let (low, high) = found.get_or_insert((point, point));
+                (*low, *high) = (low.min(point), high.max(point));
+            }
+        };
+        let (a, b, c) = (self.along, self.by_delay, self.offset);
+        // Where the boundary turns: the gradient by the one coordinate is 0.
+        for (own, other, swap) in [(a, b, false), (b, a, true)] {
+            if own.length_squared() > 0.0 {
+                // own-coordinate = p + q * other-coordinate
+                let p = -own.dot(c) / own.length_squared();
+                let q = -own.dot(other) / own.length_squared();
+                for value in self.roots(c + p * own, other + q * own) {
+                    let point = DVec2::new(p + q * value, value);
+                    take(if swap { point.yx() } else { point });
+                }
+            }
+        }
+        // On the bounds of the way, and on those of time: w = time - slowness * s.
+        let times = [self.from, self.to]
+            .into_iter()
+            .filter(|time| time.is_finite());
+        for s in [start, end] {
+            for w in self.roots(c + s * a, b) {
+                take(DVec2::new(s, w));
+            }
+            for time in times.clone() {
+                take(DVec2::new(s, time - self.slowness * s));
+            }
+        }
+        for time in times {
+            for s in self.roots(c + time * b, a - self.slowness * b) {
+                take(DVec2::new(s, time - self.slowness * s));
+            }
+        }
+        // Who stays for ever blocks all delays from some one on.
+        let (low, mut high) = found?;
+        if self.to == f64::INFINITY {
+            high.y = f64::INFINITY;
+        }
+        Some((low, high))
+    }
+
+    /// Between the middles of both bodies.
+    fn distance(&self, at: DVec2) -> f64 {
+        (self.offset + at.x * self.along + at.y * self.by_delay).length()
+    }
+
+    /// Where `offset + x * rate` is `reach` long.
+    fn roots(&self, offset: DVec3, rate: DVec3) -> Vec<f64> {
+        let square = rate.length_squared();
+        if square == 0.0 {
+            return Vec::new();
+        }
+        let middle = -offset.dot(rate) / square;
+        let nearest = (offset + middle * rate).length();
+        let rest = (self.reach - nearest) * (self.reach + nearest);
+        if rest < 0.0 {
+            return Vec::new();
+        }
+        let half = (rest / square).sqrt();
+        vec![middle - half, middle + half]
+    }
+}

@@ -1,0 +1,10 @@
+//! Every test of routes. `cargo test -p tumble-routes --test all numbers::` runs those of one file.
+
+mod grounds;
+mod inputs;
+mod nets;
+mod numbers;
+mod properties;
+#[path = "support/shapes.rs"]
+mod shapes;
+mod walking;
