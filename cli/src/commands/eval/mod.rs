@@ -3,6 +3,7 @@
 mod motion;
 mod rotations;
 
+use std::path::Path;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -138,6 +139,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 arguments,
                 device: &mut device,
                 samples: &samples,
+                path,
                 loaded,
                 started: Instant::now(),
             };
@@ -183,6 +185,7 @@ struct Job<'a> {
     arguments: &'a Arguments,
     device: &'a mut Opened,
     samples: &'a Samples,
+    path: &'a Path,
     loaded: &'a Loaded,
     started: Instant,
 }
@@ -208,6 +211,19 @@ impl Job<'_> {
             return Err(Failure::usage(message));
         };
         self.rotations(name, clip, target)
+    }
+
+    /// What made a result, for formats that have room for it. A stream's hash is not known.
+    fn notes(&self, name: &str) -> Vec<(&'static str, String)> {
+        let mut notes = vec![
+            ("method", self.arguments.method.to_string()),
+            ("input", name.to_owned()),
+        ];
+        if !input::is_standard(self.path) {
+            let hash = digest::of_file(self.path).ok();
+            notes.extend(hash.map(|hash| ("input_sha256", hash)));
+        }
+        notes
     }
 
     /// Which method interpolates each channel.

@@ -119,7 +119,7 @@ impl Job<'_> {
             all.push(self.sample(name, clip, frames)?);
         }
         let method = self.arguments.method.to_string();
-        let notes = [("method", method.clone()), ("input", name.to_owned())];
+        let notes = self.notes(name);
         let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
