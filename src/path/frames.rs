@@ -281,7 +281,7 @@ impl Frames {
                     None => vec![(first, angle)],
                 };
                 self.rolls[rolls] = Rolls::through(&points);
-                rotation = rotation * about_z(points[points.len() - 1].1);
+                rotation *= about_z(points[points.len() - 1].1);
             }
             before = Some(rotation);
             stretch = end;

@@ -99,6 +99,9 @@ impl Lengths {
         let mut t = from + (to - from) * ((length - before) / (end - before));
         let mut excess = before + between(slope, from, t) - length;
         for _ in 0..60 {
+            if excess.abs() <= 2.0 * f64::EPSILON * length.max(end) {
+                break;
+            }
             if excess > 0.0 {
                 high = t;
             } else {
@@ -111,7 +114,7 @@ impl Lengths {
                 0.5 * (low + high)
             };
             let step = next - t;
-            if step.abs() <= 1e-15 {
+            if step.abs() <= 1e-14 {
                 return next;
             }
             excess += if step.abs() < 1e-3 * (to - from) {

@@ -177,11 +177,7 @@ fn add(
             return Ok(());
         }
     };
-    let ups: Vec<Option<DVec3>> = path
-        .ups
-        .iter()
-        .map(|up| up.map(|up| up.as_dvec3()))
-        .collect();
+    let ups: Vec<Option<DVec3>> = path.ups.iter().map(|up| up.map(Vec3::as_dvec3)).collect();
     let frames = Frames::new(own, found, follow, &ups, track, warnings);
     let route = &frames.route;
     let mut spans: Vec<Span> = Vec::with_capacity(frames.stretches.len());

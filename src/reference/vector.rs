@@ -162,7 +162,7 @@ impl VectorCurve {
         };
         // The knots of interval `i` from three before it to two after its end.
         let knots_of = |i: usize| {
-            let mut knots = vec![0.0; 6];
+            let mut knots = [0.0; 6];
             for j in 1..6 {
                 knots[j] = knots[j - 1] + step(i as isize - 3 + j as isize);
             }

@@ -145,7 +145,7 @@ impl SmoothingKernel {
         };
         let reach = match self {
             Self::Linear => return Ok(vec![0.5, 0.25]),
-            Self::Cubic => return Ok(vec![6.0, 4.0, -1.0].iter().map(|a| a / 12.0).collect()),
+            Self::Cubic => return Ok([6.0, 4.0, -1.0].map(|a| a / 12.0).to_vec()),
             Self::SavitzkyGolay { radius, order } => return savitzky_golay(radius, order),
             Self::Box(half) | Self::Tent(half) => checked(half)?,
             Self::Gaussian(deviation) => 4.0 * checked(deviation)?,

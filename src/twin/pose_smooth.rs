@@ -46,7 +46,7 @@ pub(crate) fn add(sum: &mut [f32; 4], steps: &[[f32; 4]], weights: &[f32], place
         steps[place + weights.len() - 1 - m],
     );
     for c in 0..4 {
-        sum[c] = sum[c] + (after[c] - before[c]) * weights[m];
+        sum[c] += (after[c] - before[c]) * weights[m];
     }
 }
 
