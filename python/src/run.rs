@@ -27,8 +27,12 @@ pub(crate) struct Job<'a> {
 }
 
 /// Whether Ctrl-C was pressed.
+#[allow(
+    clippy::redundant_closure_for_method_calls,
+    reason = "the path has one lifetime"
+)]
 pub(crate) fn check_signals() -> PyResult<()> {
-    Python::attach(Python::check_signals)
+    Python::attach(|py| py.check_signals())
 }
 
 impl Job<'_> {
