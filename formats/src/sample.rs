@@ -88,11 +88,7 @@ impl ChannelMethods<'_> {
         frames: &Frames,
     ) -> Result<Samples, Error> {
         let tracks = clip.set.track_count();
-        // All tracks are sampled at the same times, whichever of them are evaluated together.
-        let frames = match clip.set.time_span() {
-            Some(span) => frames.clone().spanning(span),
-            None => frames.clone(),
-        };
+        let frames = over(clip, frames);
         let timeline = frames.resolve(tracks, None)?;
         let times: Vec<f64> = (0..timeline.len()).map(|i| timeline.time(0, i)).collect();
         let layout = Layout::FrameMajor;
@@ -129,7 +125,8 @@ impl ChannelMethods<'_> {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
-        let evaluate = |set: &TrackSet, how| engine.evaluate_as(set, how, frames, layout);
+        let frames = over(clip, frames);
+        let evaluate = |set: &TrackSet, how| engine.evaluate_as(set, how, &frames, layout);
         self.by_method(clip, layout, evaluate, Rotations::as_quats)
     }
 
@@ -145,7 +142,8 @@ impl ChannelMethods<'_> {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Vec<Vec4>, Error> {
-        let evaluate = |set: &TrackSet, how| engine.rates(set, how, frames, layout);
+        let frames = over(clip, frames);
+        let evaluate = |set: &TrackSet, how| engine.rates(set, how, &frames, layout);
         self.by_method(clip, layout, evaluate, Vectors::as_slice)
     }
 
@@ -158,9 +156,6 @@ impl ChannelMethods<'_> {
         values: fn(&tumble::Samples<S>) -> &[T],
     ) -> Result<Vec<T>, Error> {
         let tracks = clip.set.track_count();
-        // Tracks whose keys span another time than those of the clip are sampled at the same times.
-        let span = clip.set.time_span();
-        let frames = &span.map_or_else(|| frames.clone(), |span| frames.clone().spanning(span));
         let mut all = Vec::new();
         for (method, group) in self.groups_of(clip) {
             let interpolation = (self.with)(method);
@@ -297,6 +292,13 @@ impl Motion {
             _ => method::BESSEL_OVERHAUSER,
         }
     }
+}
+
+/// Frames over the whole of a clip: all tracks are sampled at the same times, whatever their own keys
+/// span and whichever of them are evaluated together.
+fn over(clip: &Motion, frames: &Frames) -> Frames {
+    let span = clip.set.time_span();
+    span.map_or_else(|| frames.clone(), |span| frames.clone().spanning(span))
 }
 
 /// Tracks with the same property, in lists, by the first of each.
