@@ -139,7 +139,7 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
             "<path d=\"{line}\" stroke=\"{colour}\" stroke-width=\"3\" fill=\"none\" \
              stroke-linejoin=\"round\"/>"
         );
-        for end in points.clone().take(1).chain(points.last()) {
+        for end in points.clone().take(1).chain(points.clone().next_back()) {
             let (x, y) = (end.x, end.y);
             let _ = writeln!(
                 svg,
