@@ -112,7 +112,11 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
     if let Some(rocks) = avoided {
         let mut filled = String::new();
         for own in rocks.triangles() {
-            let [a, b, c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+            let [a, mut b, mut c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+            // All the same way round, or the lower side would leave the upper one unfilled.
+            if (b - a).perp_dot(c - a) < 0.0 {
+                (b, c) = (c, b);
+            }
             let _ = write!(
                 filled,
                 "M{:.2} {:.2}L{:.2} {:.2}L{:.2} {:.2}Z",
