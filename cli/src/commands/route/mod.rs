@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     let found = busy("finding ways", || {
-        find(arguments, &surface, avoided.as_ref(), &party)
+        find(arguments, &surface, avoided.as_deref(), &party)
     })?;
     let outcomes = scheduled(found, &party);
     for outcome in &outcomes {
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     results.write(&outcomes)?;
     if let Some(file) = &arguments.plot {
-        picture::draw(arguments, file, &surface, avoided.as_ref(), &outcomes)?;
+        picture::draw(arguments, file, &surface, avoided.as_deref(), &outcomes)?;
     }
     told(arguments, &outcomes, &results, started)
 }

@@ -112,7 +112,11 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
     if let Some(rocks) = avoided {
         let mut filled = String::new();
         for own in rocks.triangles() {
-            let [a, b, c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+            let [a, mut b, mut c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+            // All the same way round, or the lower side would leave the upper one unfilled.
+            if (b - a).perp_dot(c - a) < 0.0 {
+                (b, c) = (c, b);
+            }
             let _ = write!(
                 filled,
                 "M{:.2} {:.2}L{:.2} {:.2}L{:.2} {:.2}Z",
@@ -139,7 +143,7 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
             "<path d=\"{line}\" stroke=\"{colour}\" stroke-width=\"3\" fill=\"none\" \
              stroke-linejoin=\"round\"/>"
         );
-        for end in points.clone().take(1).chain(points.last()) {
+        for end in points.clone().take(1).chain(points.clone().next_back()) {
             let (x, y) = (end.x, end.y);
             let _ = writeln!(
                 svg,

@@ -16,7 +16,7 @@ use crate::messages::words;
 const MOST_BYTES: u64 = 4 << 30;
 
 pub(super) enum Surface {
-    Mesh(Mesh),
+    Mesh(Box<Mesh>),
     Net(Net),
 }
 
@@ -54,7 +54,7 @@ impl Surface {
         for warning in mesh.warnings() {
             words::warning(&format!("{name}: {warning}"));
         }
-        Ok(Self::Mesh(mesh))
+        Ok(Self::Mesh(Box::new(mesh)))
     }
 
     pub(super) fn size(&self) -> f64 {
