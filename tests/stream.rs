@@ -216,7 +216,7 @@ fn parts_that_a_result_has_not_are_refused() {
         ),
         "{error}"
     );
-    let mut of_clip = |tracks, samples, output: &mut [u8]| {
+    let of_clip = |tracks, samples, output: &mut [u8]| {
         let (layout, encoding) = (Layout::FrameMajor, Encoding::F32);
         clip.evaluate_part_into(&frames, layout, (tracks, samples), encoding, output)
     };
