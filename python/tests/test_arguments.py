@@ -220,7 +220,7 @@ OTHERS = {
     "an output that is a list": (dict(out=[]), TypeError, "list"),
     "a method that is a number": (dict(method=3), TypeError, "text"),
     "a start that is text": (dict(start="soon"), TypeError, "seconds"),
-    "a result larger than memory": (dict(fps=10**11), MemoryError, ""),
+    "a result larger than memory": (dict(fps=10**11), MemoryError, None),
 }
 
 

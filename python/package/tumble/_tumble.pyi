@@ -9,7 +9,25 @@ from typing_extensions import Buffer, Unpack
 
 from tumble._notebook import View
 
-__all__: list[str]
+__all__ = [
+    "Chunk",
+    "Chunks",
+    "Clip",
+    "Engine",
+    "File",
+    "Verification",
+    "__version__",
+    "devices",
+    "evaluate",
+    "load",
+    "load_drivers",
+    "methods",
+    "page",
+    "panic",
+    "run",
+    "save",
+    "set_probe",
+]
 __version__: str
 
 class _Rotation(Protocol):
