@@ -203,7 +203,7 @@ struct Cases {
     cases: Vec<Case>,
 }
 
-/// Walks of points, some of which stand still for a while, with upward directions at some keys.
+/// Walks of points, some of which stand still for a while.
 fn paths() -> TrackSet {
     let mut random = Random(14);
     let mut set = TrackSet::new();

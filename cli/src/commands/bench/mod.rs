@@ -2,6 +2,7 @@
 //! would write. Everything is measured in one run, in turns, because machines are
 //! shared and their clocks drift; what counts are the ratios.
 
+pub(crate) mod follow;
 pub(crate) mod naive;
 pub(crate) mod report;
 pub(crate) mod stream;
@@ -52,6 +53,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for &kind in &arguments.workloads {
         let workload = kind.workload(arguments.shrink as usize);
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            // Paths are curves of one method.
+            if kind == Kind::Follow && method == method::SLERP {
+                continue;
+            }
             words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
             // A short call is repeated, so that the clock can see it.
             let calls = match kind {
@@ -64,6 +69,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             let section = if kind == Kind::Stream {
                 stream::measure(&workload, method, turns)?
+            } else if kind == Kind::Follow {
+                follow::measure(&workload, method, &devices, turns)
+                    .map_err(|error| crate::arguments::device::refused(&error))?
             } else {
                 measure(kind, &workload, method, &devices, turns)
                     .map_err(|error| crate::arguments::device::refused(&error))?
