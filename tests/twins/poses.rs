@@ -106,7 +106,13 @@ pub(super) fn poses() -> Vec<Twin> {
         twin(
             "poses_smooth",
             "turned",
-            |random: &mut Random| (random.rotation(), random.vector::<4>()),
+            |random: &mut Random| {
+                // Near the longest turn there is, or anything.
+                let long = [1.5708 + 0.0007 * random.number(), 0.0, 0.0, 0.0];
+                let any = random.vector::<4>();
+                let turn = if random.once_in(4) { long } else { any };
+                (random.rotation(), turn)
+            },
             |(q, v)| pose_smooth::turned(q, v),
         ),
         with_globals("poses_smooth", "pose", |random, trial| {
