@@ -365,7 +365,7 @@ mod tests {
         let numbers: Vec<f32> = (0..12u8).map(f32::from).collect();
         let pace = Some(Pace::Seconds(1.0));
         let set = read_paths("a.npy", "a", &array(&[2, 2, 3], &numbers), pace).unwrap();
-        assert_eq!((set.track_count(), set.track_name(1)), (2, "a1"));
+        assert_eq!((set.track_count(), set.track_name(1)), (2, "a1".to_owned()));
         let refused = |bytes: &[u8]| read_paths("a.npy", "a", bytes, pace).unwrap_err().code;
         assert_eq!(refused(&array(&[2, 3, 2], &numbers)), Code::Shape);
         assert_eq!(refused(&array(&[0, 2, 3], &[])), Code::NoKeys);

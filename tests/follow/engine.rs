@@ -20,14 +20,14 @@ fn set_of(own: &Follower) -> TrackSet {
 
 fn push(set: &mut TrackSet, own: &Follower) {
     let keys: Vec<Vec3> = own.curve.keys.iter().map(|key| key.as_vec3()).collect();
-    let ups: Vec<Option<Vec3>> = own.ups.iter().map(|up| up.map(|up| up.as_vec3())).collect();
+    let ups: Vec<Option<Vec3>> = own.ups.iter().map(|up| up.map(DVec3::as_vec3)).collect();
     let track = set.push_path("", &own.curve.times, &keys, &ups).unwrap();
     if !own.curve.tangents.is_empty() {
         let tangents: Vec<[Vec3; 2]> = own
             .curve
             .tangents
             .iter()
-            .map(|both| both.map(|one| one.as_vec3()))
+            .map(|both| both.map(DVec3::as_vec3))
             .collect();
         set.set_translations(track, &own.curve.times, &keys, &tangents)
             .unwrap();
@@ -111,7 +111,7 @@ fn examples_come_out() {
         .positions
         .get(0, 0)
         .unwrap();
-    assert!((natural - Vec3::new(1.83366935, 3.51814516, 0.125)).length() < 1e-6);
+    assert!((natural.as_dvec3() - DVec3::new(1.83366935, 3.51814516, 0.125)).length() < 1e-6);
 }
 
 /// The straight stretch between two bends: a quarter of the way it has turned by a quarter.
@@ -254,7 +254,7 @@ fn walk(random: &mut Random, method: &'static str, closed: bool) -> Follower {
 #[test]
 fn followers_are_the_reference_s() {
     let mut random = Random(11);
-    let (mut squares, mut count) = (0.0, 0.0);
+    let (mut squares, mut count) = (0.0f64, 0.0f64);
     let mut most = [0.0f64; 3];
     for round in 0..60 {
         let method = [
@@ -335,7 +335,7 @@ fn followers_are_the_reference_s() {
             }
         }
     }
-    let rms = (squares / count as f64).sqrt();
+    let rms = (squares / count).sqrt();
     eprintln!(
         "positions {:.2e}, rotations {:.2e} (rms {rms:.2e}), forward {:.2e}",
         most[0], most[1], most[2]
@@ -383,7 +383,7 @@ fn bits(found: &Followed) -> Vec<u32> {
         .positions
         .as_slice()
         .iter()
-        .flat_map(|own| own.to_array());
+        .flat_map(glam::Vec4::to_array);
     let turns = found.rotations.as_quats().iter().flat_map(Quat::to_array);
     places.chain(turns).map(f32::to_bits).collect()
 }

@@ -1,5 +1,7 @@
 //! The kernels over poses and that of the self-test, each beside its twin.
 
+use std::f32::consts::FRAC_PI_2;
+
 use bytemuck::Zeroable as _;
 
 use crate::shader::{Link, Probe, ROOT, Reply};
@@ -106,7 +108,13 @@ pub(super) fn poses() -> Vec<Twin> {
         twin(
             "poses_smooth",
             "turned",
-            |random: &mut Random| (random.rotation(), random.vector::<4>()),
+            |random: &mut Random| {
+                // Near the longest turn there is, or anything.
+                let long = [FRAC_PI_2 + 0.0007 * random.number(), 0.0, 0.0, 0.0];
+                let any = random.vector::<4>();
+                let turn = if random.once_in(4) { long } else { any };
+                (random.rotation(), turn)
+            },
             |(q, v)| pose_smooth::turned(q, v),
         ),
         with_globals("poses_smooth", "pose", |random, trial| {

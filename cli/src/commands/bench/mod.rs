@@ -3,6 +3,7 @@
 //! shared and their clocks drift; what counts are the ratios.
 
 pub(crate) mod files;
+pub(crate) mod follow;
 pub(crate) mod naive;
 pub(crate) mod report;
 pub(crate) mod stream;
@@ -61,6 +62,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             continue;
         };
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            // Paths are curves of one method.
+            if kind == Kind::Follow && method == method::SLERP {
+                continue;
+            }
             words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
             // A short call is repeated, so that the clock can see it.
             let calls = match kind {
@@ -73,6 +78,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             let section = if kind == Kind::Stream {
                 stream::measure(&workload, method, turns)?
+            } else if kind == Kind::Follow {
+                follow::measure(&workload, method, &devices, turns)
+                    .map_err(|error| crate::arguments::device::refused(&error))?
             } else {
                 measure(kind, &workload, method, &devices, turns)
                     .map_err(|error| crate::arguments::device::refused(&error))?

@@ -5,6 +5,8 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Frames, TrackSet};
 
+use crate::commands::bench::follow;
+
 /// A set, and the samples to evaluate.
 pub(crate) struct Workload {
     pub(crate) set: TrackSet,
@@ -29,6 +31,8 @@ pub(crate) enum Kind {
     Crowd,
     /// 1 track of 10 000 000 keys at 120 Hz, 60 frames a second
     Long,
+    /// 100 000 paths of 6 points, 60 frames
+    Follow,
     /// 8 GiB of rotations, written to a file in chunks
     Stream,
     /// 3000 clips of 22 joints and 240 frames in each motion format: read, resampled to 60 fps
@@ -57,6 +61,7 @@ impl Kind {
                 frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
             }
             Self::Crowd => crowd(few(1_000_000)),
+            Self::Follow => follow::workload(few(100_000)),
             Self::Files => return None,
         })
     }
