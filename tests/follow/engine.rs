@@ -20,18 +20,14 @@ fn set_of(own: &Follower) -> TrackSet {
 
 fn push(set: &mut TrackSet, own: &Follower) {
     let keys: Vec<Vec3> = own.curve.keys.iter().map(|key| key.as_vec3()).collect();
-    let ups: Vec<Option<Vec3>> = own
-        .ups
-        .iter()
-        .map(|up| up.as_ref().map(DVec3::as_vec3))
-        .collect();
+    let ups: Vec<Option<Vec3>> = own.ups.iter().map(|up| up.map(DVec3::as_vec3)).collect();
     let track = set.push_path("", &own.curve.times, &keys, &ups).unwrap();
     if !own.curve.tangents.is_empty() {
         let tangents: Vec<[Vec3; 2]> = own
             .curve
             .tangents
             .iter()
-            .map(|both| both.each_ref().map(DVec3::as_vec3))
+            .map(|both| both.map(DVec3::as_vec3))
             .collect();
         set.set_translations(track, &own.curve.times, &keys, &tangents)
             .unwrap();
