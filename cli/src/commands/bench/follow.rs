@@ -46,7 +46,7 @@ pub(crate) fn measure(
 ) -> Result<Section, tumble::Error> {
     let count = workload.set.track_count() * workload.times.len();
     let mut output = vec![Quat::IDENTITY; count];
-    let mut contestants = vec![
+    let mut contestants: Vec<Contestant<'_, tumble::Error>> = vec![
         Contestant::new("memory write rate", |output: &mut [Quat]| {
             output.fill(std::hint::black_box(Quat::IDENTITY));
             Ok(Vec::new())
