@@ -108,7 +108,12 @@ pub(super) fn poses() -> Vec<Twin> {
             "turned",
             |random: &mut Random| {
                 // Near the longest turn there is, or anything.
-                let long = [1.5708 + 0.0007 * random.number(), 0.0, 0.0, 0.0];
+                let long = [
+                    std::f32::consts::FRAC_PI_2 + 0.0007 * random.number(),
+                    0.0,
+                    0.0,
+                    0.0,
+                ];
                 let any = random.vector::<4>();
                 let turn = if random.once_in(4) { long } else { any };
                 (random.rotation(), turn)
