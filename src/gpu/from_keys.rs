@@ -31,7 +31,7 @@ pub(crate) struct KeysInFlight {
     weights: Option<Buffer>,
     /// The bytes of the result that the dispatch in flight makes.
     output: Range<usize>,
-    /// As [`InFlight::compiled`].
+    /// Whether the pipeline had run before: the first run of one may compile it.
     compiled: bool,
 }
 

@@ -69,9 +69,7 @@ pub enum SmoothingEnds {
 #[non_exhaustive]
 pub enum SmoothingError {
     /// The width must be positive, and not too large.
-    #[error(
-        "a kernel cannot be {width} samples wide; give a width above 0 and up to {MOST_RADIUS}"
-    )]
+    #[error("a kernel cannot be {width} samples wide; give a width above 0 and up to 250000")]
     Width {
         /// What was given.
         width: f64,

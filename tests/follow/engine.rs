@@ -347,7 +347,7 @@ fn followers_are_the_reference_s() {
 pub(super) fn trouble() -> TrackSet {
     let mut random = Random(3);
     let mut set = TrackSet::new();
-    for track in 0..18 {
+    for track in 0..9 {
         let count = 1 + track % 9;
         let mut time = random.between(-1.0, 1.0);
         let mut place = DVec3::ZERO;
