@@ -33,7 +33,7 @@ impl Collected {
 
 #[test]
 fn chunks_are_the_whole_in_order() {
-    let set = hostile_set(5, 24);
+    let set = hostile_set(24, 5);
     let explicit = (0..700).map(|i| 0.01 * f64::from((i * 37) % 700)).collect();
     let requests = [Frames::fps(60).between(-1.0, 20.0), Frames::at(explicit)];
     for device in devices() {
@@ -128,7 +128,7 @@ fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
 
 #[test]
 fn parts_are_those_of_the_whole() {
-    let set = hostile_set(5, 24);
+    let set = hostile_set(24, 5);
     let each: Vec<f64> = (0..5 * 90)
         .map(|i| 0.04 * f64::from((i * 37) % 450))
         .collect();
@@ -189,7 +189,7 @@ fn parts_are_those_of_the_whole() {
 
 #[test]
 fn parts_that_a_result_has_not_are_refused() {
-    let set = hostile_set(3, 4);
+    let set = hostile_set(4, 3);
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(&set, method::SLERP).unwrap();
     let frames = Frames::at(vec![0.0; 8]);
