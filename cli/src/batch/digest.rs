@@ -6,6 +6,8 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
+use crate::arguments::input;
+
 /// A hash that grows with the bytes.
 #[derive(Default)]
 pub(crate) struct Digest {
@@ -29,6 +31,13 @@ impl Digest {
         let hash = self.state.finalize();
         hash.iter().map(|byte| format!("{byte:02x}")).collect()
     }
+}
+
+/// The hash of an input, where it can be read twice: not of standard input, nor of a pipe. What
+/// cannot be read is told about when it is opened.
+pub(crate) fn of_input(path: &Path) -> Option<String> {
+    let is_file = !input::is_standard(path) && path.is_file();
+    is_file.then(|| of_file(path).ok()).flatten()
 }
 
 /// Of a whole file.

@@ -112,12 +112,7 @@ impl Batch<'_> {
         hand_over: &SyncSender<Input>,
     ) {
         for (path, target) in jobs {
-            // What cannot be read is told about when it is opened.
-            let sha256 = if input::is_standard(path) {
-                None
-            } else {
-                digest::of_file(path).ok()
-            };
+            let sha256 = digest::of_input(path);
             let is_done = |hash: &String| previous.is_done(target.name(), hash, &self.options);
             let done = self.resume && sha256.as_ref().is_some_and(is_done);
             let input = (!done).then(|| Read {

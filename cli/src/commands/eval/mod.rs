@@ -213,16 +213,13 @@ impl Job<'_> {
         self.rotations(name, clip, target)
     }
 
-    /// What made a result, for formats that have room for it. A stream's hash is not known.
+    /// What made a result, for formats that have room for it.
     fn notes(&self, name: &str) -> Vec<(&'static str, String)> {
         let mut notes = vec![
             ("method", self.arguments.method.to_string()),
             ("input", name.to_owned()),
         ];
-        if !input::is_standard(self.path) {
-            let hash = digest::of_file(self.path).ok();
-            notes.extend(hash.map(|hash| ("input_sha256", hash)));
-        }
+        notes.extend(digest::of_input(self.path).map(|hash| ("input_sha256", hash)));
         notes
     }
 
