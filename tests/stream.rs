@@ -33,7 +33,7 @@ impl Collected {
 
 #[test]
 fn chunks_are_the_whole_in_order() {
-    let set = hostile_set(24, 5);
+    let set = hostile_set(5, 24);
     let explicit = (0..700).map(|i| 0.01 * f64::from((i * 37) % 700)).collect();
     let requests = [Frames::fps(60).between(-1.0, 20.0), Frames::at(explicit)];
     for device in devices() {
