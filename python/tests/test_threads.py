@@ -103,6 +103,9 @@ def test_ctrl_c_ends_a_long_evaluation():
     command = [sys.executable, "-c", textwrap.dedent(script)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
+        # A child that does not hear the signal ends, and the test fails instead of waiting.
+        late = threading.Timer(90, child.kill)
+        late.start()
         assert child.stdout.readline() == "ready\n"
         time.sleep(0.5)
         sent = time.perf_counter()
@@ -111,6 +114,7 @@ def test_ctrl_c_ends_a_long_evaluation():
         waited = time.perf_counter() - sent
         assert child.stdout.readline() == "(200, 4)\n", "the clip can be used again"
         assert child.wait(timeout=60) == 0
+        late.cancel()
     assert waited < 20, f"{waited:.1f} s after Ctrl-C"
 
 
