@@ -87,7 +87,9 @@ def test_one_output_is_not_written_by_two(long, rng):
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
 def test_ctrl_c_ends_a_long_evaluation():
     script = """
-        import sys, numpy as np, tumble
+        import signal, sys, numpy as np, tumble
+        # Shells start what runs in the background with the signal ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         times = np.arange(2000.0)
         keys = np.random.default_rng(1).normal(size=(200, 2000, 4))
         keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
