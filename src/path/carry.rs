@@ -9,11 +9,13 @@ use std::sync::LazyLock;
 
 use glam::{DQuat, DVec3};
 
+use crate::fit::double::fit::MOST;
 use crate::math::quaternion::sine_cosine;
+use crate::path::lanes::{Carried, Integrand, Row, Ways};
 use crate::path::route::{Route, Stretch};
 
 /// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
-const NODES: usize = 11;
+pub(crate) const NODES: usize = 11;
 
 /// The largest sum of its last two Chebyshev coefficients: the integral errs by a tenth of that.
 const TOLERANCE: f64 = 3e-10;
@@ -21,23 +23,38 @@ const TOLERANCE: f64 = 3e-10;
 /// No piece is shorter.
 const SHORTEST: f64 = 1e-12;
 
-/// cos(j π (k + ½) / 11) for node k and degree j.
-static COSINES: LazyLock<[[f64; NODES]; NODES]> = LazyLock::new(|| {
+/// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
+/// k and degree j, 0 beyond the last degree.
+struct Chebyshev {
+    nodes: [f64; NODES],
+    cosines: [Row; NODES],
+}
+
+static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     let cosine =
         |j: usize, k: usize| sine_cosine(PI * j as f64 * (k as f64 + 0.5) / NODES as f64).1;
-    std::array::from_fn(|j| std::array::from_fn(|k| cosine(j, k)))
+    let own = |j, k| if j < NODES { cosine(j, k) } else { 0.0 };
+    Chebyshev {
+        nodes: std::array::from_fn(|k| cosine(1, k)),
+        cosines: std::array::from_fn(|k| std::array::from_fn(|j| own(j, k))),
+    }
 });
+
+/// The lanes of a piece's middle and ends, behind those of the nodes.
+const MIDDLE: usize = NODES;
+const FROM: usize = NODES + 1;
+const TO: usize = NODES + 2;
 
 /// A piece of a stretch.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    from: f64,
-    to: f64,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
     /// The direction and the rotation at the middle.
-    middle: DVec3,
-    base: DQuat,
+    pub(crate) middle: DVec3,
+    pub(crate) base: DQuat,
     /// Chebyshev coefficients of ψ.
-    roll: [f64; NODES + 1],
+    pub(crate) roll: [f64; NODES + 1],
 }
 
 /// Carries a rotation along a stretch: its pieces, and the rotation at the end.
@@ -46,45 +63,78 @@ pub(crate) fn carry(route: &Route, stretch: &Stretch, start: DQuat) -> (Vec<Piec
     let mut waiting = vec![(stretch.from, stretch.to)];
     let mut rotation = start;
     while let Some((from, to)) = waiting.pop() {
-        let (mut piece, fits) = Piece::new(route, stretch, from, to);
+        let (mut piece, fits, [first, last]) = Piece::new(route, stretch, from, to);
         let middle = 0.5 * (from + to);
         if !fits && to - from > SHORTEST && from < middle && middle < to {
             waiting.extend([(middle, to), (from, middle)]);
             continue;
         }
-        let first = stretch.way(route, from)[0];
         let unrolled = least_turn(piece.middle, first).conjugate() * rotation;
         piece.base = unrolled * about_z(-piece.roll(-1.0));
-        rotation = piece.rotation(stretch.way(route, to)[0], to);
+        rotation = piece.rotation(last, to);
         pieces.push(piece);
     }
     (pieces, rotation)
 }
 
-/// The rotation at a place of a stretch with these pieces.
-pub(crate) fn rotation(route: &Route, stretch: &Stretch, pieces: &[Piece], t: f64) -> DQuat {
-    let after = pieces.partition_point(|piece| piece.from <= t);
-    let piece = &pieces[after.max(1) - 1];
-    piece.rotation(stretch.way(route, t)[0], t)
+/// The rotations of a body at places of a stretch with these pieces, to which rolls are added.
+pub(crate) fn rotations(
+    route: &Route,
+    stretch: &Stretch,
+    pieces: &[Piece],
+    places: &Row,
+    rolls: &Row,
+    body: DQuat,
+) -> [Row; 4] {
+    let of = |t: f64| pieces.partition_point(|piece| piece.from <= t).max(1) - 1;
+    let ways = Ways::new(route, stretch, places);
+    let own = places.map(of);
+    let carried = |piece: usize| Carried {
+        piece: &pieces[piece],
+        ways: &ways,
+        places,
+        rolls,
+        body: body.to_array(),
+        rotations: [[0.0; MOST]; 4],
+    };
+    let mut found = carried(own[0]).find();
+    // Where places lie on several pieces, each piece gives the rotations of its own.
+    let [first, last] = [own.iter().min(), own.iter().max()].map(|piece| *piece.unwrap_or(&0));
+    for piece in (first..=last).filter(|piece| *piece != own[0] && own.contains(piece)) {
+        let other = carried(piece).find();
+        for lane in (0..MOST).filter(|&lane| own[lane] == piece) {
+            for (found, other) in found.iter_mut().zip(&other) {
+                found[lane] = other[lane];
+            }
+        }
+    }
+    found
 }
 
 impl Piece {
-    /// A piece without its rotation, and whether its roll is exact.
-    fn new(route: &Route, stretch: &Stretch, from: f64, to: f64) -> (Self, bool) {
+    /// A piece without its rotation, whether its roll is exact, and the directions at its ends.
+    fn new(route: &Route, stretch: &Stretch, from: f64, to: f64) -> (Self, bool, [DVec3; 2]) {
         let (center, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let middle = stretch.way(route, center)[0];
-        let mut least = 1.0f64;
-        let values: [f64; NODES] = std::array::from_fn(|k| {
-            let [way, change] = stretch.way(route, center + half * COSINES[1][k]);
-            let cosine = middle.dot(way);
-            least = least.min(cosine);
-            half * middle.cross(way).dot(change) / (1.0 + cosine).max(1e-9)
-        });
-        let coefficient = |j: usize| {
-            let sum: f64 = (0..NODES).map(|k| values[k] * COSINES[j][k]).sum();
-            sum * 2.0 / NODES as f64
+        let mut places = [center; MOST];
+        for (place, node) in places.iter_mut().zip(&CHEBYSHEV.nodes) {
+            *place = center + half * node;
+        }
+        (places[FROM], places[TO]) = (from, to);
+        let ways = Ways::new(route, stretch, &places);
+        let [middle, first, last] = [MIDDLE, FROM, TO].map(|lane| DVec3::from(ways.at(lane)));
+        let mut integrand = Integrand {
+            ways: &ways,
+            middle: middle.to_array(),
+            half,
+            cosines: &CHEBYSHEV.cosines,
+            angles: [0.0; MOST],
+            coefficients: [0.0; MOST],
         };
-        let own: [f64; NODES] = std::array::from_fn(coefficient);
+        integrand.find();
+        let least = integrand.angles[..NODES]
+            .iter()
+            .fold(1.0f64, |a, &b| a.min(b));
+        let own = &integrand.coefficients[..NODES];
         // The integral of T_j is (T_{j+1}/(j+1) - T_{j-1}/(j-1))/2.
         let mut roll: [f64; NODES + 1] = std::array::from_fn(|j| {
             let next = own.get(j + 1).copied().unwrap_or(0.0);
@@ -108,7 +158,8 @@ impl Piece {
             base: DQuat::IDENTITY,
             roll,
         };
-        (piece, least > 0.5 && rest <= TOLERANCE)
+        let fits = least > 0.5 && rest <= TOLERANCE;
+        (piece, fits, [first, last])
     }
 
     /// ψ at x, from -1 to 1, by Clenshaw's recurrence.

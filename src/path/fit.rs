@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 use crate::fit::double::fit::{MOST, Samples, TOLERANCE, interpolate};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::canonical::{canonical, round_quat};
+use crate::path::lanes::Row;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -14,6 +15,11 @@ use crate::time::spans::{NONE, Source};
 
 /// Pairs of nodes.
 const PAIRS: usize = 5;
+
+/// The places of a span's samples: its nodes, pair by pair, then its middle and its ends.
+const MIDDLE: usize = 2 * PAIRS;
+const START: usize = MIDDLE + 1;
+const END: usize = MIDDLE + 2;
 
 /// How often a span is cut in two: what then does not fit is shorter than the resolution of time,
 /// and its middle stands for it.
@@ -46,14 +52,16 @@ pub(crate) struct Span {
     pub(crate) to: f64,
 }
 
-/// Fits spans of a path, given in order, and adds them to what is prepared. `sample` gives the value
-/// on a stretch at a time.
-pub(crate) fn fit(
-    prepared: &mut Prepared,
-    spans: &[Span],
-    kind: Kind,
-    sample: &dyn Fn(usize, f64) -> [f64; 4],
-) {
+/// Gives the values on a stretch at some times: a row for each component.
+pub(crate) type Sample<'a> = dyn Fn(usize, &Row) -> [Row; 4] + 'a;
+
+/// The value on a stretch at one time.
+pub(crate) fn one(sample: &Sample<'_>, stretch: usize, time: f64) -> [f64; 4] {
+    sample(stretch, &[time; MOST]).map(|row| row[0])
+}
+
+/// Fits spans of a path, given in order, and adds them to what is prepared.
+pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], kind: Kind, sample: &Sample<'_>) {
     let whole = spans.iter().enumerate().rev();
     let mut waiting: Vec<(Span, u32, usize)> = whole.map(|(i, &span)| (span, 0, i)).collect();
     let mut pieces = vec![1u32; spans.len()];
@@ -92,15 +100,13 @@ pub(crate) fn fit(
                 && ends_fit(
                     kind,
                     segment,
-                    span,
-                    f64::from(units[lane]),
-                    LARGEST + known,
-                    sample,
+                    samples.ends[lane],
+                    (LARGEST + known) * f64::from(units[lane]),
                 )
             {
                 done.push((span.from, Source::Segment(places[lane] as u32)));
             } else if is_finest {
-                let value = round_quat(sample(span.stretch, middle));
+                let value = round_quat(one(sample, span.stretch, middle));
                 *segment = PolynomialSegment::zeroed();
                 prepared.constants.push(value);
                 done.push((
@@ -141,13 +147,15 @@ struct Fitted<'a> {
 struct Lane {
     numbers: Samples<[f32; MOST], PAIRS>,
     is_smooth: [bool; MOST],
+    /// The values at the start and the end of each span.
+    ends: [[[f64; 4]; 2]; MOST],
 }
 
 impl<'a> Fitted<'a> {
     fn new(
         kind: Kind,
         block: &[(Span, u32, usize)],
-        sample: &dyn Fn(usize, f64) -> [f64; 4],
+        sample: &Sample<'_>,
         segments: &'a mut Vec<PolynomialSegment>,
     ) -> Self {
         let first = segments.len();
@@ -157,6 +165,7 @@ impl<'a> Fitted<'a> {
             samples: Lane {
                 numbers: Samples::all([0.0; MOST]),
                 is_smooth: [true; MOST],
+                ends: [[[0.0; 4]; 2]; MOST],
             },
             units: [1.0; MOST],
             places: std::array::from_fn(|lane| first + lane.min(block.len())),
@@ -170,16 +179,22 @@ impl<'a> Fitted<'a> {
     }
 
     /// Samples a span in a unit near its largest value, a power of two.
-    fn sample(
-        &mut self,
-        kind: Kind,
-        lane: usize,
-        span: Span,
-        sample: &dyn Fn(usize, f64) -> [f64; 4],
-    ) {
+    fn sample(&mut self, kind: Kind, lane: usize, span: Span, sample: &Sample<'_>) {
         let (from, width) = (span.from, span.to - span.from);
-        let at = |s: f64| sample(span.stretch, from + width * (0.5 + s));
-        let between = at(0.0);
+        let mut times = [span.to; MOST];
+        times[START] = span.from;
+        times[MIDDLE] = from + width * 0.5;
+        for (k, node) in FULL_NODES.at.iter().enumerate() {
+            for (side, s) in [-f64::from(*node), f64::from(*node)]
+                .into_iter()
+                .enumerate()
+            {
+                times[2 * k + side] = from + width * (0.5 + s);
+            }
+        }
+        let rows = sample(span.stretch, &times);
+        let value = |place: usize| rows.map(|row| row[place]);
+        let between = value(MIDDLE);
         let mut is_smooth = true;
         let mut near = |value: [f64; 4]| {
             if kind == Kind::Vector {
@@ -193,9 +208,8 @@ impl<'a> Fitted<'a> {
                 value
             }
         };
-        let pairs = FULL_NODES
-            .at
-            .map(|node| [-f64::from(node), f64::from(node)].map(|s| near(at(s))));
+        let pairs: [[[f64; 4]; 2]; PAIRS] =
+            std::array::from_fn(|k| [2 * k, 2 * k + 1].map(|place| near(value(place))));
         let unit = match kind {
             Kind::Rotation => 1.0,
             Kind::Vector => {
@@ -208,17 +222,20 @@ impl<'a> Fitted<'a> {
                 }
             }
         };
+        // The unit is a power of two: its inverse is exact.
+        let scale = 1.0 / unit;
         let Samples { middle, even, odd } = &mut self.samples.numbers;
         for c in 0..4 {
-            middle[c][lane] = (between[c] / unit) as f32;
+            middle[c][lane] = (between[c] * scale) as f32;
             for (k, [before, after]) in pairs.iter().enumerate() {
-                let rise = (after[c] - between[c]) / unit;
-                let fall = (before[c] - between[c]) / unit;
+                let rise = (after[c] - between[c]) * scale;
+                let fall = (before[c] - between[c]) * scale;
                 even[k][c][lane] = (rise + fall) as f32;
                 odd[k][c][lane] = (rise - fall) as f32;
             }
         }
         self.samples.is_smooth[lane] = is_smooth;
+        self.samples.ends[lane] = [START, END].map(value);
         self.units[lane] = unit as f32;
     }
 }
@@ -239,35 +256,25 @@ impl InLanes for Fitted<'_> {
     }
 }
 
-/// Whether a polynomial is near the curve at both ends of its span.
-fn ends_fit(
-    kind: Kind,
-    segment: &PolynomialSegment,
-    span: Span,
-    unit: f64,
-    largest: f64,
-    sample: &dyn Fn(usize, f64) -> [f64; 4],
-) -> bool {
-    [(-0.5, span.from), (0.5, span.to)]
-        .into_iter()
-        .all(|(s, time)| {
-            let found: [f64; 4] = std::array::from_fn(|c| {
-                let powers = segment.coefficients.iter().rev();
-                powers.fold(0.0, |sum, power| sum * s + f64::from(power[c]))
-            });
-            let expected = sample(span.stretch, time);
-            let off = |sign: f64| {
-                let each = found
-                    .iter()
-                    .zip(expected)
-                    .map(|(a, b)| (a - sign * b).abs());
-                each.fold(0.0f64, f64::max)
-            };
-            let least = if kind == Kind::Rotation {
-                off(1.0).min(off(-1.0))
-            } else {
-                off(1.0)
-            };
-            least <= largest * unit && found.iter().all(|c| c.is_finite())
-        })
+/// Whether a polynomial is near the curve's values at both ends of its span.
+fn ends_fit(kind: Kind, segment: &PolynomialSegment, ends: [[f64; 4]; 2], largest: f64) -> bool {
+    [-0.5, 0.5].into_iter().zip(ends).all(|(s, expected)| {
+        let found: [f64; 4] = std::array::from_fn(|c| {
+            let powers = segment.coefficients.iter().rev();
+            powers.fold(0.0, |sum, power| sum * s + f64::from(power[c]))
+        });
+        let off = |sign: f64| {
+            let each = found
+                .iter()
+                .zip(expected)
+                .map(|(a, b)| (a - sign * b).abs());
+            each.fold(0.0f64, f64::max)
+        };
+        let least = if kind == Kind::Rotation {
+            off(1.0).min(off(-1.0))
+        } else {
+            off(1.0)
+        };
+        least <= largest && found.iter().all(|c| c.is_finite())
+    })
 }

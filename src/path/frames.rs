@@ -2,7 +2,9 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::path::carry::{Piece, about_z, around_corner, carry, least_turn, rotation};
+use crate::fit::double::fit::MOST;
+use crate::path::carry::{Piece, about_z, around_corner, carry, least_turn, rotations};
+use crate::path::lanes::Row;
 use crate::path::options::{Follow, FollowWarning, Frame, Twist};
 use crate::path::polynomial::Polynomial;
 use crate::path::rolls::{Rolls, is_half_turn, unwrapped, wrapped};
@@ -69,41 +71,38 @@ impl Frames {
         own
     }
 
-    /// The rotation on a stretch.
-    pub(crate) fn rotation(&self, stretch: usize, t: f64) -> DQuat {
-        self.unturned(stretch, t) * self.body
-    }
-
-    /// The rotation from z forward, y up.
-    fn unturned(&self, stretch: usize, t: f64) -> DQuat {
+    /// The rotations at places of a stretch, `x y z w`.
+    pub(crate) fn rotations(&self, stretch: usize, places: &Row) -> [Row; 4] {
         let own = &self.stretches[stretch];
-        let way = own.way(&self.route, t)[0];
-        match &self.turns[stretch] {
+        let side: &dyn Fn(DVec3, f64) -> DVec3 = match &self.turns[stretch] {
             Turn::Carried(pieces, rolls) => {
-                let carried = rotation(&self.route, own, pieces, t);
                 let rolls = &self.rolls[*rolls];
-                let roll = match rolls.are_spread() {
-                    true => rolls.at(self.route.lengths.at(own.interval, t)),
-                    false => rolls.at(0.0),
+                let rolls = match rolls.are_spread() {
+                    true => places.map(|t| rolls.at(self.route.lengths.at(own.interval, t))),
+                    false => [rolls.at(0.0); MOST],
                 };
-                if roll == 0.0 {
-                    carried
-                } else {
-                    carried * about_z(roll)
-                }
+                return rotations(&self.route, own, pieces, places, &rolls, self.body);
             }
-            Turn::Fixed(x, kept) => {
+            Turn::Fixed(x, kept) => &move |way, t| {
                 let is_upright = self.up.cross(way).length() < UPRIGHT;
                 let near_start = t - own.from < own.to - t || x.is_none();
-                let side = match x {
+                match x {
                     _ if is_upright && near_start => *kept,
                     Some(x) => x.at(t),
                     None => self.up.cross(way),
-                };
-                of_axes(side, way)
+                }
+            },
+            Turn::Frenet(x) => &move |_, t| x.at(t),
+        };
+        let mut found = [[0.0; MOST]; 4];
+        for (lane, &t) in places.iter().enumerate() {
+            let way = own.way(&self.route, t)[0];
+            let rotation = of_axes(side(way, t), way) * self.body;
+            for (found, own) in found.iter_mut().zip(rotation.to_array()) {
+                found[lane] = own;
             }
-            Turn::Frenet(x) => of_axes(x.at(t), way),
         }
+        found
     }
 
     /// Makes the y axis as near to the upward direction as it can be.

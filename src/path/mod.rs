@@ -4,6 +4,7 @@
 pub(crate) mod carry;
 pub(crate) mod fit;
 pub(crate) mod frames;
+pub(crate) mod lanes;
 pub(crate) mod lengths;
 pub(crate) mod options;
 pub(crate) mod polynomial;

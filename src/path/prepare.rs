@@ -4,12 +4,14 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
+use crate::fit::double::fit::MOST;
 use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_curve::Curves;
-use crate::path::fit::{Kind, Span, fit};
+use crate::path::fit::{Kind, Sample, Span, fit, one};
 use crate::path::frames::Frames;
+use crate::path::lanes::Row;
 use crate::path::options::{
     Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
 };
@@ -210,38 +212,38 @@ fn add(
             break;
         }
     }
-    let place = |stretch: usize, time: f64| {
+    let places = |stretch: usize, times: &Row| {
         let own = &frames.stretches[stretch];
-        let t = match stands {
-            true => own.from,
-            false => route.schedule.parameter(&route.lengths, own.interval, time),
-        };
-        (own.interval, t.clamp(own.from, own.to))
+        times.map(|time| {
+            let t = match stands {
+                true => own.from,
+                false => route.schedule.parameter(&route.lengths, own.interval, time),
+            };
+            t.clamp(own.from, own.to)
+        })
     };
     if is_retimed {
-        let sample = |stretch: usize, time: f64| {
-            let (interval, t) = place(stretch, time);
-            let [x, y, z] = route.curves[interval].at(t).to_array();
-            [x, y, z, 0.0]
+        let sample = |stretch: usize, times: &Row| {
+            let curve = &route.curves[frames.stretches[stretch].interval];
+            let all = places(stretch, times).map(|t| curve.at(t));
+            [0, 1, 2, 3].map(|c| all.map(|own| if c < 3 { own[c] } else { 0.0 }))
         };
+        let ends = [(0, start), (frames.stretches.len() - 1, end)];
         let part = Ends::new(
             track,
             path,
-            sample(0, start),
-            sample(frames.stretches.len() - 1, end),
+            ends.map(|(stretch, time)| one(&sample, stretch, time)),
         );
         part.add(positions, &spans, Kind::Vector, &sample, follow.is_closed());
     }
-    let sample = |stretch: usize, time: f64| {
-        let (_, t) = place(stretch, time);
-        frames.rotation(stretch, t).to_array()
-    };
+    let sample = |stretch: usize, times: &Row| frames.rotations(stretch, &places(stretch, times));
     let last = if stands {
         0
     } else {
         frames.stretches.len() - 1
     };
-    let ends = Ends::new(track, path, sample(0, start), sample(last, end));
+    let ends = [(0, start), (last, end)].map(|(stretch, time)| one(&sample, stretch, time));
+    let ends = Ends::new(track, path, ends);
     let repeats =
         follow.is_closed() && (follow.frame != Frame::Minimal || follow.twist == Twist::Spread);
     ends.add(rotations, &spans, Kind::Rotation, &sample, repeats);
@@ -251,8 +253,9 @@ fn add(
 /// Adds the rotation of a body that never moves: it looks along +z.
 fn add_still(rotations: &mut Prepared, track: usize, path: &VectorTrack, follow: &Follow) {
     let value = follow.body().to_array();
-    let ends = Ends::new(track, path, value, value);
-    ends.add(rotations, &[], Kind::Rotation, &|_, _| value, true);
+    let ends = Ends::new(track, path, [value; 2]);
+    let sample = |_: usize, _: &Row| value.map(|c| [c; MOST]);
+    ends.add(rotations, &[], Kind::Rotation, &sample, true);
 }
 
 /// A track's first and last values, which are held outside its times.
@@ -263,11 +266,11 @@ struct Ends<'a> {
 }
 
 impl<'a> Ends<'a> {
-    fn new(track: usize, path: &'a VectorTrack, first: [f64; 4], last: [f64; 4]) -> Self {
+    fn new(track: usize, path: &'a VectorTrack, values: [[f64; 4]; 2]) -> Self {
         Self {
             track,
             path,
-            values: [first, last],
+            values,
         }
     }
 
@@ -277,7 +280,7 @@ impl<'a> Ends<'a> {
         prepared: &mut Prepared,
         spans: &[Span],
         kind: Kind,
-        sample: &dyn Fn(usize, f64) -> [f64; 4],
+        sample: &Sample<'_>,
         repeats: bool,
     ) {
         let [first, last] = self.values.map(round_quat);

@@ -196,10 +196,13 @@ impl Stretch {
 /// A body nearer to its centre of interest than this part of the path's size keeps its direction.
 const HELD: f64 = 1e-9;
 
+/// A vector as short as this has no direction.
+pub(crate) const NO_DIRECTION: f64 = 1e-300;
+
 /// A vector's direction and its derivative, from the vector's own.
 fn direction([vector, change]: Way) -> Way {
     let length = vector.length();
-    if length < 1e-300 {
+    if length <= NO_DIRECTION {
         return [DVec3::ZERO; 2];
     }
     let way = vector / length;

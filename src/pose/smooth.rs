@@ -1,19 +1,15 @@
 //! Smoothing of evaluated rotations and vectors, on the engine's device.
 
-use glam::Quat;
 use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
 use crate::output::buffer::OutputBuffer;
-use crate::output::rotations::{Rotations, Samples, Vectors};
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::shader::{Kernel, PoseDispatch};
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
-use crate::smooth::kernel::{Smoothing, SmoothingEnds};
-use crate::smooth::rows::{padded, set_ends, turned_far};
-use crate::twin::{pose_smooth, pose_steps};
+use crate::smooth::kernel::Smoothing;
+use crate::smooth::rows::{Block, Pass, Row};
 
 impl Engine {
     /// Smooths the rotations of every track over its samples, which are to be evenly spaced:
@@ -60,170 +56,186 @@ impl Engine {
         smoothing: &Smoothing,
         are_rotations: bool,
     ) -> Result<Samples<T>, Error> {
-        let (tracks, samples) = (values.tracks(), values.samples());
+        let (tracks, samples, layout) = (values.tracks(), values.samples(), values.layout());
         let weights = smoothing.step_weights(samples)?;
-        let mut rows: Vec<[f32; 4]> = vec![[0.0; 4]; tracks * samples];
-        for (place, row) in rows.iter_mut().enumerate() {
-            let (track, sample) = (place / samples.max(1), place % samples.max(1));
-            let from = values.layout().index(track, sample, tracks, samples);
-            *row = values.rows()[from];
-        }
-        let mut next = rows.clone();
         let passes = if samples > 1 { smoothing.passes } else { 0 };
-        for _ in 0..passes {
-            self.on_device(|device| {
-                let each = rows.par_chunks(samples).zip(next.par_chunks_mut(samples));
-                let pass = Pass {
-                    smoothing,
-                    weights: &weights,
-                    are_rotations,
-                };
-                match device {
-                    None => each.for_each(|(values, output)| pass.on_cpu(values, output)),
-                    Some(device) => {
-                        for (values, output) in rows.chunks(samples).zip(next.chunks_mut(samples)) {
-                            pass.on(device, values, output)?;
-                        }
-                    }
+        let pass = Pass {
+            smoothing,
+            weights: &weights,
+            are_rotations,
+        };
+        let count = values.rows().len();
+        let mut output = OutputBuffer::new(count);
+        let mut other = OutputBuffer::new(if passes > 1 { count } else { 0 });
+        if passes == 0 {
+            output.copy_from_slice(bytemuck::cast_slice(values.rows()));
+        }
+        for done in 0..passes {
+            let (from, to) = match (passes - done) % 2 {
+                1 => (&other, &mut output),
+                _ => (&output, &mut other),
+            };
+            let set = Set {
+                values: if done == 0 {
+                    values.rows()
+                } else {
+                    bytemuck::cast_slice(from)
+                },
+                tracks,
+                samples,
+                layout,
+            };
+            let to = bytemuck::cast_slice_mut(to);
+            self.on_device(|device| match device {
+                Some(device) if !weights.is_empty() => set.on(&pass, device, to),
+                _ => {
+                    set.on_cpu(&pass, to);
+                    Ok(())
                 }
-                Ok(())
             })?;
-            std::mem::swap(&mut rows, &mut next);
+            for track in 0..tracks {
+                pass.set_ends(set.row(track), |sample, value| {
+                    to[layout.index(track, sample, tracks, samples)] = value;
+                });
+            }
         }
-        let mut output = OutputBuffer::new(rows.len());
-        for (place, row) in rows.iter().enumerate() {
-            let (track, sample) = (place / samples.max(1), place % samples.max(1));
-            let to = values.layout().index(track, sample, tracks, samples);
-            output[to] = Quat::from_array(*row);
-        }
-        let layout = values.layout();
         Ok(Samples::new(Box::new(output), tracks, samples, layout))
     }
 }
 
-/// One pass over the samples of a track.
-struct Pass<'a> {
-    smoothing: &'a Smoothing,
-    weights: &'a [f32],
-    are_rotations: bool,
+/// Samples of each track that a thread smooths at once, for a kernel that is not wider: their steps
+/// stay in the caches.
+const BLOCK: usize = 1024;
+
+/// The values of a pass.
+struct Set<'a> {
+    values: &'a [[f32; 4]],
+    tracks: usize,
+    samples: usize,
+    layout: Layout,
 }
 
-impl Pass<'_> {
-    /// The steps of a row, with those beyond its ends.
-    fn padded(&self, steps: &[[f32; 4]]) -> Vec<[f32; 4]> {
-        let radius = self.weights.len();
-        let mut all = vec![[0.0; 4]; steps.len() + 2 * radius];
-        let is_loop = self.smoothing.ends == SmoothingEnds::Loop;
-        padded(steps, radius, is_loop, &mut all);
-        all
-    }
-
-    /// What the host does after either device.
-    fn finish(
-        &self,
-        values: &[[f32; 4]],
-        steps: &[[f32; 4]],
-        all: &[[f32; 4]],
-        output: &mut [[f32; 4]],
-    ) {
-        if self.are_rotations {
-            turned_far(values, all, self.weights, output);
+impl Set<'_> {
+    fn row(&self, track: usize) -> Row<'_> {
+        let at = |sample| self.layout.index(track, sample, self.tracks, self.samples);
+        Row {
+            values: self.values,
+            first: at(0),
+            stride: at(1) - at(0),
+            count: self.samples,
         }
-        set_ends(self.smoothing, values, steps, self.are_rotations, output);
     }
 
-    fn on_cpu(&self, values: &[[f32; 4]], output: &mut [[f32; 4]]) {
-        let mut steps = vec![[0.0; 4]; values.len() - 1];
-        in_lanes(&mut Steps(values, &mut steps, self.are_rotations));
-        let all = self.padded(&steps);
-        in_lanes(&mut Sums(self, values, &all, output));
-        self.finish(values, &steps, &all, output);
+    fn on_cpu(&self, pass: &Pass<'_>, output: &mut [[f32; 4]]) {
+        let length = BLOCK.max(4 * pass.weights.len());
+        let block = |steps: &mut _, output: &mut [[f32; 4]], track: usize, place, i: usize| {
+            let row = self.row(track);
+            Block {
+                pass: *pass,
+                row,
+                first: i * length,
+                steps,
+                count: output.len() / row.stride,
+                output,
+                place,
+            }
+            .smooth();
+        };
+        match self.layout {
+            Layout::TrackMajor => {
+                let rows = output.par_chunks_mut(self.samples).enumerate();
+                rows.for_each(|(track, row)| {
+                    let blocks = row.par_chunks_mut(length).enumerate();
+                    blocks.for_each_init(Default::default, |steps, (i, output)| {
+                        block(steps, output, track, 0, i);
+                    });
+                });
+            }
+            Layout::FrameMajor => {
+                let blocks = output.par_chunks_mut(length * self.tracks).enumerate();
+                blocks.for_each_init(Default::default, |steps, (i, output)| {
+                    for track in 0..self.tracks {
+                        block(steps, output, track, track, i);
+                    }
+                });
+            }
+        }
     }
 
+    /// The same on a device, as many tracks at once as one pass takes. Steps beyond the ends of rows
+    /// are copied there by the host.
     fn on(
         &self,
+        pass: &Pass<'_>,
         device: &VulkanEngine,
-        values: &[[f32; 4]],
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
-        let limit = device.pass_limit().max(2);
-        let are_rotations = u32::from(self.are_rotations);
+        let (limit, radius) = (device.pass_limit().max(2), pass.weights.len());
+        let detail = u32::from(pass.are_rotations);
         let dispatch = |count: usize, detail: u32| PoseDispatch {
             count: count as u32,
             detail,
         };
-        let mut steps = vec![[0.0; 4]; values.len() - 1];
-        for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
-            let inputs: [&[u8]; 1] = [bytemuck::cast_slice(&values[first..=first + output.len()])];
-            let pass = dispatch(output.len(), are_rotations);
-            device.pass(
-                Kernel::PosesSteps,
-                &inputs,
-                pass,
-                bytemuck::cast_slice_mut(output),
-            )?;
-        }
-        let all = self.padded(&steps);
-        let radius = self.weights.len();
-        let detail = 2 * radius as u32 + are_rotations;
-        let block = limit.saturating_sub(2 * radius).max(1);
-        for (first, output) in (0..).step_by(block).zip(output.chunks_mut(block)) {
-            let own = &all[first..first + output.len() + 2 * radius - 1];
-            let inputs: [&[u8]; 3] = [
-                bytemuck::cast_slice(&values[first..first + output.len()]),
-                bytemuck::cast_slice(own),
-                bytemuck::cast_slice(self.weights),
-            ];
-            let pass = dispatch(output.len(), detail);
-            device.pass(
-                Kernel::PosesSmooth,
-                &inputs,
-                pass,
-                bytemuck::cast_slice_mut(output),
-            )?;
-        }
-        self.finish(values, &steps, &all, output);
-        Ok(())
-    }
-}
-
-struct Steps<'a>(&'a [[f32; 4]], &'a mut [[f32; 4]], bool);
-
-impl InLanes for Steps<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let Self(values, steps, are_rotations) = self;
-        for (step, pair) in steps.iter_mut().zip(values.windows(2)) {
-            *step = pose_steps::pose(pair[0], pair[1], *are_rotations);
-        }
-    }
-}
-
-/// Samples whose sums are built together, so that each weight is applied to all of them in vectors.
-const BLOCK: usize = 64;
-
-struct Sums<'a>(
-    &'a Pass<'a>,
-    &'a [[f32; 4]],
-    &'a [[f32; 4]],
-    &'a mut [[f32; 4]],
-);
-
-impl InLanes for Sums<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let Self(pass, values, steps, output) = self;
-        for (block, output) in output.chunks_mut(BLOCK).enumerate() {
-            let first = block * BLOCK;
-            let mut sums = [[0.0f32; 4]; BLOCK];
-            for m in 0..pass.weights.len() {
-                for (i, sum) in sums[..output.len()].iter_mut().enumerate() {
-                    pose_smooth::add(sum, steps, pass.weights, first + i, m);
+        let stride = self.samples - 1 + 2 * radius;
+        let each = (limit / stride).max(1);
+        for first in (0..self.tracks).step_by(each) {
+            let rows: Vec<Row<'_>> = (first..self.tracks.min(first + each))
+                .map(|track| self.row(track))
+                .collect();
+            let samples = rows
+                .iter()
+                .flat_map(|row| (0..row.count).map(|i| row.get(i)));
+            let values: Vec<[f32; 4]> = samples.collect();
+            // A step from one row to the next is found too, and not used.
+            let mut steps = vec![[0.0; 4]; values.len() - 1];
+            for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
+                let values = &values[first..=first + output.len()];
+                device.pass(
+                    Kernel::PosesSteps,
+                    &[bytemuck::cast_slice(values)],
+                    dispatch(output.len(), detail),
+                    bytemuck::cast_slice_mut(output),
+                )?;
+            }
+            let mut padded = Vec::with_capacity(rows.len() * stride);
+            let mut spaced = Vec::with_capacity(rows.len() * stride);
+            for (values, first) in values.chunks(self.samples).zip((0..).step_by(self.samples)) {
+                let before = (0..stride).map(|place| place as isize - radius as isize);
+                padded.extend(before.map(|place| steps[first + pass.step_at(place, self.samples)]));
+                spaced.extend_from_slice(values);
+                spaced.resize(padded.len(), [0.0; 4]);
+            }
+            let mut found = vec![[0.0; 4]; spaced.len() - stride + self.samples];
+            let block = limit.saturating_sub(2 * radius).max(1);
+            for (first, output) in (0..).step_by(block).zip(found.chunks_mut(block)) {
+                let steps = &padded[first..first + output.len() + 2 * radius - 1];
+                let inputs: [&[u8]; 3] = [
+                    bytemuck::cast_slice(&spaced[first..first + output.len()]),
+                    bytemuck::cast_slice(steps),
+                    bytemuck::cast_slice(pass.weights),
+                ];
+                let pass = dispatch(output.len(), 2 * radius as u32 + detail);
+                device.pass(
+                    Kernel::PosesSmooth,
+                    &inputs,
+                    pass,
+                    bytemuck::cast_slice_mut(output),
+                )?;
+            }
+            for (row, start) in rows.iter().zip((0..).step_by(stride)) {
+                for sample in 0..self.samples {
+                    let mut value = found[start + sample];
+                    if pass.are_rotations && value == [0.0; 4] {
+                        let place = (start + sample + radius) as isize;
+                        value = pass.turned_far(row.get(sample), |step| {
+                            let [x, y, z, _] = padded[(place + step) as usize];
+                            [x, y, z]
+                        });
+                    }
+                    output[row.first + sample * row.stride] = value;
                 }
             }
-            for (i, (own, sum)) in output.iter_mut().zip(sums).enumerate() {
-                *own = pose_smooth::moved(values[first + i], sum, pass.are_rotations);
-            }
         }
+        Ok(())
     }
 }

@@ -186,15 +186,19 @@ impl Followed<'_> {
             Travel::Constant => x,
             Travel::Eased(a, b) => eased(a, b, x),
         };
-        let target = part * self.length();
-        let after = self.lengths.partition_point(|&length| length <= target);
+        self.place_of(part * self.length())
+    }
+
+    /// The interval and its parameter where a length is reached, by bisection.
+    fn place_of(&self, length: f64) -> (usize, f64) {
+        let after = self.lengths.partition_point(|&own| own <= length);
         let step = (after - 1).min(self.lengths.len() - 2);
         let i = step / STEPS;
         let from = (step % STEPS) as f64 / STEPS as f64;
         let (mut low, mut high) = (from, from + 1.0 / STEPS as f64);
         for _ in 0..60 {
             let middle = (low + high) / 2.0;
-            if self.length_at(i, middle) < target {
+            if self.length_at(i, middle) < length {
                 low = middle;
             } else {
                 high = middle;
@@ -237,20 +241,8 @@ impl Followed<'_> {
         } else {
             length
         };
-        let after = self.lengths.partition_point(|&own| own <= length);
-        let step = (after - 1).min(self.lengths.len() - 2);
-        let i = step / STEPS;
-        let from = (step % STEPS) as f64 / STEPS as f64;
-        let (mut low, mut high) = (from, from + 1.0 / STEPS as f64);
-        for _ in 0..60 {
-            let middle = (low + high) / 2.0;
-            if self.length_at(i, middle) < length {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let [place, velocity, _] = self.curves[i]((low + high) / 2.0);
+        let (i, t) = self.place_of(length);
+        let [place, velocity, _] = self.curves[i](t);
         let tangent = velocity.normalize();
         (place + tangent * (length - whole).max(0.0), tangent)
     }

@@ -1,100 +1,240 @@
-//! Rows of samples, a row a track, with the steps beyond their ends.
+//! Samples of one track, and the sums of the steps about each of them.
 
 use glam::DQuat;
 
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::{exp, product, unit};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
 use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingKernel};
-use crate::twin::pose_smooth::moved;
+use crate::twin::{pose_smooth, pose_steps};
 
-/// Writes the steps of a row with those beyond its ends: `radius` before them and `radius` after.
-/// `steps` are the steps within the row, one fewer than its samples.
-pub(crate) fn padded(steps: &[[f32; 4]], radius: usize, is_loop: bool, output: &mut [[f32; 4]]) {
-    let count = steps.len() as isize;
-    for (i, own) in output.iter_mut().enumerate() {
-        let place = i as isize - radius as isize;
-        *own = match count {
-            0 => [0.0; 4],
-            _ if is_loop => steps[place.rem_euclid(count) as usize],
-            _ => {
-                // Mirrored again and again: 0 1 2 2 1 0 0 1 2.
-                let there = place.rem_euclid(2 * count);
-                steps[there.min(2 * count - 1 - there) as usize]
-            }
-        };
+/// The samples of a track among those of others.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'a> {
+    /// All values; those of the track are every `stride`th from `first` on.
+    pub(crate) values: &'a [[f32; 4]],
+    pub(crate) first: usize,
+    pub(crate) stride: usize,
+    /// The number of samples.
+    pub(crate) count: usize,
+}
+
+impl Row<'_> {
+    #[inline(always)]
+    pub(crate) fn get(&self, sample: usize) -> [f32; 4] {
+        self.values[self.first + sample * self.stride]
     }
 }
 
-/// Sets the samples next to the ends of a row, where the cubic kernel has other weights.
-pub(crate) fn set_ends(
-    smoothing: &Smoothing,
-    values: &[[f32; 4]],
-    steps: &[[f32; 4]],
-    are_rotations: bool,
-    output: &mut [[f32; 4]],
-) {
-    let last = values.len().saturating_sub(1);
-    let is_cubic = smoothing.kernel == SmoothingKernel::Cubic && last >= 3;
-    if !is_cubic || smoothing.ends == SmoothingEnds::Loop {
-        return;
-    }
-    let mut set = |place: usize, own: [usize; 3], weights: [f32; 3]| {
-        let mut sum = [0.0; 4];
-        for (step, weight) in own.into_iter().zip(weights) {
-            for c in 0..4 {
-                sum[c] += steps[step][c] * weight;
-            }
+/// One pass over the samples of a track, of which there are at least two.
+#[derive(Clone, Copy)]
+pub(crate) struct Pass<'a> {
+    pub(crate) smoothing: &'a Smoothing,
+    /// The weights of steps.
+    pub(crate) weights: &'a [f32],
+    pub(crate) are_rotations: bool,
+}
+
+impl Pass<'_> {
+    /// The step within a row that stands at a place before its start, in it, or beyond its end.
+    #[inline(always)]
+    pub(crate) fn step_at(&self, place: isize, samples: usize) -> usize {
+        let count = samples as isize - 1;
+        if place >= 0 && place < count {
+            return place as usize;
         }
-        output[place] = match are_rotations {
-            true => turned(values[place], sum),
-            false => moved(values[place], sum, false),
-        };
-    };
-    let (first, end) = ([0, 1, 2], [last - 1, last - 2, last - 3]);
-    let sixth = 1.0 / 6.0;
-    set(1, first, [-sixth, 2.0 * sixth, -sixth]);
-    set(last - 1, end, [sixth, -2.0 * sixth, sixth]);
-    if smoothing.ends == SmoothingEnds::Parabolic {
-        set(0, first, [1.0, -2.0, 1.0]);
-        set(last, end, [-1.0, 2.0, -1.0]);
-    } else {
-        (output[0], output[last]) = (values[0], values[last]);
+        if self.smoothing.ends == SmoothingEnds::Loop {
+            return place.rem_euclid(count) as usize;
+        }
+        // Mirrored again and again: 0 1 2 2 1 0 0 1 2.
+        let there = place.rem_euclid(2 * count);
+        there.min(2 * count - 1 - there) as usize
     }
-}
 
-/// What a kernel left 0 because it turns too far for its polynomials, in f64.
-pub(crate) fn turned_far(
-    values: &[[f32; 4]],
-    steps: &[[f32; 4]],
-    weights: &[f32],
-    output: &mut [[f32; 4]],
-) {
-    let radius = weights.len();
-    for (place, own) in output
-        .iter_mut()
-        .enumerate()
-        .filter(|(_, own)| **own == [0.0; 4])
-    {
-        let mut sum = [0.0; 4];
-        for (m, weight) in weights.iter().enumerate() {
-            let (after, before) = (steps[place + radius + m], steps[place + radius - 1 - m]);
+    /// Sets the samples next to the ends of a row, where the cubic kernel has other weights.
+    pub(crate) fn set_ends(&self, row: Row<'_>, mut set: impl FnMut(usize, [f32; 4])) {
+        let last = row.count - 1;
+        let is_cubic = self.smoothing.kernel == SmoothingKernel::Cubic && last >= 3;
+        if !is_cubic || self.smoothing.ends == SmoothingEnds::Loop {
+            return;
+        }
+        let mut move_by = |sample: usize, steps: [usize; 3], weights: [f32; 3]| {
+            let mut sum = [0.0; 4];
+            for (step, weight) in steps.into_iter().zip(weights) {
+                let step = pose_steps::pose(row.get(step), row.get(step + 1), self.are_rotations);
+                for c in 0..4 {
+                    sum[c] += step[c] * weight;
+                }
+            }
+            let value = row.get(sample);
+            let moved = match (self.are_rotations, sum.map(f64::from)) {
+                (false, _) => pose_smooth::moved(value, sum, false),
+                (true, [0.0, 0.0, 0.0, _]) => value,
+                (true, [x, y, z, _]) => turned_by(value, [x, y, z]),
+            };
+            set(sample, moved);
+        };
+        let (first, end) = ([0, 1, 2], [last - 1, last - 2, last - 3]);
+        let sixth = 1.0 / 6.0;
+        move_by(1, first, [-sixth, 2.0 * sixth, -sixth]);
+        move_by(last - 1, end, [sixth, -2.0 * sixth, sixth]);
+        if self.smoothing.ends == SmoothingEnds::Parabolic {
+            move_by(0, first, [1.0, -2.0, 1.0]);
+            move_by(last, end, [-1.0, 2.0, -1.0]);
+        } else {
+            set(0, row.get(0));
+            set(last, row.get(last));
+        }
+    }
+
+    /// A rotation that turns too far for the kernels' polynomials, in f64. `step` gives the steps
+    /// about it by their places: 0 is the one after it, -1 the one before.
+    pub(crate) fn turned_far(&self, value: [f32; 4], step: impl Fn(isize) -> [f32; 3]) -> [f32; 4] {
+        let mut sum = [0.0; 3];
+        for (m, weight) in (0..).zip(self.weights) {
+            let (after, before) = (step(m), step(-1 - m));
             for c in 0..3 {
                 sum[c] += (f64::from(after[c]) - f64::from(before[c])) * f64::from(*weight);
             }
         }
-        *own = turned_by(values[place], [sum[0], sum[1], sum[2]]);
-    }
-}
-
-fn turned(value: [f32; 4], sum: [f32; 4]) -> [f32; 4] {
-    let [x, y, z, _] = sum.map(f64::from);
-    match [x, y, z] {
-        [0.0, 0.0, 0.0] => value,
-        half => turned_by(value, half),
+        turned_by(value, sum)
     }
 }
 
 fn turned_by(value: [f32; 4], half: [f64; 3]) -> [f32; 4] {
     let own = DQuat::from_array(product(unit(value), exp(half)));
     round_quat(own.normalize().to_array())
+}
+
+/// Samples that are worked on together, so that each number of them is in vectors.
+const LANES: usize = 64;
+
+type Components = [[f32; LANES]; 4];
+
+/// Smooths consecutive samples of a row on the CPU.
+pub(crate) struct Block<'a> {
+    pub(crate) pass: Pass<'a>,
+    pub(crate) row: Row<'a>,
+    /// The first of the samples.
+    pub(crate) first: usize,
+    /// The steps about the samples, from the first that reaches the first of them: a list for each
+    /// component, which is made once for many blocks.
+    pub(crate) steps: &'a mut [Vec<f32>; 4],
+    /// As [`Row`]: every `stride`th from the `place`th on is a smoothed sample.
+    pub(crate) output: &'a mut [[f32; 4]],
+    pub(crate) place: usize,
+    pub(crate) count: usize,
+}
+
+impl Block<'_> {
+    pub(crate) fn smooth(&mut self) {
+        in_lanes(self);
+    }
+
+    #[inline(always)]
+    fn find_steps(&mut self) {
+        let (row, radius) = (self.row, self.pass.weights.len());
+        let count = self.count + 2 * radius - 1;
+        let rounded = count.next_multiple_of(LANES);
+        for steps in self.steps.iter_mut() {
+            steps.resize(rounded, 0.0);
+        }
+        let before = self.first as isize - radius as isize;
+        for lane in (0..rounded).step_by(LANES) {
+            let mut pairs: [Components; 2] = [[[0.0; LANES]; 4]; 2];
+            let own = LANES.min(count - lane);
+            let place = before + lane as isize;
+            let is_inside = place >= 0 && place + (own as isize) < row.count as isize;
+            for i in 0..own {
+                let place = place + i as isize;
+                let step = match is_inside {
+                    true => place as usize,
+                    false => self.pass.step_at(place, row.count),
+                };
+                for (end, of_pair) in pairs.iter_mut().enumerate() {
+                    let value = row.get(step + end);
+                    for c in 0..4 {
+                        of_pair[c][i] = value[c];
+                    }
+                }
+            }
+            let [from, to] = &pairs;
+            let mut found: Components = [[0.0; LANES]; 4];
+            for i in 0..LANES {
+                let from = [from[0][i], from[1][i], from[2][i], from[3][i]];
+                let to = [to[0][i], to[1][i], to[2][i], to[3][i]];
+                let step = pose_steps::pose(from, to, self.pass.are_rotations);
+                for c in 0..4 {
+                    found[c][i] = step[c];
+                }
+            }
+            for (steps, found) in self.steps.iter_mut().zip(&found) {
+                steps[lane..lane + LANES].copy_from_slice(found);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn find_values(&mut self) {
+        let (row, radius, weights) = (self.row, self.pass.weights.len(), self.pass.weights);
+        for lane in (0..self.count).step_by(LANES) {
+            let own = LANES.min(self.count - lane);
+            let mut values: Components = [[0.0; LANES]; 4];
+            for i in 0..own {
+                let value = row.get(self.first + lane + i);
+                for c in 0..4 {
+                    values[c][i] = value[c];
+                }
+            }
+            let mut sums: Components = [[0.0; LANES]; 4];
+            for (sum, steps) in sums.iter_mut().zip(self.steps.iter()) {
+                for (m, weight) in weights.iter().enumerate() {
+                    let after = &steps[lane + radius + m..][..own];
+                    let before = &steps[lane + radius - 1 - m..][..own];
+                    if let (Some(after), Some(before)) =
+                        (after.first_chunk::<LANES>(), before.first_chunk::<LANES>())
+                    {
+                        for i in 0..LANES {
+                            sum[i] += (after[i] - before[i]) * weight;
+                        }
+                    } else {
+                        for (i, sum) in sum[..own].iter_mut().enumerate() {
+                            *sum += (after[i] - before[i]) * weight;
+                        }
+                    }
+                }
+            }
+            let mut moved: Components = [[0.0; LANES]; 4];
+            for i in 0..LANES {
+                let value = [values[0][i], values[1][i], values[2][i], values[3][i]];
+                let sum = [sums[0][i], sums[1][i], sums[2][i], sums[3][i]];
+                let value = pose_smooth::moved(value, sum, self.pass.are_rotations);
+                for c in 0..4 {
+                    moved[c][i] = value[c];
+                }
+            }
+            for i in 0..own {
+                let mut value = [moved[0][i], moved[1][i], moved[2][i], moved[3][i]];
+                if self.pass.are_rotations && value == [0.0; 4] {
+                    let place = (lane + i + radius) as isize;
+                    value = self
+                        .pass
+                        .turned_far(row.get(self.first + lane + i), |step| {
+                            let step = (place + step) as usize;
+                            [0, 1, 2].map(|c| self.steps[c][step])
+                        });
+                }
+                self.output[self.place + (lane + i) * row.stride] = value;
+            }
+        }
+    }
+}
+
+impl InLanes for Block<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        self.find_steps();
+        self.find_values();
+    }
 }

@@ -38,18 +38,7 @@ pub(crate) fn moved(own: [f32; 4], sum: [f32; 4], are_rotations: bool) -> [f32; 
     value.map(canonical)
 }
 
-/// Adds the part of the `m`th weight to the sum for the value at `place`.
-#[inline(always)]
-pub(crate) fn add(sum: &mut [f32; 4], steps: &[[f32; 4]], weights: &[f32], place: usize, m: usize) {
-    let (after, before) = (
-        steps[place + weights.len() + m],
-        steps[place + weights.len() - 1 - m],
-    );
-    for c in 0..4 {
-        sum[c] += (after[c] - before[c]) * weights[m];
-    }
-}
-
+/// The whole function of the shader: `steps` begin at the first that reaches the value at place 0.
 #[cfg(test)]
 pub(crate) fn pose(
     values: &[[f32; 4]],
@@ -59,8 +48,12 @@ pub(crate) fn pose(
     place: usize,
 ) -> [f32; 4] {
     let mut sum = [0.0; 4];
-    for m in 0..weights.len() {
-        add(&mut sum, steps, weights, place, m);
+    for (m, weight) in weights.iter().enumerate() {
+        let after = steps[place + weights.len() + m];
+        let before = steps[place + weights.len() - 1 - m];
+        for c in 0..4 {
+            sum[c] += (after[c] - before[c]) * weight;
+        }
     }
     moved(values[place], sum, are_rotations)
 }
