@@ -99,17 +99,6 @@ if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --workspace --all-targets --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
-# Instructions are counted in a program without checks for overflow. The tests' own features are
-# taken, so that all but files and program is compiled once. With debug assertions there would be
-# nothing to count, and no test; so the tests are counted too.
-as_release=()
-for package in tumble-formats tumble-cli; do
-    for setting in codegen-units=16 overflow-checks=false debug-assertions=false; do
-        as_release+=(--config "profile.dev.package.$package.$setting")
-    done
-done
-CARGO_INCREMENTAL=0 cargo test --workspace --test cost "${as_release[@]}" |
-    tee /dev/stderr | grep -q "^test result: ok. 2 passed"
 # Ten seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
 FUZZ_SECONDS=${FUZZ_SECONDS:-10} cargo test --workspace
 # The Python package.

@@ -216,14 +216,14 @@ impl InLanes for Carried<'_> {
             let [x, y, z] = cross3(middle, way);
             let mut turn = [x, y, z, one + dot3(middle, way)];
             let length = dot(turn, turn).root();
-            for c in 0..4 {
+            for (c, own) in turn.iter_mut().enumerate() {
                 let identity = if c == 3 { one } else { zero };
-                turn[c] = length.up_to(zero, identity, turn[c] / length);
+                *own = length.up_to(zero, identity, *own / length);
             }
             let carried = product(turn, about_z(base, own));
             let rotation = product(about_z(carried, added), body);
-            for c in 0..4 {
-                rotation[c].store(&mut self.rotations[c][lane..]);
+            for (own, row) in rotation.into_iter().zip(&mut self.rotations) {
+                own.store(&mut row[lane..]);
             }
         }
     }

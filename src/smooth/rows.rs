@@ -112,6 +112,18 @@ const LANES: usize = 64;
 
 type Components = [[f32; LANES]; 4];
 
+#[inline(always)]
+fn at(rows: &Components, lane: usize) -> [f32; 4] {
+    [rows[0][lane], rows[1][lane], rows[2][lane], rows[3][lane]]
+}
+
+#[inline(always)]
+fn put(rows: &mut Components, lane: usize, value: [f32; 4]) {
+    for (row, own) in rows.iter_mut().zip(value) {
+        row[lane] = own;
+    }
+}
+
 /// Smooths consecutive samples of a row on the CPU.
 pub(crate) struct Block<'a> {
     pub(crate) pass: Pass<'a>,
@@ -152,22 +164,15 @@ impl Block<'_> {
                     true => place as usize,
                     false => self.pass.step_at(place, row.count),
                 };
-                for (end, of_pair) in pairs.iter_mut().enumerate() {
-                    let value = row.get(step + end);
-                    for c in 0..4 {
-                        of_pair[c][i] = value[c];
-                    }
+                for (end, values) in pairs.iter_mut().enumerate() {
+                    put(values, i, row.get(step + end));
                 }
             }
             let [from, to] = &pairs;
             let mut found: Components = [[0.0; LANES]; 4];
             for i in 0..LANES {
-                let from = [from[0][i], from[1][i], from[2][i], from[3][i]];
-                let to = [to[0][i], to[1][i], to[2][i], to[3][i]];
-                let step = pose_steps::pose(from, to, self.pass.are_rotations);
-                for c in 0..4 {
-                    found[c][i] = step[c];
-                }
+                let step = pose_steps::pose(at(from, i), at(to, i), self.pass.are_rotations);
+                put(&mut found, i, step);
             }
             for (steps, found) in self.steps.iter_mut().zip(&found) {
                 steps[lane..lane + LANES].copy_from_slice(found);
@@ -182,10 +187,7 @@ impl Block<'_> {
             let own = LANES.min(self.count - lane);
             let mut values: Components = [[0.0; LANES]; 4];
             for i in 0..own {
-                let value = row.get(self.first + lane + i);
-                for c in 0..4 {
-                    values[c][i] = value[c];
-                }
+                put(&mut values, i, row.get(self.first + lane + i));
             }
             let mut sums: Components = [[0.0; LANES]; 4];
             for (sum, steps) in sums.iter_mut().zip(self.steps.iter()) {
@@ -207,15 +209,12 @@ impl Block<'_> {
             }
             let mut moved: Components = [[0.0; LANES]; 4];
             for i in 0..LANES {
-                let value = [values[0][i], values[1][i], values[2][i], values[3][i]];
-                let sum = [sums[0][i], sums[1][i], sums[2][i], sums[3][i]];
+                let (value, sum) = (at(&values, i), at(&sums, i));
                 let value = pose_smooth::moved(value, sum, self.pass.are_rotations);
-                for c in 0..4 {
-                    moved[c][i] = value[c];
-                }
+                put(&mut moved, i, value);
             }
             for i in 0..own {
-                let mut value = [moved[0][i], moved[1][i], moved[2][i], moved[3][i]];
+                let mut value = at(&moved, i);
                 if self.pass.are_rotations && value == [0.0; 4] {
                     let place = (lane + i + radius) as isize;
                     value = self
