@@ -127,11 +127,11 @@ impl Piece {
             middle: middle.to_array(),
             half,
             cosines: &CHEBYSHEV.cosines,
-            angles: [0.0; MOST],
+            to_middle: [0.0; MOST],
             coefficients: [0.0; MOST],
         };
         integrand.find();
-        let least = integrand.angles[..NODES]
+        let least = integrand.to_middle[..NODES]
             .iter()
             .fold(1.0f64, |a, &b| a.min(b));
         let own = &integrand.coefficients[..NODES];

@@ -56,7 +56,7 @@ pub(crate) struct Span {
 pub(crate) type Sample<'a> = dyn Fn(usize, &Row) -> [Row; 4] + 'a;
 
 /// The value on a stretch at one time.
-pub(crate) fn one(sample: &Sample<'_>, stretch: usize, time: f64) -> [f64; 4] {
+pub(crate) fn value_at(sample: &Sample<'_>, stretch: usize, time: f64) -> [f64; 4] {
     sample(stretch, &[time; MOST]).map(|row| row[0])
 }
 
@@ -106,7 +106,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], kind: Kind, sample: &
             {
                 done.push((span.from, Source::Segment(places[lane] as u32)));
             } else if is_finest {
-                let value = round_quat(one(sample, span.stretch, middle));
+                let value = round_quat(value_at(sample, span.stretch, middle));
                 *segment = PolynomialSegment::zeroed();
                 prepared.constants.push(value);
                 done.push((

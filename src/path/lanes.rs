@@ -106,7 +106,7 @@ pub(crate) struct Integrand<'a> {
     /// `cosines[k][j]` is the Chebyshev polynomial of degree j at node k, 0 beyond the last degree.
     pub(crate) cosines: &'a [Row; NODES],
     /// The cosines of the angles to the middle's direction.
-    pub(crate) angles: Row,
+    pub(crate) to_middle: Row,
     pub(crate) coefficients: Row,
 }
 
@@ -124,10 +124,10 @@ impl InLanes for Integrand<'_> {
         for lane in (0..MOST).step_by(L::COUNT) {
             let way = load::<L, 3>(&self.ways.ways, lane);
             let change = load::<L, 3>(&self.ways.changes, lane);
-            let angle = dot3(middle, way);
-            let rest = (L::Doubles::all(1.0) + angle).larger(L::Doubles::all(1e-9));
+            let cosine = dot3(middle, way);
+            let rest = (L::Doubles::all(1.0) + cosine).larger(L::Doubles::all(1e-9));
             let value = half * dot3(cross3(middle, way), change) / rest;
-            angle.store(&mut self.angles[lane..]);
+            cosine.store(&mut self.to_middle[lane..]);
             value.store(&mut values[lane..]);
         }
         for degree in (0..MOST).step_by(L::COUNT) {

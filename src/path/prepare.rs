@@ -9,7 +9,7 @@ use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_curve::Curves;
-use crate::path::fit::{Kind, Sample, Span, fit, one};
+use crate::path::fit::{Kind, Sample, Span, fit, value_at};
 use crate::path::frames::Frames;
 use crate::path::lanes::Row;
 use crate::path::options::{
@@ -214,12 +214,14 @@ fn add(
     }
     let places = |stretch: usize, times: &Row| {
         let own = &frames.stretches[stretch];
+        // Lanes that are left repeat the time before: finding a place by its length is dear.
+        let mut known = (f64::NAN, own.from);
         times.map(|time| {
-            let t = match stands {
-                true => own.from,
-                false => route.schedule.parameter(&route.lengths, own.interval, time),
-            };
-            t.clamp(own.from, own.to)
+            if !stands && time != known.0 {
+                let t = route.schedule.parameter(&route.lengths, own.interval, time);
+                known = (time, t.clamp(own.from, own.to));
+            }
+            known.1
         })
     };
     if is_retimed {
@@ -232,7 +234,7 @@ fn add(
         let part = Ends::new(
             track,
             path,
-            ends.map(|(stretch, time)| one(&sample, stretch, time)),
+            ends.map(|(stretch, time)| value_at(&sample, stretch, time)),
         );
         part.add(positions, &spans, Kind::Vector, &sample, follow.is_closed());
     }
@@ -242,7 +244,7 @@ fn add(
     } else {
         frames.stretches.len() - 1
     };
-    let ends = [(0, start), (last, end)].map(|(stretch, time)| one(&sample, stretch, time));
+    let ends = [(0, start), (last, end)].map(|(stretch, time)| value_at(&sample, stretch, time));
     let ends = Ends::new(track, path, ends);
     let repeats =
         follow.is_closed() && (follow.frame != Frame::Minimal || follow.twist == Twist::Spread);
