@@ -32,6 +32,11 @@ pub(crate) struct Results {
 }
 
 impl Results {
+    /// Whether existing files are replaced.
+    pub(crate) fn overwrites(&self) -> bool {
+        self.overwrite
+    }
+
     /// Where each input's result goes. Everything that can be refused is refused here, before any
     /// work.
     pub(crate) fn plan(&self, inputs: &Gathered) -> Result<Plan, Failure> {

@@ -94,11 +94,17 @@ impl Travel {
         let mut found = Vec::with_capacity(self.rotations.len());
         for sample in 0..samples {
             let from = sample.min(samples.saturating_sub(2));
-            let seconds = self.times.get(from + 1).map_or(1.0, |next| next - self.times[from]);
+            let seconds = self
+                .times
+                .get(from + 1)
+                .map_or(1.0, |next| next - self.times[from]);
             for track in 0..self.tracks {
                 let [before, after] = [from, from + 1].map(|own| {
                     let place = own * self.tracks + track;
-                    self.rotations.get(place).unwrap_or(&Quat::IDENTITY).as_dquat()
+                    self.rotations
+                        .get(place)
+                        .unwrap_or(&Quat::IDENTITY)
+                        .as_dquat()
                 });
                 let step = match samples {
                     0 | 1 => DVec3::ZERO,
@@ -187,7 +193,10 @@ pub(crate) fn is_travel(clip: &Motion) -> bool {
 impl Source {
     /// The paths of a file.
     pub(crate) fn of_paths(path: &Path, arguments: &PathArguments) -> Result<Self, Failure> {
-        Ok(Self::Paths(arguments.read(path)?, Box::new(arguments.clone())))
+        Ok(Self::Paths(
+            arguments.read(path)?,
+            Box::new(arguments.clone()),
+        ))
     }
 
     pub(crate) fn set(&self) -> &TrackSet {

@@ -52,7 +52,8 @@ impl Landscape {
             let radius = within(&mut random, 0.35, 0.75);
             let mut place = || within(&mut random, 0.9, SIZE - 0.9);
             let middle = DVec2::new(place(), place());
-            let clear = |&(other, own): &(DVec2, f64)| middle.distance(other) > radius + own + APART;
+            let clear =
+                |&(other, own): &(DVec2, f64)| middle.distance(other) > radius + own + APART;
             let ends = [DVec2::ZERO, DVec2::splat(SIZE)];
             if rocks.iter().all(clear) && ends.iter().all(|end| middle.distance(*end) > FREE) {
                 rocks.push((middle, radius));
@@ -185,7 +186,11 @@ mod tests {
                 (b - a).cross(c - a).y > 0.0
             };
             assert!(triangles.iter().all(up));
-            assert!(landscape.rocks.len() > 8, "{seed}: {}", landscape.rocks.len());
+            assert!(
+                landscape.rocks.len() > 8,
+                "{seed}: {}",
+                landscape.rocks.len()
+            );
             assert!(volume(&landscape.rocks()) > 0.0);
             for (place, (middle, radius)) in landscape.rocks.iter().enumerate() {
                 for (other, own) in &landscape.rocks[..place] {

@@ -7,6 +7,7 @@ mod path;
 pub(crate) mod report;
 pub(crate) mod source;
 pub(crate) mod sphere;
+mod subjects;
 
 use std::io::Write;
 use std::ops::Range;
@@ -25,13 +26,11 @@ use crate::batch::place::{self, Place};
 use crate::commands::plot::curves::Subject;
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::Source;
+use crate::commands::plot::subjects::{Subjects, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
-
-/// A picture with more panels than this cannot be read.
-const PANELS: usize = 64;
 
 /// Draw components, speeds, errors and spheres of rotations, or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
@@ -238,57 +237,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     outcome
 }
 
-/// What is drawn of one set, and how it is shared out where there are several pictures.
-struct Subjects {
-    boxes: Vec<usize>,
-    dimensions: Vec<usize>,
-    show: Show,
-    axis: Vec3,
-}
-
-impl Subjects {
-    fn of(&self, boxes: Vec<usize>) -> Subject {
-        match self.show {
-            Show::Components => Subject::Components(boxes),
-            Show::Speed => Subject::Speed(boxes),
-            Show::Error => Subject::Error(boxes),
-            Show::Sphere | Show::Path => Subject::Sphere(boxes, self.axis),
-        }
-    }
-
-    fn panels(&self, methods: usize) -> usize {
-        match (self.dimensions.len(), self.show) {
-            (0, Show::Components) if methods > 1 => 4 * self.boxes.len(),
-            (0, _) => self.boxes.len(),
-            (dimensions, _) => dimensions,
-        }
-    }
-
-    fn one(&self) -> Subject {
-        if self.dimensions.is_empty() {
-            self.of(self.boxes.clone())
-        } else {
-            Subject::Dimensions(self.dimensions.clone())
-        }
-    }
-
-    /// A picture for each dimension, or for each box; and what its file is called.
-    fn each(&self) -> Vec<(String, Subject)> {
-        let dimension = |&place: &usize| {
-            let name = format!("dimension-{}", place + 1);
-            (name, Subject::Dimensions(vec![place]))
-        };
-        let show = self.show.to_possible_value();
-        let show = show.as_ref().map_or("", |value| value.get_name());
-        let one = |&index: &usize| (format!("{show}-box-{}", index + 1), self.of(vec![index]));
-        if self.dimensions.is_empty() {
-            self.boxes.iter().map(one).collect()
-        } else {
-            self.dimensions.iter().map(dimension).collect()
-        }
-    }
-}
-
 impl Arguments {
     fn methods(&self) -> Vec<Method> {
         let methods = chosen(&self.methods);
@@ -420,18 +368,6 @@ fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Everything in one picture, if that can be read.
-fn together(subjects: &Subjects, methods: usize, name: &str) -> Result<Subject, Failure> {
-    let panels = subjects.panels(methods);
-    if panels > PANELS {
-        return Err(Failure::usage(format!(
-            "{name}: {panels} panels in one picture cannot be read, at most {PANELS}; choose \
-             some (--box, --dimension), or give a directory, for a picture each"
-        )));
-    }
-    Ok(subjects.one())
 }
 
 /// Draws figures into files.

@@ -64,10 +64,23 @@ pub(super) fn figure(
             opacity: 1.0,
             pieces: vec![points(travel, track, show, forward)],
         };
-        let curves: Vec<Curve> = travels.iter().zip(&colours).enumerate().map(curve).collect();
-        let all = || curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
+        let curves: Vec<Curve> = travels
+            .iter()
+            .zip(&colours)
+            .enumerate()
+            .map(curve)
+            .collect();
+        let all = || {
+            curves
+                .iter()
+                .flat_map(|curve| curve.pieces.iter().flatten())
+        };
         // A body that never rolls does so by its rounding alone, which is not to fill the panel.
-        let least = if matches!(show, Show::Roll) { [-1.0, 1.0] } else { [0.0, 0.0] };
+        let least = if matches!(show, Show::Roll) {
+            [-1.0, 1.0]
+        } else {
+            [0.0, 0.0]
+        };
         let range = range_of(all().map(|point| point.1).chain(least));
         let axis = |label: &str, range| Axis {
             label: label.to_owned(),
@@ -160,7 +173,10 @@ mod tests {
             (Show::Roll, 720.0, 0.1),
         ] {
             let (at, found) = last(show);
-            assert!((at - 1.999).abs() < 1e-9 && (found - value).abs() < bound, "{found}, {value}");
+            assert!(
+                (at - 1.999).abs() < 1e-9 && (found - value).abs() < bound,
+                "{found}, {value}"
+            );
         }
     }
 }

@@ -141,9 +141,8 @@ impl Shown {
         let frames = Frames::at(times.clone());
         let poses = source.sample(device, &self.name, Maker::Frame(frame), &frames)?;
         let (paths, mut set) = (source.set(), TrackSet::new());
-        let refused = |error: TrackError| {
-            Failure::new(ALL_INPUTS, format!("{}: {error}", self.name))
-        };
+        let refused =
+            |error: TrackError| Failure::new(ALL_INPUTS, format!("{}: {error}", self.name));
         for track in 0..paths.track_count() {
             let Some(path) = paths.vector_keys(Channel::Translation, track) else {
                 continue;
@@ -245,7 +244,8 @@ impl Shown {
             (Choice::In(_), None) => return Err(refused("frames are for paths")),
             (Choice::In(frame), Some(source)) => {
                 let found = source.sample(device, name, Maker::Frame(frame), &frames)?;
-                let result = StoredResult::new(choice, found.tracks, &found.rotations, &found.velocities());
+                let result =
+                    StoredResult::new(choice, found.tracks, &found.rotations, &found.velocities());
                 return result.at(&found.places).ok_or_else(|| refused(far));
             }
         };
