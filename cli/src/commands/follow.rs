@@ -33,7 +33,7 @@ use crate::messages::words;
     mut_arg("path_speed", |arg| arg.long("speed")),
     mut_arg("path_frames", |arg| {
         let arg = arg.value_name("FRAME").help("How it is turned about this direction");
-        arg.action(ArgAction::Set).value_delimiter(None)
+        arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })
 )]
 #[command(after_help = "\
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = arguments.sampling.samples()?;
     let plan = arguments.results.plan(&inputs)?;
     let mut device = arguments.device.open()?;
-    let read = |path: &Path| {
+    let read = |path: &Path| -> Result<Loaded, Failure> {
         let set = arguments.path.read(path)?;
         let clip = Motion {
             set,

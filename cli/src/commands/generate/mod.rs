@@ -2,7 +2,7 @@
 
 mod landscape;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble_formats::generate::{Generate, Steps};
@@ -89,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// Writes the hill and its rocks.
 fn land(arguments: &Arguments) -> Result<(), Failure> {
     let landscape = Landscape::new(arguments.seed);
-    let place = |path| Place::new(path, arguments.overwrite, &[]);
+    let place = |path: &Path| Place::new(path, arguments.overwrite, &[]);
     let rocks = arguments.rocks.as_deref().map(place).transpose()?;
     let hill = place(&arguments.out)?;
     hill.write(None, |out| landscape.write_hill(out))?;

@@ -35,7 +35,7 @@ pub(super) fn chain(
         })
         .map_err(|error| Failure::evaluating(name, &error))?;
     let (tracks, samples) = (poses.tracks(), poses.samples());
-    let all = || (0..samples).flat_map(|sample| (0..tracks).map(move |track| (track, sample)));
+    let all = || (0..samples).flat_map(move |sample| (0..tracks).map(move |track| (track, sample)));
     let mut actor = Actor {
         name: interpolation.method.name.to_owned(),
         tracks,

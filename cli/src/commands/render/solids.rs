@@ -118,9 +118,9 @@ impl Body {
         let colour = BOXES[track % BOXES.len()];
         SIDES.into_iter().flat_map(move |(side, normal)| {
             let [a, b, c, d] = side.map(|sign| at + turn * (own.centre + own.half * sign));
-            let colour = match normal {
-                Vec3::Y if own.is_marked => mixed(colour, [255; 3], 0.62),
-                Vec3::NEG_Y if own.is_marked => mixed(colour, [0; 3], 0.6),
+            let colour = match own.is_marked {
+                true if normal == Vec3::Y => mixed(colour, [255; 3], 0.62),
+                true if normal == Vec3::NEG_Y => mixed(colour, [0; 3], 0.6),
                 _ => colour,
             };
             let normal = Some(turn * normal);
