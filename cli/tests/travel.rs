@@ -108,12 +108,12 @@ fn a_path_its_axes_and_a_box_are_rendered() {
         run.words
     );
     let (found, width) = pixels(&place.path().join("a.png"));
-    let colourful = |columns: std::ops::Range<usize>| {
+    let coloured = |columns: std::ops::Range<usize>| {
         let rows = found.chunks(width).flat_map(|row| &row[columns.clone()]);
         rows.filter(|pixel| colourful(pixel)).count()
     };
     for columns in [0..200, 200..400] {
-        let count = colourful(columns);
+        let count = coloured(columns);
         assert!(count > 300, "{count} pixels of boxes and axes");
     }
     // Without axes and with a small body less is coloured, and the body moves.

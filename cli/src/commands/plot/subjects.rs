@@ -8,7 +8,7 @@ use crate::commands::plot::curves::Subject;
 use crate::messages::exit::Failure;
 
 /// A picture with more panels than this cannot be read.
-const PANELS: usize = 64;
+pub(super) const PANELS: usize = 64;
 
 /// What is drawn of one set, and how it is shared out where there are several pictures.
 pub(super) struct Subjects {

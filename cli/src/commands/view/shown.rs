@@ -152,8 +152,9 @@ impl Shown {
                 poses.rotations[sample * poses.tracks + track]
             };
             let turns: Vec<Quat> = path.times.iter().map(turn).collect();
-            set.push(&paths.track_name(track), path.times, &turns)
-                .and_then(|place| set.set_translations(place, path.times, path.keys, &[]))
+            let place = set.track_count();
+            set.push(&*paths.track_name(track), path.times, &turns)
+                .and_then(|()| set.set_translations(place, path.times, path.keys, &[]))
                 .map_err(refused)?;
         }
         self.clip.set = set;
