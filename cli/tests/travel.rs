@@ -91,9 +91,11 @@ fn the_readme_s_pipe_leads_a_box_over_the_hill() {
         let off = hill.nearest(at).distance(at);
         assert!(off < 0.01, "{at} is {off} off the hill");
         let clear = rocks.nearest(at).distance(at);
-        assert!(clear > 0.34, "{at} is {clear} from a rock");
+        // The route's clearance, less the rounding of its points. All of a box 0.6 long is nearer to its
+        // foot: the upper corners are √(0.3² + 0.18² + 0.24²) = 0.424 away.
+        assert!(clear > 0.45 - 1e-5, "{at} is {clear} from a rock");
         let up = Quat::from_slice(&pose[3..]) * Vec3::Y;
-        assert!(up.y > 0.6, "{up} at {at} is not upright");
+        assert!(up.y > 0.55, "{up} at {at} is not upright");
     }
 }
 
