@@ -13,6 +13,7 @@ mod peers;
 mod plot;
 mod render;
 mod route;
+mod travel;
 mod validation;
 mod view;
 mod view_controls;

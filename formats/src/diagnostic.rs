@@ -205,7 +205,7 @@ codes! {
     Parents = "E314", "parents that make no hierarchy", "Each track hangs on another one, or has the parent -1.";
     OneClip = "E315", "not one clip", "An NPZ file holds one clip.";
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
-    NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear` names arrays of numbers with an entry for each frame, which are not keys.";
+    NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, names arrays of numbers with an entry for each frame, which are not keys.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is cut or damaged, or written in a way that is not read here; the reason is given. Rows count from 0.";
     TableClaims = "E402", "more than the file can hold", "The file announces more rows or bytes than could be packed into its length; nothing was read.";
@@ -257,7 +257,7 @@ codes! {
     Scales = "W203", "scales are left out", "The format has rotations and translations only.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
-    LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME` interpolates them linearly.";
+    LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
 }
 

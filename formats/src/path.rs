@@ -1,6 +1,7 @@
 //! Paths that bodies follow: points in CSV with the header `[t,]x,y,z[,ux,uy,uz]`, or in NPY of shape
 //! (tracks, points, 3).
 
+use std::io::Read;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -46,6 +47,37 @@ pub fn open_paths(
     let file = source.name.clone();
     read_paths(&file, name, &source.into_bytes(options.limits.file)?, pace)
 }
+
+/// Whether a file looks like one of paths: text whose first line names the columns of points, or NPY of
+/// shape (tracks, points, 3). What cannot be read looks like none.
+#[must_use]
+pub fn looks_like_paths(path: &Path) -> bool {
+    let mut start = Vec::new();
+    if !path.is_file() {
+        return false; // a pipe would lose its first bytes
+    }
+    let read =
+        std::fs::File::open(path).and_then(|file| file.take(MOST_HEADER).read_to_end(&mut start));
+    if read.is_err() {
+        return false;
+    }
+    if start.starts_with(b"\x93NUMPY") {
+        let header = npyz::NpyFile::new(&start[..]);
+        return header.is_ok_and(|array| matches!(array.shape(), [_, _, 3]));
+    }
+    let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next();
+    let line = String::from_utf8_lossy(line.unwrap_or_default()).to_lowercase();
+    let names: Vec<&str> = line.trim_start_matches('\u{feff}').split(',').collect();
+    let names: Vec<&str> = names.iter().map(|name| name.trim()).collect();
+    let has_all = ["x", "y", "z"].iter().all(|name| names.contains(name));
+    has_all
+        && names
+            .iter()
+            .all(|name| NAMES.contains(name) || *name == "time")
+}
+
+/// More than the header of an array or the first line of a table needs.
+const MOST_HEADER: u64 = 4096;
 
 /// Reads the bytes of a file; `file` is what messages call it, `name` what the tracks are called.
 ///
@@ -347,6 +379,34 @@ mod tests {
             code("t,x,y,z\n0,0,0,0\n", Some(Pace::Rate(1.0))),
             Code::PathTimes
         );
+    }
+
+    #[test]
+    fn files_of_paths_are_told_from_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let looks = |name: &str, bytes: &[u8]| {
+            let file = folder.path().join(name);
+            std::fs::write(&file, bytes).unwrap();
+            looks_like_paths(&file)
+        };
+        assert!(looks("a.csv", b"t,x,y,z\n0,0,0,0\n"));
+        assert!(looks("b.csv", b"\xef\xbb\xbfTime, X, Y, Z, ux, uy, uz\r\n"));
+        assert!(looks("c.csv", b"x,y,z"));
+        assert!(!looks("d.csv", b"frame,time,box.x,box.y,box.z,box.w\n"));
+        assert!(!looks("e.csv", b"t,x,y,z,w\n"));
+        assert!(!looks("f.dat", b"# 4 3.0\n"));
+        assert!(!looks("g.glb", b"glTF\x02\0\0\0"));
+        assert!(!looks("h", b""));
+        let array = |shape: &str| {
+            let dictionary =
+                format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+            let header = format!("{dictionary:117}\n");
+            [&b"\x93NUMPY\x01\0\x76\0"[..], header.as_bytes()].concat()
+        };
+        assert!(looks("i.npy", &array("(2, 5, 3)")));
+        assert!(!looks("j.npy", &array("(2, 5, 4)")));
+        assert!(!looks_like_paths(folder.path()));
+        assert!(!looks_like_paths(&folder.path().join("none")));
     }
 
     #[test]

@@ -7,6 +7,14 @@ async function inflated(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+/** The triangles of a mesh: places of vertices, and three vertices each. */
+export async function mesh({ places, triangles }) {
+  return {
+    places: new Float32Array((await inflated(places)).buffer),
+    triangles: new Uint32Array((await inflated(triangles)).buffer),
+  };
+}
+
 const doubles = async (text) => new Float64Array((await inflated(text)).buffer);
 
 // Each sample is stored as its difference from the one before it, all low bytes before
@@ -34,6 +42,9 @@ export class Set {
     this.names = stored.names;
     this.isWorld = stored.isWorld;
     this.isSkeleton = stored.parents.length > 0;
+    // How bodies on paths are drawn, where tracks are these.
+    this.bodies = stored.bodies;
+    this.hasFrames = stored.hasFrames;
     this.methods = stored.results.map((result) => result.method);
     this.results = new Map();
   }

@@ -1,6 +1,6 @@
 // What is shown, and what people do to it.
 
-import { Set as Input, placeInWords, rotation } from "./data.js";
+import { Set as Input, mesh, placeInWords, rotation } from "./data.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./scene.js";
 import { colours, switchTheme } from "./theme.js";
@@ -86,9 +86,10 @@ function tell() {
   element("pairing-field").style.display = results.length < 2 ? "none" : "";
   element("arrangement").value = state.apart ? "apart" : "chain";
   element("arrangement-field").style.display = input.isSkeleton ? "none" : "";
-  element("box-label").textContent = input.isSkeleton ? "Joint" : "Box";
+  element("box-label").textContent = input.bodies ? "Body" : input.isSkeleton ? "Joint" : "Box";
+  element("method-label").textContent = input.hasFrames ? "Frame" : "Method";
   element("box-name").textContent = input.isSkeleton ? input.names[state.box] : "";
-  element("stage").ariaLabel = `The ${input.isSkeleton ? "bones" : "boxes"}. Drag, or use the arrow keys, to turn the view.`;
+  element("stage").ariaLabel = `The ${input.bodies ? "paths" : input.isSkeleton ? "bones" : "boxes"}. Drag, or use the arrow keys, to turn the view.`;
   element("speed").value = String(state.speed);
   element("loop").checked = state.loop;
   element("box").max = String(input.boxes);
@@ -102,7 +103,7 @@ function tell() {
     return entry;
   });
   element("legend").replaceChildren(...legend);
-  const square = input.isSkeleton && stage?.square;
+  const square = input.isSkeleton && stage?.floor?.visible && stage.square;
   element("floor").textContent = square ? `squares of ${Number(square.toPrecision(1))}` : "";
 }
 
@@ -272,7 +273,7 @@ const KEYS = [
   ["m", "m", "choose any other method", () => element("method").focus()],
   ["g", "g", "compare with another method: ghost, side by side, off", nextPairing],
   ["a", "a", "boxes as a chain, or apart", () => arrange(!state.apart)],
-  ["n p", ["n", "p"], "curves of the next box or joint, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
+  ["n p", ["n", "p"], "curves of the next box, joint or body, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
   ["- +", ["-", "+", "="], "slower, faster", (key) => faster(key === "-" ? -1 : 1)],
   ["l", "l", "loop", () => loop(!state.loop)],
   ["r", "r", "the whole view again", () => stage?.frame(side())],
@@ -368,6 +369,7 @@ async function start() {
     element("trouble").hidden = false;
     element("trouble").textContent = `Nothing can be drawn, this browser has no WebGL (${error.message}); the curves are below.`;
   }
+  stage?.stand(await Promise.all(stored.meshes.map(mesh)));
   dress();
   await load(true);
   let before = performance.now();
@@ -391,5 +393,6 @@ globalThis.tumble = {
   ends: (joint, group = 0) => stage.groups[group].ends(joint),
   frames: () => stage.drawn,
   pixelRatio: () => stage.ratio,
+  inView: () => stage.inView(),
   ready: start(),
 };

@@ -1,11 +1,12 @@
-// The view, drawn by three.js: boxes, or the bones of bones.js.
+// The view, drawn by three.js: boxes, the bones of bones.js, or the bodies of bodies.js.
 
 import {
-  Box3, BoxGeometry, Color, DirectionalLight, Euler, GridHelper, HemisphereLight, InstancedMesh,
-  MathUtils, Matrix4, MeshLambertMaterial, PerspectiveCamera, Quaternion, Raycaster, Scene,
-  Vector2, Vector3, WebGLRenderer,
+  Box3, BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Euler, GridHelper,
+  HemisphereLight, InstancedMesh, MathUtils, Matrix4, Mesh, MeshLambertMaterial, PerspectiveCamera, Quaternion,
+  Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Bodies } from "./bodies.js";
 import { Bones } from "./bones.js";
 
 // Frames slower than this are drawn with fewer pixels.
@@ -14,6 +15,11 @@ const COARSEST = 0.5;
 // Where the camera looks from at first: down and around the upright axis, radians.
 const DOWN = 0.3;
 const AROUND = 0.4;
+// With ground in it, more from above.
+const DOWN_ON_GROUND = 0.6;
+// The colours of the ground and of what stands on it.
+const GROUND = 0xa9c28f;
+const OBSTACLE = 0x9c9690;
 
 /** Where the boxes of one result stand at a sample. */
 class Boxes {
@@ -127,6 +133,7 @@ export class Stage {
     this.scene.add(this.sky, this.sun);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => (this.stale = true));
+    this.ground = [];
     this.drawn = 0;
     this.slow = 0;
     this.stale = true;
@@ -144,16 +151,30 @@ export class Stage {
     this.stale = true;
   }
 
-  /** New boxes or bones: of one result, or of two. */
+  /** The ground, and what stands on it: meshes of data.js. */
+  stand(meshes) {
+    this.ground = meshes.map(({ places, triangles }, i) => {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute("position", new BufferAttribute(places, 3));
+      geometry.setIndex(new BufferAttribute(triangles, 1));
+      const color = i === 0 ? GROUND : OBSTACLE;
+      return new Mesh(geometry, new MeshLambertMaterial({ color, flatShading: true, side: DoubleSide }));
+    });
+    if (this.ground.length > 0) this.scene.add(...this.ground);
+    this.stale = true;
+  }
+
+  /** New boxes, bones or bodies: of one result, or of two. */
   fill(input, results, colours, others) {
     for (const group of this.groups ?? []) {
       this.scene.remove(group.object);
       group.dispose();
     }
-    const group = (result, colours, ghost) =>
-      input.isSkeleton
-        ? new Bones(input, result, colours, ghost)
-        : new Boxes(input.boxes, input.length, colours, ghost);
+    const group = (result, colours, ghost) => {
+      if (input.bodies) return new Bodies(input, result, colours, ghost);
+      if (input.isSkeleton) return new Bones(input, result, colours, ghost);
+      return new Boxes(input.boxes, input.length, colours, ghost);
+    };
     this.groups = [group(results[0], colours, false)];
     if (others) this.groups.push(group(results[1], others.colours, others.ghost));
     this.scene.add(...this.groups.map((group) => group.object));
@@ -180,6 +201,12 @@ export class Stage {
     const [group] = this.groups;
     this.points = results.flatMap((result) => group.points(result, samples, apart));
     this.extent = new Box3().setFromPoints(this.points);
+    for (const mesh of this.ground) {
+      const { min, max } = new Box3().setFromObject(mesh);
+      const sides = [min, max];
+      for (let i = 0; i < 8; i++) this.points.push(new Vector3(sides[i & 1].x, sides[(i >> 1) & 1].y, sides[i >> 2].z));
+      this.extent.union(new Box3(min, max));
+    }
     this.room = this.extent.clone().expandByScalar(group.length * 0.2);
     const size = this.room.getSize(new Vector3());
     // Long skeletons side by side would hide each other: the camera looks past them at an angle.
@@ -199,7 +226,8 @@ export class Stage {
       this.floorPlace = new Vector3(centre.x, min.y - (max.y - min.y) * 0.02, centre.z);
     }
     this.layFloor();
-    const view = new Quaternion().setFromEuler(new Euler(-DOWN, AROUND, 0, "YXZ"));
+    const down = this.ground.length > 0 ? DOWN_ON_GROUND : DOWN;
+    const view = new Quaternion().setFromEuler(new Euler(-down, AROUND, 0, "YXZ"));
     const back = view.clone().invert();
     const upright = Math.tan(MathUtils.degToRad(this.camera.fov / 2)) * 0.92;
     const point = new Vector3();
@@ -244,6 +272,7 @@ export class Stage {
     const lines = this.hasSquares ? [this.lines[1], this.lines[1]] : this.lines;
     this.floor = new GridHelper(this.floorSize, this.floorSquares, ...lines);
     this.floor.position.copy(this.floorPlace);
+    this.floor.visible = this.ground.length === 0;
     this.scene.add(this.floor);
     this.stale = true;
   }
@@ -286,6 +315,12 @@ export class Stage {
     const [hit] = ray.intersectObjects(meshes);
     if (!hit) return -1;
     return hit.object.userData.joints?.[hit.instanceId] ?? hit.instanceId;
+  }
+
+  /** How many boxes, bones, curves and axes stand in the scene. */
+  inView() {
+    const count = (object) => (object.visible ? (object.count ?? 0) : 0);
+    return this.groups.map((group) => group.object.children.map(count));
   }
 
   /** Draws if anything has changed; where that takes long, with fewer pixels from then on. */

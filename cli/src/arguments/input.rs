@@ -94,9 +94,7 @@ impl Inputs {
     /// Reads a keyframe file; its warnings go to standard error.
     pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
         let loaded = self.load_quietly(path)?;
-        for warning in loaded.warnings.iter().chain(&loaded.refused) {
-            words::note(&warning.to_string());
-        }
+        tell_warnings(&loaded);
         Ok(loaded)
     }
 
@@ -141,6 +139,13 @@ impl Inputs {
         }
         self.reading.apply(&mut loaded, path)?;
         Ok(loaded)
+    }
+}
+
+/// Says what is remarkable about an input.
+pub(crate) fn tell_warnings(loaded: &Loaded) {
+    for warning in loaded.warnings.iter().chain(&loaded.refused) {
+        words::note(&warning.to_string());
     }
 }
 

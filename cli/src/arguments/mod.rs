@@ -4,6 +4,7 @@ pub(crate) mod device;
 pub(crate) mod gather;
 pub(crate) mod input;
 pub(crate) mod interpolation;
+pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;
 pub(crate) mod time;

@@ -8,10 +8,11 @@ use tumble_formats::motion::Motion;
 use tumble_formats::{Format, Loaded};
 
 use crate::arguments::gather::Gathered;
-use crate::arguments::input::{Inputs, clip_name, several};
+use crate::arguments::input::{Inputs, clip_name, name, several, tell_warnings};
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::run::{Batch, Done, Evaluated};
 use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
+use crate::messages::progress::busy;
 use crate::messages::words;
 
 #[derive(Debug, Args)]
@@ -31,6 +32,11 @@ pub(crate) struct Results {
 }
 
 impl Results {
+    /// Whether existing files are replaced.
+    pub(crate) fn overwrites(&self) -> bool {
+        self.overwrite
+    }
+
     /// Where each input's result goes. Everything that can be refused is refused here, before any
     /// work.
     pub(crate) fn plan(&self, inputs: &Gathered) -> Result<Plan, Failure> {
@@ -53,20 +59,33 @@ impl Results {
         files: &Gathered,
         plan: Plan,
         options: String,
+        work: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.make_of(|path| inputs.read(path), files, plan, options, work)
+    }
+
+    /// As [`Results::make`], of inputs that `read` reads.
+    pub(crate) fn make_of(
+        &self,
+        read: impl Fn(&Path) -> Result<Loaded, Failure> + Sync,
+        files: &Gathered,
+        plan: Plan,
+        options: String,
         mut work: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let Plan { targets, manifest } = plan;
         let jobs: Vec<(PathBuf, Target)> = files.paths().into_iter().zip(targets).collect();
         if let Some(manifest) = manifest {
             let batch = Batch {
-                inputs,
+                read,
                 options,
                 resume: self.resume,
             };
             return batch.run(&jobs, manifest, work);
         }
         for_each(&jobs, |(path, target)| {
-            let loaded = inputs.load(path)?;
+            let loaded = busy(&format!("reading {}", name(path)), || read(path))?;
+            tell_warnings(&loaded);
             work(path, &loaded, target, &mut |_, evaluated: Evaluated| {
                 evaluated.written.commit()?;
                 words::note(&evaluated.told);

@@ -6,6 +6,7 @@ use clap::Args;
 use tumble::{FrameRate, Frames, TrackSet};
 
 use crate::arguments::input;
+use crate::batch::digest;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -81,6 +82,17 @@ impl Sampling {
 }
 
 impl Samples {
+    /// The hash of a list of times; nothing for a rate.
+    pub(crate) fn digest(&self) -> String {
+        match self {
+            Self::Times(times) => {
+                let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
+                digest::of_bytes([&*bytes])
+            }
+            Self::Rate { .. } => String::new(),
+        }
+    }
+
     /// The samples for one set; says when they pass its keys.
     pub(crate) fn of(&self, set: &TrackSet, name: &str) -> Frames {
         match self {

@@ -9,7 +9,6 @@ use std::thread;
 use tumble_formats::Loaded;
 
 use crate::arguments::input;
-use crate::arguments::input::Inputs;
 use crate::batch::digest;
 use crate::batch::manifest::{Entry, Manifest, Previous, kernels_sha256};
 use crate::batch::output::Target;
@@ -18,8 +17,9 @@ use crate::messages::exit::{Failure, for_each};
 use crate::messages::{signals, words};
 
 /// How a batch is done.
-pub(crate) struct Batch<'a> {
-    pub(crate) inputs: &'a Inputs,
+pub(crate) struct Batch<R> {
+    /// Reads an input.
+    pub(crate) read: R,
     /// All that decides over a result besides its input.
     pub(crate) options: String,
     /// Results that are done are skipped.
@@ -44,7 +44,7 @@ pub(crate) struct Evaluated {
 /// Takes each result as it is whole, with the name that the manifest gives it.
 pub(crate) type Done<'a> = dyn FnMut(&str, Evaluated) -> Result<(), Failure> + 'a;
 
-impl Batch<'_> {
+impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
     pub(crate) fn run(
         &self,
         jobs: &[(PathBuf, Target)],
@@ -116,7 +116,7 @@ impl Batch<'_> {
             let is_done = |hash: &String| previous.is_done(target.name(), hash, &self.options);
             let done = self.resume && sha256.as_ref().is_some_and(is_done);
             let input = (!done).then(|| Read {
-                loaded: self.inputs.read(path),
+                loaded: (self.read)(path),
                 sha256,
             });
             if hand_over.send(input).is_err() {
@@ -133,8 +133,6 @@ fn taken(inputs: &Receiver<Input>) -> Result<Option<(Option<String>, Loaded)>, F
         return Ok(None);
     };
     let loaded = loaded?;
-    for warning in loaded.warnings.iter().chain(&loaded.refused) {
-        words::note(&warning.to_string());
-    }
+    input::tell_warnings(&loaded);
     Ok(Some((sha256, loaded)))
 }

@@ -17,6 +17,7 @@ pub(crate) mod probe;
 pub(crate) mod render;
 pub(crate) mod route;
 pub(crate) mod smooth;
+pub(crate) mod travel;
 pub(crate) mod verify;
 pub(crate) mod view;
 

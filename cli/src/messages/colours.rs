@@ -21,6 +21,12 @@ const ORANGE: Colour = [0xe6, 0x9f, 0x00];
 /// Of w, x, y and z.
 pub(crate) const COMPONENTS: [Colour; 4] = [INK, VERMILLION, GREEN, BLUE];
 
+/// Of the axes x, y and z.
+pub(crate) const AXES: [Colour; 3] = [VERMILLION, GREEN, BLUE];
+
+/// Of minimal, fixed and Frenet's frames.
+pub(crate) const FRAMES: [Colour; 3] = [GREEN, BLUE, VERMILLION];
+
 /// Of the boxes of a chain, from the first on, and again.
 pub(crate) const BOXES: [Colour; 6] = [BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION];
 

@@ -156,8 +156,8 @@ impl NpzDocument {
                     matches!(fate, Fate::LeftOut | Fate::Linear(_))
                 });
                 let message = format!(
-                    "--linear {name}: no array beside the keys has this name and an entry for each \
-                     frame; there are {candidates}"
+                    "linear names {name}: no array beside the keys has this name and an entry for \
+                     each frame; there are {candidates}"
                 );
                 return Err(self.refuse(Code::NotPerFrame, message));
             }
@@ -229,7 +229,7 @@ impl NpzDocument {
                     let array = self.archive.array(place)?;
                     if !array.header.element.is_float() {
                         let message = format!(
-                            "--linear {}: the array is of {}; floats are interpolated",
+                            "linear names {}: the array is of {}; floats are interpolated",
                             member.name, array.header.element
                         );
                         return Err(self.refuse(Code::NotPerFrame, message));
@@ -308,8 +308,8 @@ impl Document for NpzDocument {
             let names = self.named(&fates, |fate| matches!(fate, Fate::LeftOut));
             warnings.warn(Code::LeftOut, || {
                 let message = format!(
-                    "left out, because it is not known how to sample them: {names}; --linear NAME \
-                     interpolates numbers"
+                    "left out, because it is not known how to sample them: {names}; numbers are \
+                     interpolated where linear names them (--linear NAME, in Python linear=[NAME])"
                 );
                 (None, message)
             });

@@ -158,13 +158,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 impl Arguments {
     /// All that decides over the bytes of a result besides its input.
     fn options(&self, samples: &Samples) -> String {
-        let times = match samples {
-            Samples::Times(times) => {
-                let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
-                digest::of_bytes([&*bytes])
-            }
-            Samples::Rate { .. } => String::new(),
-        };
+        let times = samples.digest();
         format!(
             "{} {:?} {:?} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
             self.method,

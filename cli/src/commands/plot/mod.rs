@@ -1,11 +1,13 @@
-//! `tumble plot`: pictures of what interpolation makes of keys.
+//! `tumble plot`: pictures of what interpolation makes of keys, and of bodies on paths.
 
 pub(crate) mod curves;
 pub(crate) mod draw;
 pub(crate) mod figure;
+mod path;
 pub(crate) mod report;
 pub(crate) mod source;
 pub(crate) mod sphere;
+mod subjects;
 
 use std::io::Write;
 use std::ops::Range;
@@ -18,24 +20,24 @@ use tumble::{Interpolation, Method, TrackSet, method};
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::Sampling;
 use crate::batch::place::{self, Place};
 use crate::commands::plot::curves::Subject;
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::Source;
+use crate::commands::plot::subjects::{Subjects, together};
+use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
-/// A picture with more panels than this cannot be read.
-const PANELS: usize = 64;
-
-/// Draw components, speeds, errors and paths of rotations as SVG or PNG
+/// Draw components, speeds, errors and spheres of rotations, or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A set of N boxes has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so on,
 counted from 1. Keys are drawn as dots, or as upright lines where a curve has no value
-at a key.
+at a key. Of files of paths speed, turning rate and roll are drawn, by each --frame.
 
 Examples:
   tumble plot data/pendulum.dat -o pendulum.svg
@@ -43,6 +45,7 @@ Examples:
   tumble plot data/pendulum.dat --show speed -m slerp,catmull-rom,c2 -o speed.svg
   tumble plot data/pendulum.dat --show error --box 4 -m all -o error.svg
   tumble plot data/*.dat -o pictures           a picture for each box of each input
+  tumble plot road.csv --frame minimal,frenet -o road.svg
   tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -57,9 +60,9 @@ pub(crate) struct Arguments {
     /// report slerp,catmull-rom,bessel-overhauser]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = methods())]
     methods: Vec<Selection>,
-    /// What to draw
-    #[arg(long, value_enum, default_value = "components", value_name = "WHAT")]
-    show: Show,
+    /// What to draw [default: components; of files of paths, path]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    show: Option<Show>,
     /// Only this dimension, counted from 1 (may be repeated)
     #[arg(
         long = "dimension",
@@ -82,6 +85,8 @@ pub(crate) struct Arguments {
     format: Option<PictureFormat>,
     #[command(flatten)]
     sampling: Sampling,
+    #[command(flatten, next_help_heading = PATHS)]
+    path: PathArguments,
     #[command(flatten)]
     manner: Manner,
     #[command(flatten)]
@@ -98,6 +103,8 @@ enum Show {
     Error,
     /// the path of an axis of a box on the sphere
     Sphere,
+    /// of bodies on paths: speed, turning rate of the direction, and the turn about it
+    Path,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -181,6 +188,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
+        let stem = input::stem(path);
+        if let Some((source, makers)) = arguments.bodies(path, &interpolations)? {
+            let title = (&*name, input::file_name(path));
+            let figure = path::figure(&mut studio.device, title, &source, &makers)?;
+            let file = match &out {
+                Out::One(file) => file.clone(),
+                Out::Folder(folder) => {
+                    folder.join(format!("{stem}-path.{}", studio.format.extension()))
+                }
+            };
+            return studio.draw(&figure, &file);
+        }
         let set = arguments.inputs.load_one(path)?.set;
         let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, &name)?;
@@ -190,7 +209,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 together(&subjects, interpolations.len(), &name)?,
             )],
             Out::Folder(folder) => {
-                let stem = input::stem(path);
                 let file = |(label, subject): (String, Subject)| {
                     let name = format!("{stem}-{label}.{}", studio.format.extension());
                     (folder.join(name), subject)
@@ -219,57 +237,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     outcome
 }
 
-/// What is drawn of one set, and how it is shared out where there are several pictures.
-struct Subjects {
-    boxes: Vec<usize>,
-    dimensions: Vec<usize>,
-    show: Show,
-    axis: Vec3,
-}
-
-impl Subjects {
-    fn of(&self, boxes: Vec<usize>) -> Subject {
-        match self.show {
-            Show::Components => Subject::Components(boxes),
-            Show::Speed => Subject::Speed(boxes),
-            Show::Error => Subject::Error(boxes),
-            Show::Sphere => Subject::Sphere(boxes, self.axis),
-        }
-    }
-
-    fn panels(&self, methods: usize) -> usize {
-        match (self.dimensions.len(), self.show) {
-            (0, Show::Components) if methods > 1 => 4 * self.boxes.len(),
-            (0, _) => self.boxes.len(),
-            (dimensions, _) => dimensions,
-        }
-    }
-
-    fn one(&self) -> Subject {
-        if self.dimensions.is_empty() {
-            self.of(self.boxes.clone())
-        } else {
-            Subject::Dimensions(self.dimensions.clone())
-        }
-    }
-
-    /// A picture for each dimension, or for each box; and what its file is called.
-    fn each(&self) -> Vec<(String, Subject)> {
-        let dimension = |&place: &usize| {
-            let name = format!("dimension-{}", place + 1);
-            (name, Subject::Dimensions(vec![place]))
-        };
-        let show = self.show.to_possible_value();
-        let show = show.as_ref().map_or("", |value| value.get_name());
-        let one = |&index: &usize| (format!("{show}-box-{}", index + 1), self.of(vec![index]));
-        if self.dimensions.is_empty() {
-            self.boxes.iter().map(one).collect()
-        } else {
-            self.dimensions.iter().map(dimension).collect()
-        }
-    }
-}
-
 impl Arguments {
     fn methods(&self) -> Vec<Method> {
         let methods = chosen(&self.methods);
@@ -281,6 +248,40 @@ impl Arguments {
                 method::CATMULL_ROM,
                 method::BESSEL_OVERHAUSER,
             ],
+        }
+    }
+
+    fn show(&self) -> Show {
+        self.show.unwrap_or(Show::Components)
+    }
+
+    /// The bodies on the paths of a file, if these are to be drawn, and what makes them.
+    fn bodies(
+        &self,
+        path: &Path,
+        interpolations: &[Interpolation],
+    ) -> Result<Option<(travel::Source, Vec<Maker>)>, Failure> {
+        let name = input::name(path);
+        match self.show {
+            None | Some(Show::Path) if is_path_file(path) => {
+                let frames = self.path.frames().into_iter().map(Maker::Frame);
+                let source = travel::Source::of_paths(path, &self.path)?;
+                Ok(Some((source, frames.collect())))
+            }
+            Some(Show::Path) => {
+                let clip = self.inputs.load_one(path)?;
+                if !is_travel(&clip) {
+                    let message = "is no file of paths, nor of joints without parents that move";
+                    return Err(Failure::usage(format!("{name}: {message}")));
+                }
+                let methods = interpolations.iter().copied().map(Maker::Method);
+                let source = travel::Source::Clip(Box::new(clip));
+                Ok(Some((source, methods.collect())))
+            }
+            Some(_) if is_path_file(path) => Err(Failure::usage(format!(
+                "{name}: of paths --show path is drawn; for rotations follow them into a file first"
+            ))),
+            _ => Ok(None),
         }
     }
 
@@ -321,7 +322,7 @@ impl Arguments {
     /// What to draw of a set; refuses what is not there.
     fn subjects(&self, set: &TrackSet, name: &str) -> Result<Subjects, Failure> {
         let boxes = set.track_count();
-        if !self.dimensions.is_empty() && self.show != Show::Components {
+        if !self.dimensions.is_empty() && self.show() != Show::Components {
             return Err(Failure::usage(
                 "--dimension is for components; the others have boxes (--box)",
             ));
@@ -348,7 +349,7 @@ impl Arguments {
         Ok(Subjects {
             boxes: own,
             dimensions,
-            show: self.show,
+            show: self.show(),
             axis: self.axis.into(),
         })
     }
@@ -367,18 +368,6 @@ fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Everything in one picture, if that can be read.
-fn together(subjects: &Subjects, methods: usize, name: &str) -> Result<Subject, Failure> {
-    let panels = subjects.panels(methods);
-    if panels > PANELS {
-        return Err(Failure::usage(format!(
-            "{name}: {panels} panels in one picture cannot be read, at most {PANELS}; choose \
-             some (--box, --dimension), or give a directory, for a picture each"
-        )));
-    }
-    Ok(subjects.one())
 }
 
 /// Draws figures into files.

@@ -1,17 +1,20 @@
-//! `tumble render`: boxes drawn to pictures and films, without a display.
+//! `tumble render`: boxes and bodies on paths drawn to pictures and films, without a display.
 
+mod actors;
 pub(crate) mod film;
 pub(crate) mod scene;
+pub(crate) mod solids;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use tumble::{Frames, Layout, Skeleton, Timeline, TrackSet, WorldPoses};
+use tumble::{Frames, Method, Timeline};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::Sampling;
 use crate::batch::place::{self, Place};
 use crate::batch::room;
@@ -19,7 +22,8 @@ use crate::commands::picture;
 use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
-use crate::commands::render::scene::{Actor, Scene, Theme, View};
+use crate::commands::render::scene::{Actor, Scene, Style, Surroundings, Theme, View};
+use crate::commands::travel::{Maker, Scenery, Source, is_path_file, is_travel};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{signals, words};
@@ -30,16 +34,21 @@ const MOST: usize = 4;
 /// What browsers show a frame of a GIF for at least, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 
-/// Draw the boxes of a chain as pictures or a film, without a display
+/// Draw the boxes of a chain, or bodies on paths, as pictures or a film, without a display
 #[derive(Debug, Args)]
 #[command(after_help = "\
+Of files of paths, and of motion files whose joints all are roots that move (as `tumble follow`
+writes them), the path is drawn, its frames as small axes (x red, y green, z blue), and a box on it.
+
 Examples:
   tumble render data/pendulum.dat -o pendulum.gif
   tumble render data/pendulum.dat -m slerp,bessel-overhauser --size 800x400 -o both.apng
   tumble render data/pendulum.dat --start 2.5 -o still.png
-  tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …")]
+  tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …
+  tumble render road.csv --frame frenet,minimal -o both.gif
+  tumble render walk.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
 pub(crate) struct Arguments {
-    /// A keyframe file (`-`: standard input)
+    /// A keyframe file, or one of paths (`-`: standard input)
     #[command(flatten)]
     inputs: Inputs,
     /// Where to draw: FILE.gif, FILE.apng, FILE.png (the first frame), or a directory for a
@@ -68,6 +77,10 @@ pub(crate) struct Arguments {
     /// The colours of ground and floor
     #[arg(long, value_enum, default_value = "light")]
     theme: ThemeArgument,
+    #[command(flatten, next_help_heading = PATHS)]
+    scenery: Scenery,
+    #[command(flatten, next_help_heading = PATHS)]
+    path: PathArguments,
     #[command(flatten)]
     sampling: Sampling,
     #[command(flatten)]
@@ -167,8 +180,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
     }
     let name = input::name(path);
-    let set = arguments.inputs.load_one(path)?.set;
-    let mut frames = samples.of(&set, &name);
+    let source = match is_path_file(path) {
+        true => Source::of_paths(path, &arguments.path)?,
+        false => Source::Clip(Box::new(arguments.inputs.load_one(path)?)),
+    };
+    let set = source.set();
+    let mut frames = samples.of(set, &name);
     let mut timeline = frames
         .resolve(set.track_count(), set.time_span())
         .map_err(|error| Failure::evaluating(&name, &error.into()))?;
@@ -184,21 +201,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
     }
     // The rotations, and twice what becomes of them, for each method.
-    room::in_memory(&name, &set, &frames, 5 * methods.len())?;
+    room::in_memory(&name, set, &frames, 5 * methods.len())?;
     let mut device = arguments.device.open()?;
-    let mut actors = Vec::new();
-    for method in methods {
-        let poses = arguments.poses(&mut device, &name, &set, method, &frames)?;
-        actors.push(Actor { method, poses });
-    }
-    let theme = arguments.theme.into();
-    let scene = Scene::new(actors, arguments.size, arguments.view, theme)
+    let style = Style {
+        size: arguments.size,
+        view: arguments.view,
+        theme: arguments.theme.into(),
+    };
+    let (actors, surroundings) =
+        arguments.actors(&mut device, &name, &source, &methods, &frames, style)?;
+    let scene = Scene::new(actors, &surroundings, style)
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
     arguments.shoot(kind, &scene, &timeline, &inputs)?;
     words::note(&format!(
         "{name}: {}, {}, on {} → {}",
         words::count(timeline.len(), "frame"),
-        words::boxes(set.track_count()),
+        match surroundings.shadows {
+            true => words::count(set.track_count(), "path"),
+            false => words::boxes(set.track_count()),
+        },
         device.label,
         arguments.out.display()
     ));
@@ -206,26 +227,28 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// Where the boxes hang and how they are turned, by one method.
-    fn poses(
+    /// What is drawn: bodies where there are paths, else a chain, by each frame or method.
+    fn actors(
         &self,
         device: &mut Opened,
         name: &str,
-        set: &TrackSet,
-        method: tumble::Method,
+        source: &Source,
+        methods: &[Method],
         frames: &Frames,
-    ) -> Result<WorldPoses, Failure> {
-        let interpolation = self.manner.with(method);
-        // A picture has no scale: boxes are 1 long, however long they are.
-        let skeleton = Skeleton::chain(set.track_count(), 1.0);
-        device
-            .choose(set.track_count())
-            .and_then(|()| {
-                let engine = &device.engine;
-                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
-                engine.world(&local, &skeleton)
-            })
-            .map_err(|error| Failure::evaluating(name, &error))
+        style: Style,
+    ) -> Result<(Vec<Actor>, Surroundings), Failure> {
+        let by_method = || methods.iter().map(|&method| self.manner.with(method));
+        let makers: Vec<Maker> = match source {
+            Source::Paths(..) => self.path.frames().into_iter().map(Maker::Frame).collect(),
+            Source::Clip(clip) if is_travel(clip) => by_method().map(Maker::Method).collect(),
+            Source::Clip(clip) => {
+                let chain = |by| actors::chain(device, name, &clip.set, by, frames);
+                let chains = by_method().map(chain).collect::<Result<_, _>>()?;
+                return Ok((chains, actors::around_chains()));
+            }
+        };
+        let of = (source, &*makers);
+        actors::travellers(device, name, of, &self.scenery, frames, style.theme.ink)
     }
 
     /// Draws every frame and writes it.

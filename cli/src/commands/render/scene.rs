@@ -1,4 +1,4 @@
-//! Boxes on a floor, drawn by a small rasteriser with a depth buffer.
+//! Bodies on a floor or on the ground, drawn by a small rasteriser with a depth buffer.
 
 use std::io;
 
@@ -9,18 +9,16 @@ use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{EulerRot, Mat4, Quat, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
-use tumble::{Method, WorldPoses};
 
 use crate::commands::picture::halved;
 use crate::commands::render::film::overlay;
-use crate::messages::colours::{BOXES, Colour};
+use crate::commands::render::solids::{Body, Face};
+use crate::messages::colours::Colour;
 
 /// How many times finer a picture is drawn than it becomes, to be smooth.
 const FINER: u32 = 2;
 /// Height of the picture's cone of sight, degrees.
 const SIGHT: f32 = 38.0;
-/// Of a box that is 1 long.
-const BREADTH: f32 = 0.28;
 /// Twice the area of the smallest triangle that is drawn, the picture being 2 × 2.
 const SEEN: f32 = 1e-9;
 /// Frames drawn at once, by all threads.
@@ -38,26 +36,58 @@ pub(crate) struct View {
 pub(crate) struct Theme {
     ground: Colour,
     floor: Colour,
-    ink: Colour,
+    shadow: Colour,
+    pub(crate) ink: Colour,
 }
 
 impl Theme {
     pub(crate) const LIGHT: Self = Self {
         ground: [0xff, 0xff, 0xff],
         floor: [0xc8, 0xce, 0xd6],
+        shadow: [0xdb, 0xdf, 0xe4],
         ink: [0x22, 0x26, 0x2b],
     };
     pub(crate) const DARK: Self = Self {
         ground: [0x1d, 0x21, 0x27],
         floor: [0x45, 0x4d, 0x57],
+        shadow: [0x12, 0x15, 0x19],
         ink: [0xe8, 0xea, 0xed],
     };
 }
 
-/// A chain, and the method that moves it.
+/// Bodies, and what is beside them on every frame.
 pub(crate) struct Actor {
-    pub(crate) method: Method,
-    pub(crate) poses: WorldPoses,
+    pub(crate) name: String,
+    pub(crate) tracks: usize,
+    /// `[frame][track]`.
+    pub(crate) rotations: Vec<Quat>,
+    /// `[frame][track]`.
+    pub(crate) places: Vec<Vec3>,
+    pub(crate) body: Body,
+    /// What casts a shadow on the floor: the curves that bodies go along.
+    pub(crate) trails: Vec<Face>,
+    /// Where the camera looks, and nothing may be left out.
+    pub(crate) reach: Vec<Vec3>,
+}
+
+/// What there is beside actors.
+pub(crate) struct Surroundings {
+    /// The ground, instead of a floor.
+    pub(crate) ground: Vec<Face>,
+    /// The length of a body.
+    pub(crate) length: f32,
+    /// How far beyond the places that count bodies reach.
+    pub(crate) margin: f32,
+    /// Whether bodies throw shadows on the floor.
+    pub(crate) shadows: bool,
+}
+
+/// What a picture looks like, whatever it shows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Style {
+    pub(crate) size: (u32, u32),
+    pub(crate) view: View,
+    pub(crate) theme: Theme,
 }
 
 /// Everything that is drawn, and the camera that sees all of it.
@@ -65,13 +95,23 @@ pub(crate) struct Scene {
     actors: Vec<Actor>,
     /// How far each is moved aside.
     shifts: Vec<Vec3>,
-    size: (u32, u32),
-    camera: Mat4,
-    /// Ground and floor, which every frame begins with.
+    style: Style,
+    camera: Camera,
+    /// The height of the floor that shadows fall on.
+    shadowed: Option<f32>,
+    /// Ground and floor, and all that never moves, which every frame begins with.
     colour: Buffer2d<Colour>,
     depth: Buffer2d<f32>,
     labels: overlay::Labels,
 }
+
+#[derive(Debug, Clone, Copy)]
+struct Camera {
+    matrix: Mat4,
+    eye: Vec3,
+}
+
+type Solid<'a> = Triangles<'a, Buffer2d<f32>, BackfaceCullingEnabled>;
 
 /// Draws flat colours at places that the camera has seen already.
 struct Flat;
@@ -104,69 +144,46 @@ impl euc::Interpolate for Shade {
     }
 }
 
-/// Corners of the sides of a box, each counterclockwise seen from outside, and its normal.
-const SIDES: [([Vec3; 4], Vec3); 6] = {
-    const fn corner(x: f32, y: f32, z: f32) -> Vec3 {
-        Vec3::new(x, y, z)
-    }
-    let [a, b, c, d] = [
-        corner(-0.5, -1.0, -0.5),
-        corner(0.5, -1.0, -0.5),
-        corner(0.5, -1.0, 0.5),
-        corner(-0.5, -1.0, 0.5),
-    ];
-    let [e, f, g, h] = [
-        corner(-0.5, 0.0, -0.5),
-        corner(0.5, 0.0, -0.5),
-        corner(0.5, 0.0, 0.5),
-        corner(-0.5, 0.0, 0.5),
-    ];
-    [
-        ([a, b, c, d], Vec3::NEG_Y),
-        ([h, g, f, e], Vec3::Y),
-        ([d, c, g, h], Vec3::Z),
-        ([b, a, e, f], Vec3::NEG_Z),
-        ([c, b, f, g], Vec3::X),
-        ([a, d, h, e], Vec3::NEG_X),
-    ]
-};
-
 impl Scene {
-    /// The poses of all actors have the same boxes, 1 long, and samples, at least one of each.
+    /// The actors have the same samples, at least one.
     pub(crate) fn new(
         actors: Vec<Actor>,
-        size: (u32, u32),
-        view: View,
-        theme: Theme,
+        surroundings: &Surroundings,
+        style: Style,
     ) -> io::Result<Self> {
-        let ends = ends(&actors);
-        let (low, high) = ends
-            .iter()
+        let reach = || actors.iter().flat_map(|actor| &actor.reach).copied();
+        let ground = || surroundings.ground.iter().flat_map(|face| face.corners);
+        let (low, high) = reach()
+            .chain(ground())
             .fold((Vec3::MAX, Vec3::MIN), |(low, high), end| {
-                (low.min(*end), high.max(*end))
+                (low.min(end), high.max(end))
             });
-        let (around, above) = (view.around.to_radians(), view.above.to_radians());
+        let (around, above) = (
+            style.view.around.to_radians(),
+            style.view.above.to_radians(),
+        );
         let turn = Quat::from_euler(EulerRot::YXZ, around, -above, 0.0);
-        // Chains stand beside each other as they are seen.
+        // Actors stand beside each other as they are seen.
         let right = turn * Vec3::X;
-        let sides = ends.iter().map(|end| end.dot(right));
+        let sides = reach().chain(ground()).map(|end| end.dot(right));
         let (left_end, right_end) = sides.fold((f32::MAX, f32::MIN), |(left, right), side| {
             (left.min(side), right.max(side))
         });
-        let apart = right_end - left_end + 0.8;
+        let length = surroundings.length;
+        let apart = right_end - left_end + 0.8 * length;
         let middle = (actors.len() - 1) as f32 / 2.0;
         let shifts: Vec<Vec3> = (0..actors.len())
             .map(|i| right * (i as f32 - middle) * apart)
             .collect();
         let centre = (low + high) / 2.0;
-        let aspect = size.0 as f32 / size.1 as f32;
+        let aspect = style.size.0 as f32 / style.size.1 as f32;
         let upright = (SIGHT.to_radians() / 2.0).tan() * 0.92;
-        let mut distance = 1.0f32;
-        for end in &ends {
+        let mut distance = length;
+        for end in reach().chain(ground()) {
             for shift in &shifts {
-                let seen = turn.inverse() * (*end - centre + *shift);
-                let breadth = BREADTH * 0.7;
-                let across = Vec2::new((seen.x.abs() + breadth) / aspect, seen.y.abs() + breadth);
+                let seen = turn.inverse() * (end - centre + *shift);
+                let margin = surroundings.margin;
+                let across = Vec2::new((seen.x.abs() + margin) / aspect, seen.y.abs() + margin);
                 let across = across / upright;
                 distance = distance.max(seen.z + across.max_element());
             }
@@ -174,28 +191,53 @@ impl Scene {
         let radius = (high - low).length() / 2.0 + shifts[0].length();
         let eye = centre + turn * Vec3::Z * distance;
         let near = distance / 50.0;
-        let camera =
+        let matrix =
             directx::perspective(SIGHT.to_radians(), aspect, near, distance + radius * 40.0)
                 * look_at_mat4(eye, centre, Vec3::Y);
-        let fine = [(size.0 * FINER) as usize, (size.1 * FINER) as usize];
+        let camera = Camera { matrix, eye };
+        let theme = style.theme;
+        let fine = [
+            (style.size.0 * FINER) as usize,
+            (style.size.1 * FINER) as usize,
+        ];
         let mut colour = Buffer2d::new(fine, theme.ground);
         let mut depth = Buffer2d::new(fine, 1.0);
-        let floor = Vec3::new(centre.x, low.y - 0.15, centre.z);
-        for line in grid(camera, floor, radius) {
-            let ends = line.map(|end| (camera * end.extend(1.0), theme.floor));
-            Flat.draw::<Lines<_>, _>(&ends, &mut colour, Some(&mut depth));
+        let floor = Vec3::new(centre.x, low.y - 0.15 * length, centre.z);
+        let has_floor = surroundings.ground.is_empty();
+        if has_floor {
+            for line in grid(matrix, floor, radius, length) {
+                let ends = line.map(|end| (matrix * end.extend(1.0), theme.floor));
+                Flat.draw::<Lines<_>, _>(&ends, &mut colour, Some(&mut depth));
+            }
         }
+        let shadowed = (has_floor && surroundings.shadows).then_some(floor.y);
+        let mut corners = Vec::new();
+        for (actor, &shift) in actors.iter().zip(&shifts) {
+            for face in &surroundings.ground {
+                camera.add(&mut corners, face, shift, 0.0);
+            }
+            for face in &actor.trails {
+                if let Some(floor) = shadowed {
+                    camera.add(&mut corners, &face.shadow(floor, theme.shadow), shift, 0.0);
+                }
+                // A curve on the ground would be half in it: it is drawn a little nearer to the eye.
+                camera.add(&mut corners, face, shift, 0.06 * length);
+            }
+        }
+        Flat.draw::<Solid<'_>, _>(&corners, &mut colour, Some(&mut depth));
         let place = |shift: &Vec3| {
-            let at = camera * (centre + *shift).extend(1.0);
+            let at = matrix * (centre + *shift).extend(1.0);
             (at.x / at.w + 1.0) / 2.0
         };
-        let names = actors.iter().map(|actor| actor.method.name);
-        let labels = overlay::Labels::new(names.zip(shifts.iter().map(place)), size, theme.ink)?;
+        let names = actors.iter().map(|actor| &*actor.name);
+        let places = shifts.iter().map(place);
+        let labels = overlay::Labels::new(names.zip(places), style.size, theme.ink)?;
         Ok(Self {
             actors,
             shifts,
-            size,
+            style,
             camera,
+            shadowed,
             colour,
             depth,
             labels,
@@ -203,7 +245,8 @@ impl Scene {
     }
 
     fn frames(&self) -> usize {
-        self.actors.first().map_or(0, |actor| actor.poses.samples())
+        let first = self.actors.first();
+        first.map_or(0, |actor| actor.places.len() / actor.tracks.max(1))
     }
 
     /// Draws every frame, several at once, and hands them over in order.
@@ -236,67 +279,54 @@ impl Scene {
         let mut depth = self.depth.clone();
         let mut corners = Vec::new();
         for (actor, &shift) in self.actors.iter().zip(&self.shifts) {
-            for track in 0..actor.poses.tracks() {
-                let (Some(turn), Some(hung)) = (
-                    actor.poses.rotation(track, frame),
-                    actor.poses.position(track, frame),
-                ) else {
-                    continue;
-                };
-                let at = hung + shift;
-                let colour = BOXES[track % BOXES.len()];
-                block(&mut corners, self.camera, turn, at, colour);
+            for track in 0..actor.tracks {
+                let place = frame * actor.tracks + track;
+                let (turn, at) = (actor.rotations[place], actor.places[place]);
+                for face in actor.body.faces(turn, at, track) {
+                    self.camera.add(&mut corners, &face, shift, 0.0);
+                    if let Some(floor) = self.shadowed {
+                        let shadow = face.shadow(floor, self.style.theme.shadow);
+                        self.camera.add(&mut corners, &shadow, shift, 0.0);
+                    }
+                }
             }
         }
-        type Solid<'a> = Triangles<'a, Buffer2d<f32>, BackfaceCullingEnabled>;
         Flat.draw::<Solid<'_>, _>(&corners, &mut colour, Some(&mut depth));
         let fine: &[u8] = bytemuck::cast_slice(colour.as_ref());
-        let mut pixels = halved(fine, (self.size.0 * FINER) as usize);
+        let mut pixels = halved(fine, (self.style.size.0 * FINER) as usize);
         self.labels.put(&mut pixels);
         pixels
     }
 }
 
-/// Every end of a box at some samples.
-fn ends(actors: &[Actor]) -> Vec<Vec3> {
-    let mut ends = Vec::new();
-    for actor in actors {
-        let poses = &actor.poses;
-        for sample in (0..poses.samples()).step_by(poses.samples().div_ceil(200).max(1)) {
-            for track in 0..poses.tracks() {
-                let (turn, hung) = (poses.rotation(track, sample), poses.position(track, sample));
-                if let (Some(turn), Some(hung)) = (turn, hung) {
-                    ends.extend([hung, hung + turn * Vec3::NEG_Y]);
-                }
-            }
-        }
-    }
-    ends
-}
-
-/// The triangles of a box that hangs at a place, but not those that show their back or
-/// nothing of themselves.
-fn block(corners: &mut Vec<(Vec4, Colour)>, camera: Mat4, turn: Quat, at: Vec3, colour: Colour) {
-    let extent = Vec3::new(BREADTH, 0.96, BREADTH);
-    let sun = Vec3::new(2.0, 4.0, 3.0).normalize();
-    for (side, normal) in SIDES {
-        let normal = turn * normal;
-        // The sky from above, its light thrown back from below, and the sun.
-        let light = 0.5 + 0.14 * normal.y + 0.5 * normal.dot(sun).max(0.0);
-        let shade = colour.map(|channel| (f32::from(channel) * light).min(255.0) as u8);
-        let [a, b, c, d] = side.map(|corner| camera * (at + turn * (corner * extent)).extend(1.0));
-        for triangle in [[a, b, c], [a, c, d]] {
-            let [p, q, r] = triangle.map(|corner| Vec2::new(corner.x, corner.y) / corner.w);
-            if (q - p).perp_dot(r - p) > SEEN {
-                corners.extend(triangle.map(|corner| (corner, shade)));
-            }
+impl Camera {
+    /// Adds a triangle as it is seen, moved aside and so much nearer to the eye; nothing if it shows its
+    /// back or nothing of itself.
+    fn add(&self, corners: &mut Vec<(Vec4, Colour)>, face: &Face, shift: Vec3, nearer: f32) {
+        let seen = face.corners.map(|corner| {
+            let corner = corner + shift;
+            let nearer = (self.eye - corner).normalize_or_zero() * nearer;
+            self.matrix * (corner + nearer).extend(1.0)
+        });
+        let [p, q, r] = seen.map(|corner| Vec2::new(corner.x, corner.y) / corner.w);
+        let area = (q - p).perp_dot(r - p);
+        if area > SEEN {
+            let shade = face.shade();
+            corners.extend(seen.map(|corner| (corner, shade)));
+        } else if face.two_sided && area < -SEEN {
+            let shade = Face {
+                normal: face.normal.map(|normal| -normal),
+                ..*face
+            };
+            let [p, q, r] = seen;
+            corners.extend([p, r, q].map(|corner| (corner, shade.shade())));
         }
     }
 }
 
 /// Lines of the floor, cut off before they reach the eye.
-fn grid(camera: Mat4, middle: Vec3, radius: f32) -> Vec<[Vec3; 2]> {
-    let step = (radius * 4.0 / 24.0).max(1.0).ceil();
+fn grid(camera: Mat4, middle: Vec3, radius: f32, unit: f32) -> Vec<[Vec3; 2]> {
+    let step = (radius / unit * 4.0 / 24.0).max(1.0).ceil() * unit;
     let half = (radius * 3.0 / step).ceil().clamp(4.0, 64.0) as i32;
     let reach = half as f32 * step;
     let mut lines = Vec::new();
@@ -327,23 +357,5 @@ fn visible(camera: Mat4, start: Vec3, end: Vec3) -> Option<[Vec3; 2]> {
         (true, false) => Some([start, start + (cut() - start) * 0.999]),
         (false, true) => Some([end + (cut() - end) * 0.999, end]),
         (false, false) => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A side seen from inside would be missing from the picture.
-    #[test]
-    fn sides_turn_counterclockwise_about_their_normals() {
-        for ([a, b, c, d], normal) in SIDES {
-            for (from, over, to) in [(a, b, c), (a, c, d)] {
-                let turned = (over - from).cross(to - over);
-                assert!(turned.dot(normal) > 0.0, "{normal}");
-            }
-            let outward = (a + b + c + d) / 4.0 - Vec3::new(0.0, -0.5, 0.0);
-            assert!(outward.dot(normal) > 0.0, "{normal}");
-        }
     }
 }

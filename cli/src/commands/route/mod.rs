@@ -3,7 +3,7 @@
 mod arguments;
 mod picture;
 mod results;
-mod surface;
+pub(crate) mod surface;
 mod tables;
 
 use std::time::Instant;

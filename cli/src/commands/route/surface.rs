@@ -15,14 +15,14 @@ use crate::messages::words;
 /// The largest file that is read.
 const MOST_BYTES: u64 = 4 << 30;
 
-pub(super) enum Surface {
+pub(crate) enum Surface {
     Mesh(Box<Mesh>),
     Net(Net),
 }
 
 impl Surface {
     /// Reads a file, known by its name.
-    pub(super) fn read(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
         let refuse =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));

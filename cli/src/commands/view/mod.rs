@@ -1,4 +1,4 @@
-//! `tumble view`: a page that shows boxes turning and skeletons moving, in any browser.
+//! `tumble view`: a page that shows boxes turning, skeletons moving and bodies on paths, in any browser.
 
 pub(crate) mod pack;
 pub(crate) mod page;
@@ -16,10 +16,12 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{Manner, Wanted, WantedSelection, each_once, wanted_methods};
+use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::batch::place::Place;
+use crate::commands::travel::{Scenery, Source, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
-use crate::commands::view::shown::Shown;
+use crate::commands::view::shown::{Choice, Shown};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
 use crate::messages::progress::Progress;
 use crate::messages::words;
@@ -29,17 +31,20 @@ const LARGEST: f64 = 256e6;
 /// With no more than this, every method is shown where none is named.
 const SMALL: f64 = 24e6;
 
-/// Write a page that shows boxes turning and skeletons moving: one HTML file, for any browser
+/// Write a page that shows boxes turning, skeletons moving and bodies on paths: one HTML file
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The file needs no network and nothing beside it. It shows the engine's own rotations and
 positions, at the frames asked for and at the keys between them; it interpolates nothing
-itself. Files with skeletons are shown as bones, all their animations in a menu.
+itself. Files with skeletons are shown as bones, all their animations in a menu; files of
+paths, and joints without parents that move, as boxes on their paths, with frames as small axes.
 
 Examples:
   tumble view data/pendulum.dat -o pendulum.html
   tumble view data/pendulum.dat --open
-  tumble view a.dat b.dat -m slerp,c2 --fps 120 -o both.html")]
+  tumble view a.dat b.dat -m slerp,c2 --fps 120 -o both.html
+  tumble view road.csv --frame minimal,frenet --path-speed constant --open
+  tumble view walk.glb --mesh hill.obj,rocks.obj -o walk.html")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
@@ -75,6 +80,10 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    #[command(flatten, next_help_heading = PATHS)]
+    scenery: Scenery,
+    #[command(flatten, next_help_heading = PATHS)]
+    path: PathArguments,
     #[command(flatten)]
     manner: Manner,
     #[command(flatten)]
@@ -90,6 +99,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut shown = Vec::new();
     let mut refused = 0;
     for path in &inputs {
+        if is_path_file(path) {
+            let source = Source::of_paths(path, &arguments.path)?;
+            shown.push(arguments.sampled(Shown::of_paths(path, source))?);
+            continue;
+        }
         let loaded = arguments.inputs.load(path)?;
         refused += loaded.refused.len();
         let several = loaded.clips.len() + loaded.refused.len() > 1;
@@ -109,7 +123,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         "Animation"
     };
-    let text = arguments.page(&shown, &methods, menu, &mut device)?;
+    let text = arguments.page(&mut shown, &methods, menu, &mut device)?;
     place.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
         "{}, {}, on {}, {} → {place}",
@@ -149,9 +163,9 @@ impl Arguments {
             .filter(|one| !one.clip.set.is_empty())
             .map(|one| self.sampled(one))
             .collect();
-        let shown = shown?;
+        let mut shown = shown?;
         let methods = self.methods(&shown)?;
-        self.page(&shown, &methods, "Animation", &mut self.device.open()?)
+        self.page(&mut shown, &methods, "Animation", &mut self.device.open()?)
     }
 
     fn place(&self, inputs: &[PathBuf]) -> Result<Place, Failure> {
@@ -170,11 +184,11 @@ impl Arguments {
 
     /// The methods of each clip: those asked for; else all, or the common ones where all would make
     /// a large page.
-    fn methods(&self, shown: &[Shown]) -> Result<Vec<Vec<Wanted>>, Failure> {
+    fn methods(&self, shown: &[Shown]) -> Result<Vec<Vec<Choice>>, Failure> {
         if shown.is_empty() {
             return Err(Failure::usage("there is nothing to show: nothing moves"));
         }
-        let own = |methods: &[Wanted]| -> Vec<Vec<Wanted>> {
+        let own = |methods: &[Wanted]| -> Vec<Vec<Choice>> {
             shown.iter().map(|one| one.methods(methods)).collect()
         };
         let asked = each_once(self.methods.iter().flat_map(|selection| &selection.0));
@@ -229,29 +243,33 @@ impl Arguments {
     /// The page of all clips, each by its methods. `menu`: what the choice of clips is called.
     fn page(
         &self,
-        shown: &[Shown],
-        methods: &[Vec<Wanted>],
+        shown: &mut [Shown],
+        methods: &[Vec<Choice>],
         menu: &'static str,
         device: &mut Opened,
     ) -> Result<String, Failure> {
         let results: usize = methods.iter().map(Vec::len).sum();
         let mut progress = Progress::new("evaluating", results as u64);
         let mut sets = Vec::new();
-        for (one, own) in shown.iter().zip(methods) {
+        for (one, own) in shown.iter_mut().zip(methods) {
             let mut results = Vec::new();
-            for &wanted in own {
-                results.push(one.result(wanted, self.manner, device)?);
+            for &choice in own {
+                results.push(one.result(choice, self.manner, device)?);
                 progress.advance(1);
             }
-            sets.push(StoredSet::new(one, results));
+            if let Some(&first) = own.first() {
+                one.give_keys(first, device)?;
+            }
+            sets.push(StoredSet::new(one, results, &self.scenery));
         }
         drop(progress);
-        Ok(Page::new(&methods.concat(), sets, menu, &device.label).html())
+        let meshes = self.scenery.read()?;
+        Ok(Page::new(&methods.concat(), sets, &meshes, menu, &device.label).html())
     }
 }
 
 /// Bytes of all results before they are packed.
-fn bytes(shown: &[Shown], methods: &[Vec<Wanted>]) -> f64 {
+fn bytes(shown: &[Shown], methods: &[Vec<Choice>]) -> f64 {
     let of_each = shown.iter().zip(methods);
     of_each
         .map(|(one, own)| own.len() as f64 * one.bytes(one.times.len()))
@@ -259,7 +277,7 @@ fn bytes(shown: &[Shown], methods: &[Vec<Wanted>]) -> f64 {
 }
 
 /// The methods of each clip, if a page can hold the results.
-fn fitting(shown: &[Shown], methods: Vec<Vec<Wanted>>) -> Result<Vec<Vec<Wanted>>, Failure> {
+fn fitting(shown: &[Shown], methods: Vec<Vec<Choice>>) -> Result<Vec<Vec<Choice>>, Failure> {
     let bytes = bytes(shown, &methods);
     if bytes <= LARGEST {
         return Ok(methods);

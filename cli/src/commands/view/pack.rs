@@ -17,6 +17,11 @@ pub(crate) fn doubles(values: &[f64]) -> String {
     )
 }
 
+/// Little-endian words of 32 bits.
+pub(crate) fn words(values: impl Iterator<Item = u32>) -> String {
+    deflated(&values.flat_map(u32::to_le_bytes).collect::<Vec<_>>())
+}
+
 /// 16-bit integers, each as its difference from the one `stride` before it, which is
 /// small where those are a component of neighbouring samples; all low bytes first, then
 /// all high bytes, which are mostly alike.

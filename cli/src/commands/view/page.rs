@@ -1,14 +1,14 @@
 //! The page: what `web/` was built into, and the results in it.
 
-use glam::{DVec3, Quat, Vec4};
+use glam::{DVec3, Quat, Vec3, Vec4};
 use serde::Serialize;
 use tumble::Encoding;
-use tumble_formats::world::WorldPose;
+use tumble_routes::mesh::Mesh;
 
-use crate::arguments::interpolation::Wanted;
-use crate::commands::view::pack::{differences, doubles};
-use crate::commands::view::shown::Shown;
-use crate::messages::colours::{self, BOXES, Colour};
+use crate::commands::travel::Scenery;
+use crate::commands::view::pack::{differences, doubles, words};
+use crate::commands::view::shown::{Choice, Shown};
+use crate::messages::colours::{BOXES, Colour};
 
 /// Built from `web/src` by `npm run build` there.
 const HTML: &str = include_str!("../../../../web/dist/view.html");
@@ -25,6 +25,40 @@ pub(crate) struct Page<'a> {
     box_colours: Vec<String>,
     methods: Vec<StoredMethod>,
     sets: Vec<StoredSet>,
+    /// The ground first, then what stands on it.
+    meshes: Vec<StoredMesh>,
+}
+
+/// Triangles that stand beside everything.
+#[derive(Serialize)]
+struct StoredMesh {
+    /// x y z of each vertex, f32.
+    places: String,
+    /// Three vertices each, u32.
+    triangles: String,
+}
+
+impl StoredMesh {
+    fn new(mesh: &Mesh) -> Self {
+        let places = mesh.positions().iter().flat_map(|place| place.to_array());
+        Self {
+            places: words(places.map(|number| (number as f32).to_bits())),
+            triangles: words(mesh.triangles().iter().flatten().copied()),
+        }
+    }
+}
+
+/// How bodies on paths are drawn.
+#[derive(Serialize)]
+struct StoredBodies {
+    /// Of a body, along z before `turn`.
+    length: f32,
+    /// `x y z w`.
+    turn: [f32; 4],
+    /// Whether they stand on their paths, instead of about them.
+    stand: bool,
+    /// How many frames are drawn as axes along each path.
+    axes: usize,
 }
 
 #[derive(Serialize)]
@@ -47,6 +81,10 @@ pub(crate) struct StoredSet {
     names: Vec<String>,
     /// Whether rotations are relative to the world instead of the parent.
     is_world: bool,
+    /// Of bodies on paths, where tracks are these.
+    bodies: Option<StoredBodies>,
+    /// Whether results are named after frames, not after methods.
+    has_frames: bool,
     times: String,
     /// Whether all boxes have the same key times, which are stored once then.
     shared_keys: bool,
@@ -86,7 +124,7 @@ struct StoredPositions {
 impl StoredResult {
     /// Rotations and angular velocities, `[sample][box]`.
     pub(crate) fn new(
-        method: Wanted,
+        method: Choice,
         boxes: usize,
         rotations: &[Quat],
         velocities: &[Vec4],
@@ -111,9 +149,9 @@ impl StoredResult {
         }
     }
 
-    /// With the poses of joints, `[sample][joint]`; `None` if a position is not finite.
-    pub(crate) fn at(self, poses: &[WorldPose]) -> Option<Self> {
-        let positions = || poses.iter().map(|pose| pose.position.as_dvec3());
+    /// With the places of joints, `[sample][joint]`; `None` if one is not finite.
+    pub(crate) fn at(self, places: &[Vec3]) -> Option<Self> {
+        let positions = || places.iter().map(|place| place.as_dvec3());
         let low = positions().reduce(DVec3::min).unwrap_or_default();
         let size = positions().reduce(DVec3::max).unwrap_or_default() - low;
         if !positions().all(DVec3::is_finite) {
@@ -150,7 +188,7 @@ fn short(rotations: &[Quat]) -> Vec<u16> {
 }
 
 impl StoredSet {
-    pub(crate) fn new(shown: &Shown, results: Vec<StoredResult>) -> Self {
+    pub(crate) fn new(shown: &Shown, results: Vec<StoredResult>, scenery: &Scenery) -> Self {
         let (set, skeleton) = (&shown.clip.set, &shown.clip.skeleton);
         let joints = if shown.has_places() {
             set.track_count()
@@ -171,8 +209,16 @@ impl StoredSet {
             .tracks()
             .flat_map(|track| track.keys.iter().copied())
             .collect();
+        let bodies = shown.is_travel().then(|| StoredBodies {
+            length: scenery.length(&shown.places()),
+            turn: shown.body_turn().to_array(),
+            stand: !scenery.meshes.is_empty(),
+            axes: scenery.axes,
+        });
         Self {
             name: shown.title.clone(),
+            bodies,
+            has_frames: shown.path.is_some(),
             boxes: set.track_count(),
             length: shown.box_length,
             parents: (0..joints)
@@ -197,26 +243,26 @@ impl StoredSet {
 impl<'a> Page<'a> {
     /// Of clips by these methods.
     pub(crate) fn new(
-        methods: &[Wanted],
+        methods: &[Choice],
         sets: Vec<StoredSet>,
+        meshes: &[Mesh],
         menu: &'static str,
         device: &'a str,
     ) -> Self {
-        let stored = |method: Wanted| StoredMethod {
+        let stored = |method: Choice| StoredMethod {
             name: method.name(),
             summary: method.summary(),
-            colour: css(method.0.map_or(colours::AUTHORED, colours::of_method)),
+            colour: css(method.colour()),
         };
+        let all = Choice::all().filter(|method| methods.contains(method));
         Self {
             version: env!("CARGO_PKG_VERSION"),
             device,
             menu,
             box_colours: BOXES.map(css).to_vec(),
-            methods: Wanted::all()
-                .filter(|method| methods.contains(method))
-                .map(stored)
-                .collect(),
+            methods: all.map(stored).collect(),
             sets,
+            meshes: meshes.iter().map(StoredMesh::new).collect(),
         }
     }
 

@@ -12,7 +12,7 @@ use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 
 use crate::arguments::interpolation::Wanted;
-use crate::commands::view::shown::Shown;
+use crate::commands::view::shown::{Choice, Shown};
 
 #[path = "../../../tests/support/browser.rs"]
 #[allow(dead_code)] // the tests of boxes use the rest of it
@@ -120,10 +120,10 @@ fn opened(clips: Vec<Motion>, folder: &Path) -> (Vec<Shown>, Option<browser::Pag
         .into_iter()
         .map(|clip| arguments.sampled(one(clip)))
         .collect();
-    let shown = shown.unwrap();
+    let mut shown = shown.unwrap();
     let methods = arguments.methods(&shown).unwrap();
     let mut device = arguments.device.open().unwrap();
-    let page = arguments.page(&shown, &methods, "Animation", &mut device);
+    let page = arguments.page(&mut shown, &methods, "Animation", &mut device);
     let path = folder.join("view.html");
     std::fs::write(&path, page.unwrap()).unwrap();
     (shown, browser::Page::open(&path))
@@ -287,7 +287,7 @@ fn what_has_no_place_or_no_room_is_refused() {
     ] {
         let one = Shown::new(Path::new("fox.glb"), clip, None, true);
         let one = arguments.sampled(one).unwrap();
-        let result = one.result(Wanted(None), arguments.manner, &mut device);
+        let result = one.result(Choice::By(Wanted(None)), arguments.manner, &mut device);
         let found = format!("{:?}", result.err());
         assert!(found.contains(message), "{found}");
     }

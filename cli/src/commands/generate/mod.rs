@@ -1,20 +1,24 @@
-//! `tumble generate`: keyframe files to try things with.
+//! `tumble generate`: keyframe files and a landscape to try things with.
 
-use std::path::PathBuf;
+mod landscape;
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble_formats::generate::{Generate, Steps};
 
 use crate::batch::place::Place;
+use crate::commands::generate::landscape::{Landscape, SIZE};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
-/// Write a keyframe file of swinging boxes; the same seed gives the same file
+/// Write a keyframe file of swinging boxes, or a hill with rocks; the same seed gives the same file
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   tumble generate -o chain.dat
-  tumble generate --boxes 4096 --keys 260 --seconds 200 --random -o - | tumble info -")]
+  tumble generate --boxes 4096 --keys 260 --seconds 200 --random -o - | tumble info -
+  tumble generate --hill -o hill.obj --rocks rocks.obj")]
 pub(crate) struct Arguments {
     /// Where to write (`-`: standard output)
     #[arg(short, long = "out", value_name = "FILE")]
@@ -43,9 +47,18 @@ pub(crate) struct Arguments {
     /// Length of a box
     #[arg(long, default_value = "3", value_parser = positive, allow_hyphen_values = true)]
     length: f64,
+    /// Write a hill instead, as OBJ: over the square from 0,0,0 to 10,0,10, level at its rim
+    #[arg(long, conflicts_with_all = ["boxes", "keys", "seconds", "uniform", "random", "length"])]
+    hill: bool,
+    /// Also write rocks that stand on the hill, as OBJ
+    #[arg(long, value_name = "FILE", requires = "hill")]
+    rocks: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.hill {
+        return land(arguments);
+    }
     let generate = Generate {
         boxes: arguments.boxes as usize,
         keys: arguments.keys as usize,
@@ -69,6 +82,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         words::count(arguments.keys as usize, "key"),
         arguments.seconds,
         arguments.seed,
+    ));
+    Ok(())
+}
+
+/// Writes the hill and its rocks.
+fn land(arguments: &Arguments) -> Result<(), Failure> {
+    let landscape = Landscape::new(arguments.seed);
+    let place = |path: &Path| Place::new(path, arguments.overwrite, &[]);
+    let rocks = arguments.rocks.as_deref().map(place).transpose()?;
+    let hill = place(&arguments.out)?;
+    hill.write(None, |out| landscape.write_hill(out))?;
+    if let Some(rocks) = rocks {
+        rocks.write(None, |out| landscape.write_rocks(out))?;
+    }
+    words::note(&format!(
+        "a hill over {SIZE} × {SIZE}, seed {} → {hill}",
+        arguments.seed
     ));
     Ok(())
 }

@@ -1,5 +1,8 @@
 //! `tumble smooth`: motion without its noise.
 
+mod picture;
+
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -13,11 +16,14 @@ use tumble_formats::npy::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
 
 use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::gather::Gathered;
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::results::{Results, each_file};
 use crate::batch::output::Target;
+use crate::batch::place::{Place, Written};
 use crate::batch::room;
 use crate::batch::run::Evaluated;
+use crate::commands::smooth::picture::Subject;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -32,6 +38,7 @@ deviation), savitzky-golay:RADIUS:ORDER. Samples are the keys where these are ev
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
   tumble smooth walk.bvh --kernel savitzky-golay:4:3 -o smooth.bvh
+  tumble smooth walk.bvh -o calm.bvh --plot calm.svg
   tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -50,6 +57,10 @@ pub(crate) struct Arguments {
     /// Sample at this rate first [default: the keys themselves]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
+    /// Also draw, as .svg or .png, how fast the joint turns and moves that had the most noise, before
+    /// and after; of one input
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArguments,
 }
@@ -79,6 +90,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Failure::usage(error.to_string()))?;
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
+    let plot = arguments.plot(&files)?;
     let mut device = arguments.device.open()?;
     let options = format!(
         "smooth {smoothing:?} {:?} {:?}",
@@ -96,8 +108,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     .iter()
                     .map(|clip| smoothed(&mut device, name, clip, &smoothing, arguments.fps))
                     .collect::<Result<Vec<_>, Failure>>()?;
+                if let ([clip], [own], Some(place)) = (clips, &*samples, &plot) {
+                    let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
+                    let names: Vec<String> = names.collect();
+                    let subject = Subject {
+                        title: input::file_name(path),
+                        about: match smoothing.passes {
+                            1 => smoothing.kernel.to_string(),
+                            passes => format!("{}, {passes} times", smoothing.kernel),
+                        },
+                        names: &names,
+                        before: &own.before,
+                        after: &own.after,
+                    };
+                    picture::draw(&subject, place)?;
+                }
                 let written = write(name, clips, &samples, &smoothing, target)?;
-                let times = samples.iter().map(|own| own.0.times.len()).sum();
+                let times = samples.iter().map(|own| own.after.times.len()).sum();
                 let told = format!(
                     "{name}: {}, {}, on {} in {} → {target}",
                     words::count(times, "sample"),
@@ -114,6 +141,29 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             each_file(&input::name(path), (path, loaded), target, done, &mut make)
         },
     )
+}
+
+impl Arguments {
+    /// Where a picture goes; it is of one input.
+    fn plot(&self, files: &Gathered) -> Result<Option<Place>, Failure> {
+        let Some(file) = &self.plot else {
+            return Ok(None);
+        };
+        let inputs = files.paths();
+        if inputs.len() > 1 {
+            return Err(Failure::usage("--plot is of one input"));
+        }
+        let place = Place::new(file, self.results.overwrites(), &inputs)?;
+        place.try_out()?;
+        Ok(Some(place))
+    }
+}
+
+/// A clip's samples as they were and smoothed, and the rate that they are frames of.
+struct Smoothed {
+    before: Samples,
+    after: Samples,
+    rate: Option<FrameRate>,
 }
 
 /// How far steps of time may differ, as a part of a step.
@@ -137,14 +187,13 @@ fn even_times(clip: &Motion) -> Option<Vec<f64>> {
     (all && (times.len() < 2 || most - least <= EVEN * most)).then(|| times.to_vec())
 }
 
-/// A clip's samples, smoothed, and the rate that they are frames of.
 fn smoothed(
     device: &mut Opened,
     name: &str,
     clip: &Motion,
     smoothing: &Smoothing,
     fps: Option<FrameRate>,
-) -> Result<(Samples, Option<FrameRate>), Failure> {
+) -> Result<Smoothed, Failure> {
     let (frames, rate) = match fps {
         Some(rate) => (Frames::rate(rate), Some(rate)),
         None => match even_times(clip) {
@@ -157,14 +206,15 @@ fn smoothed(
             }
         },
     };
-    room::in_memory(name, &clip.set, &frames, 6)?;
+    room::in_memory(name, &clip.set, &frames, 7)?;
     let methods = ChannelMethods {
         method: None,
         with: &|method: Method| Interpolation::from(method),
     };
     let tracks = clip.set.track_count();
     let work = |engine: &Engine| {
-        let mut samples = methods.sample(engine, clip, &frames)?;
+        let before = methods.sample(engine, clip, &frames)?;
+        let mut samples = before.clone();
         let layout = Layout::FrameMajor;
         if let Some(own) = Rotations::of(&samples.rotations, tracks, layout) {
             samples.rotations = engine.smooth(&own, smoothing)?.as_quats().to_vec();
@@ -174,28 +224,32 @@ fn smoothed(
             let moved = engine.smooth_vectors(&own, smoothing)?;
             samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
         }
-        Ok::<_, Error>(samples)
+        Ok::<_, Error>((before, samples))
     };
-    let samples = device
+    let (before, after) = device
         .work(work)
         .map_err(|error| Failure::evaluating(name, &error))?;
-    Ok((samples, rate))
+    Ok(Smoothed {
+        before,
+        after,
+        rate,
+    })
 }
 
 /// Writes rotations as they come, or clips as a motion file.
 fn write(
     name: &str,
     clips: &[&Motion],
-    samples: &[(Samples, Option<FrameRate>)],
+    samples: &[Smoothed],
     smoothing: &Smoothing,
     target: &Target,
-) -> Result<crate::batch::place::Written, Failure> {
+) -> Result<Written, Failure> {
     let notes = [
         ("kernel", smoothing.kernel.to_string()),
         ("input", name.to_owned()),
     ];
     let format = target.format();
-    if let ([clip], [(own, _)], Some(_)) = (clips, samples, &format.write) {
+    if let ([clip], [Smoothed { after: own, .. }], Some(_)) = (clips, samples, &format.write) {
         let tracks = clip.set.track_count();
         let timeline = Frames::at(own.times.clone())
             .resolve(tracks, None)
@@ -221,7 +275,7 @@ fn write(
         return target.write_whole(&ResultShape { layout, ..shape }, &rotations);
     }
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
-        .map(|(clip, (own, rate))| own.of(clip, *rate, &notes))
+        .map(|(clip, own)| own.after.of(clip, own.rate, &notes))
         .collect();
     let options = target.motion_options();
     let Some(write) = format.write_motion else {

@@ -1,0 +1,294 @@
+//! Arguments that say how bodies follow paths: those of `follow`, and of the commands that draw paths.
+
+use std::path::Path;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use glam::{DVec3, Mat3, Quat};
+use tumble::{BodyAxis, Direction, Ends, Follow, Frame, PathSpeed, TrackSet, Twist, VectorMethod};
+use tumble_formats::path::{Pace, open_paths};
+use tumble_formats::{Limits, ReadOptions};
+
+use crate::arguments::input;
+use crate::arguments::interpolation::each_once;
+use crate::messages::colours::{self, Colour};
+use crate::messages::exit::Failure;
+
+/// The heading of these options in help.
+pub(crate) const PATHS: &str = "Paths";
+
+/// How paths are followed. Beside arguments about rotations those of the same meaning are called
+/// `--path-…`; `follow`, which has none of these, gives them their short names.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct PathArguments {
+    /// The duration of paths without times, seconds
+    #[arg(long, value_name = "S", conflicts_with = "rate", value_parser = positive)]
+    seconds: Option<f64>,
+    /// The way that a body covers in a second on paths without times
+    #[arg(long, value_name = "UNITS", value_parser = positive)]
+    rate: Option<f64>,
+    /// The curve through the points
+    #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
+    path_method: VectorMethod,
+    /// What happens at the first and the last point
+    #[arg(long, value_name = "ENDS", default_value = "parabolic")]
+    path_ends: EndsArgument,
+    /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK
+    #[arg(long, value_name = "WAY", default_value = "tangent", value_parser = Way::parse)]
+    direction: Way,
+    /// How it is turned about this direction; several stand side by side
+    #[arg(
+        long = "frame",
+        value_name = "FRAMES",
+        value_delimiter = ',',
+        default_value = "minimal"
+    )]
+    path_frames: Vec<FrameArgument>,
+    /// The upward direction: at the start of minimal frames, everywhere of fixed ones
+    #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = vector, allow_hyphen_values = true)]
+    path_up: DVec3,
+    /// What becomes of the turn about the direction that a closed path leaves over
+    #[arg(long, value_name = "TWIST", default_value = "spread")]
+    twist: TwistArgument,
+    /// keys, constant, or eased:A,B: growing over the part A of the time, falling over the part B
+    #[arg(long, value_name = "SPEED", default_value = "keys", value_parser = speed)]
+    path_speed: PathSpeed,
+    /// The axis of the body that faces forward
+    #[arg(long, value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
+    forward: Axis,
+    /// The axis of the body that faces up
+    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
+    upward: Axis,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum EndsArgument {
+    /// the parabola through the last three points
+    Parabolic,
+    /// no acceleration
+    Natural,
+    /// start and end at rest
+    Clamped,
+    /// the velocity of the straight line between the last two points
+    Secant,
+    /// the last point repeats the first
+    Loop,
+    /// the first and the last interval stand still
+    Frozen,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FrameArgument {
+    /// it never turns about its direction
+    Minimal,
+    /// its upward axis is as near to --up as it can be
+    Fixed,
+    /// as the path's normal has it, without its half turns
+    Frenet,
+}
+
+impl FrameArgument {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Minimal => "minimal",
+            Self::Fixed => "fixed",
+            Self::Frenet => "frenet",
+        }
+    }
+
+    pub(crate) fn colour(self) -> Colour {
+        colours::FRAMES[self as usize]
+    }
+
+    pub(crate) fn summary(self) -> &'static str {
+        match self {
+            Self::Minimal => "it never turns about its direction",
+            Self::Fixed => "its upward axis is as near to upwards as it can be",
+            Self::Frenet => "as the path's normal has it, without its half turns",
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum TwistArgument {
+    /// it is spread evenly: the last pose is the first
+    Spread,
+    /// it stays
+    Free,
+}
+
+/// A direction; the track that it may name is looked for in each input.
+#[derive(Debug, Clone)]
+enum Way {
+    Known(Direction),
+    Track(String),
+}
+
+impl Way {
+    fn parse(text: &str) -> Result<Self, String> {
+        let number = |text: &str| {
+            text.trim()
+                .parse::<f64>()
+                .map_err(|_| wrong(text, "number"))
+        };
+        match text.split_once(':') {
+            None if text == "tangent" => Ok(Self::Known(Direction::Tangent)),
+            Some(("ahead", distance)) => Ok(Self::Known(Direction::Ahead(number(distance)?))),
+            Some(("at", place)) => match vector(place) {
+                Ok(point) => Ok(Self::Known(Direction::Point(point))),
+                Err(_) if !place.is_empty() => Ok(Self::Track(place.to_owned())),
+                Err(error) => Err(error),
+            },
+            _ => Err("a body faces tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK".to_owned()),
+        }
+    }
+
+    fn of(&self, set: &TrackSet, name: &str) -> Result<Direction, Failure> {
+        let wanted = match self {
+            Self::Known(direction) => return Ok(*direction),
+            Self::Track(wanted) => wanted,
+        };
+        let mut tracks = 0..set.track_count();
+        let found = tracks.find(|&track| set.track_name(track) == wanted.as_str());
+        let found = found.or_else(|| {
+            wanted
+                .parse()
+                .ok()
+                .filter(|&track| track < set.track_count())
+        });
+        found
+            .map(Direction::Track)
+            .ok_or_else(|| Failure::usage(format!("{name}: has no track `{wanted}` to look at")))
+    }
+}
+
+fn wrong(text: &str, what: &str) -> String {
+    format!("`{text}` is no finite {what}")
+}
+
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse::<f64>()
+        .ok()
+        .filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| wrong(text, "number above 0"))
+}
+
+fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|number| number.trim().parse())
+        .collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err(wrong(text, "vector X,Y,Z")),
+    }
+}
+
+fn speed(text: &str) -> Result<PathSpeed, String> {
+    let parts = text
+        .strip_prefix("eased:")
+        .and_then(|parts| parts.split_once(','));
+    match (text, parts) {
+        ("keys", _) => Ok(PathSpeed::Keys),
+        ("constant", _) => Ok(PathSpeed::Constant),
+        (_, Some((start, end))) => match (start.parse(), end.parse()) {
+            (Ok(start), Ok(end)) => Ok(PathSpeed::Eased { start, end }),
+            _ => Err(wrong(text, "pair of parts")),
+        },
+        _ => Err("a speed is keys, constant or eased:A,B".to_owned()),
+    }
+}
+
+/// An axis of a body, and the direction that it has in the body.
+#[derive(Debug, Clone, Copy)]
+struct Axis {
+    axis: BodyAxis,
+    direction: DVec3,
+}
+
+fn axis(text: &str) -> Result<Axis, String> {
+    let axis = text
+        .parse()
+        .map_err(|error: tumble::FollowError| error.to_string())?;
+    let letter = text.trim_start_matches(['+', '-']);
+    let place = ["x", "y", "z"].iter().position(|own| *own == letter);
+    let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
+    let direction = DVec3::AXES[place.unwrap_or(2)] * sign;
+    Ok(Axis { axis, direction })
+}
+
+fn methods() -> impl TypedValueParser<Value = VectorMethod> {
+    let names = VectorMethod::ALL.map(VectorMethod::name);
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<VectorMethod>())
+}
+
+impl PathArguments {
+    /// The curve.
+    pub(crate) fn method(&self) -> VectorMethod {
+        self.path_method
+    }
+
+    /// The frames, each once; at least one.
+    pub(crate) fn frames(&self) -> Vec<FrameArgument> {
+        each_once(self.path_frames.iter())
+    }
+
+    /// Turns a body that faces along z, with y upwards, to the axes that were asked for.
+    pub(crate) fn body_turn(&self) -> Quat {
+        let [z, y] = [self.forward, self.upward].map(|own| own.direction.as_vec3());
+        Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z))
+    }
+
+    /// Reads the paths of a file, a track each.
+    pub(crate) fn read(&self, path: &Path) -> Result<TrackSet, Failure> {
+        let pace = match (self.seconds, self.rate) {
+            (Some(seconds), _) => Some(Pace::Seconds(seconds)),
+            (None, rate) => rate.map(Pace::Rate),
+        };
+        let options = ReadOptions {
+            limits: Limits::default(),
+            ..ReadOptions::default()
+        };
+        open_paths(path, &input::stem(path), pace, &options)
+            .map_err(|diagnostic| Failure::input(&diagnostic, ""))
+    }
+
+    /// How the paths of a set, which messages call `name`, are followed in a frame.
+    pub(crate) fn follow(
+        &self,
+        set: &TrackSet,
+        name: &str,
+        frame: FrameArgument,
+    ) -> Result<Follow, Failure> {
+        Ok(Follow {
+            method: self.path_method,
+            ends: match self.path_ends {
+                EndsArgument::Parabolic => Ends::Parabolic,
+                EndsArgument::Natural => Ends::Natural,
+                EndsArgument::Clamped => Ends::Clamped {
+                    start: DVec3::ZERO,
+                    end: DVec3::ZERO,
+                },
+                EndsArgument::Secant => Ends::Secant,
+                EndsArgument::Loop => Ends::Loop,
+                EndsArgument::Frozen => Ends::Frozen,
+            },
+            direction: self.direction.of(set, name)?,
+            frame: match frame {
+                FrameArgument::Minimal => Frame::Minimal,
+                FrameArgument::Fixed => Frame::Fixed,
+                FrameArgument::Frenet => Frame::Frenet,
+            },
+            up: self.path_up,
+            twist: match self.twist {
+                TwistArgument::Spread => Twist::Spread,
+                TwistArgument::Free => Twist::Free,
+            },
+            speed: self.path_speed,
+            axes: [self.forward.axis, self.upward.axis],
+        })
+    }
+}

@@ -1,0 +1,182 @@
+//! What is drawn of bodies on paths: how fast they go, how fast they turn, and how far they have rolled.
+
+use glam::Vec3;
+use tumble::Frames;
+
+use crate::arguments::device::Opened;
+use crate::commands::plot::figure::{Axes, Axis, Curve, Entry, Figure, Mark, Panel, range_of};
+use crate::commands::travel::{Maker, Source, Travel};
+use crate::messages::colours::Colour;
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Steps from the first key to the last. Speeds are differences between them: with more, the rounding of
+/// positions to f32 would be seen.
+const STEPS: usize = 1000;
+/// More keys than this stand too close for upright lines.
+const UPRIGHTS: usize = 200;
+
+/// What a panel shows of a body, between two samples.
+#[derive(Clone, Copy)]
+enum Show {
+    /// Units a second.
+    Speed,
+    /// Of its direction, rad/s.
+    Turning,
+    /// About its direction since the start, degrees.
+    Roll,
+}
+
+const ALL: [(Show, &str, &str); 3] = [
+    (Show::Speed, "speed along the path", "units/s"),
+    (Show::Turning, "turning rate of the direction", "rad/s"),
+    (Show::Roll, "turned about the direction", "degrees"),
+];
+
+/// Three panels for each path, with a curve for each frame or method.
+pub(super) fn figure(
+    device: &mut Opened,
+    (name, title): (&str, String),
+    source: &Source,
+    makers: &[Maker],
+) -> Result<Figure, Failure> {
+    let set = source.set();
+    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+    let at = |i: usize| first + (last - first) * i as f64 / STEPS as f64;
+    let frames = match first < last {
+        true => Frames::at((0..=STEPS).map(at).collect()),
+        false => return Err(Failure::usage(format!("{name}: has no time to plot"))),
+    };
+    let travels: Vec<Travel> = makers
+        .iter()
+        .map(|&maker| source.sample(device, name, maker, &frames))
+        .collect::<Result<_, _>>()?;
+    let colours: Vec<Colour> = makers.iter().map(|maker| maker.colour()).collect();
+    let forward = source.body_turn() * Vec3::Z;
+    let keys = source.key_times();
+    let uprights = if keys.len() > UPRIGHTS { vec![] } else { keys };
+    let tracks = set.track_count();
+    let panels = (0..tracks).flat_map(|track| ALL.map(|show| (track, show)));
+    let panels = panels.map(|(track, (show, what, unit))| {
+        let curve = |(order, (travel, &colour)): (usize, (&Travel, &Colour))| Curve {
+            colour,
+            width: 1.6 + 1.4 * (travels.len() - 1 - order).min(3) as f64,
+            opacity: 1.0,
+            pieces: vec![points(travel, track, show, forward)],
+        };
+        let curves: Vec<Curve> = travels
+            .iter()
+            .zip(&colours)
+            .enumerate()
+            .map(curve)
+            .collect();
+        let all = || {
+            curves
+                .iter()
+                .flat_map(|curve| curve.pieces.iter().flatten())
+        };
+        // A body that never rolls does so by its rounding alone, which is not to fill the panel.
+        let least = if matches!(show, Show::Roll) {
+            [-1.0, 1.0]
+        } else {
+            [0.0, 0.0]
+        };
+        let range = range_of(all().map(|point| point.1).chain(least));
+        let axis = |label: &str, range| Axis {
+            label: label.to_owned(),
+            range,
+            powers: false,
+        };
+        Panel {
+            title: match tracks {
+                1 => what.to_owned(),
+                _ => format!("{}: {what}", set.track_name(track)),
+            },
+            axes: Axes::Plane {
+                x: axis("time, s", range_of([first, last])),
+                y: axis(unit, range),
+            },
+            curves,
+            dots: Vec::new(),
+            uprights: uprights.clone(),
+            level: None,
+        }
+    });
+    let entry = |(travel, &colour): (&Travel, &Colour)| Entry {
+        label: travel.name.clone(),
+        colour,
+        mark: Mark::Line,
+    };
+    Ok(Figure {
+        title: format!("{title}: along the path"),
+        subtitle: format!(
+            "{}, differences of {STEPS} steps; evaluated on {}",
+            words::count(tracks, "path"),
+            device.label
+        ),
+        legend: travels.iter().zip(&colours).map(entry).collect(),
+        columns: if tracks == 1 { 1 } else { 3 },
+        panels: panels.collect(),
+    })
+}
+
+/// The curve of one body, a point in the middle of each step.
+fn points(travel: &Travel, track: usize, show: Show, forward: Vec3) -> Vec<(f64, f64)> {
+    let velocities = travel.velocities();
+    let places: Vec<Vec3> = travel.line(track).collect();
+    let mut rolled = 0.0;
+    let steps = travel.times.windows(2).enumerate();
+    let point = |(sample, pair): (usize, &[f64])| {
+        let seconds = pair[1] - pair[0];
+        let turning = velocities[sample * travel.tracks + track].truncate();
+        let roll = turning.dot(forward);
+        rolled += f64::from(roll) * seconds;
+        let value = match show {
+            Show::Speed => f64::from((places[sample + 1] - places[sample]).length()) / seconds,
+            Show::Turning => f64::from((turning - forward * roll).length()),
+            Show::Roll => rolled.to_degrees(),
+        };
+        ((pair[0] + pair[1]) / 2.0, value)
+    };
+    steps.map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Quat;
+
+    /// A body that goes round a circle in the plane, and rolls twice while it does.
+    #[test]
+    fn speed_turning_and_roll_are_those_of_a_circle() {
+        let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) / 500.0).collect();
+        let angle = |time: &f64| (time * 0.75) as f32;
+        let travel = Travel {
+            name: String::new(),
+            tracks: 1,
+            rotations: (times.iter())
+                .map(|time| {
+                    let roll = Quat::from_rotation_z((time * std::f64::consts::TAU) as f32);
+                    Quat::from_rotation_y(angle(time)) * roll
+                })
+                .collect(),
+            // Faces along z at first, and goes round y.
+            places: (times.iter())
+                .map(|time| Vec3::new(-angle(time).cos(), 0.0, angle(time).sin()) * 4.0)
+                .collect(),
+            times,
+        };
+        let last = |show| *points(&travel, 0, show, Vec3::Z).last().unwrap();
+        for (show, value, bound) in [
+            (Show::Speed, 3.0, 2e-3),
+            (Show::Turning, 0.75, 1e-3),
+            (Show::Roll, 720.0, 0.1),
+        ] {
+            let (at, found) = last(show);
+            assert!(
+                (at - 1.999).abs() < 1e-9 && (found - value).abs() < bound,
+                "{found}, {value}"
+            );
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What stands in a picture: chains of boxes, or bodies on paths.
+
+use glam::Vec3;
+use tumble::{Frames, Interpolation, Layout, Skeleton, TrackSet};
+use tumble_routes::mesh::Mesh;
+
+use crate::arguments::device::Opened;
+use crate::commands::render::scene::{Actor, Surroundings};
+use crate::commands::render::solids::{Body, meshes, trails};
+use crate::commands::travel::{Maker, Scenery, Source};
+use crate::messages::colours::Colour;
+use crate::messages::exit::Failure;
+
+/// Of a box that is 1 long.
+const BREADTH: f32 = 0.28;
+/// So many samples tell where a chain gets.
+const REACHES: usize = 200;
+
+/// The boxes of a set as a chain, by one method.
+pub(super) fn chain(
+    device: &mut Opened,
+    name: &str,
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+) -> Result<Actor, Failure> {
+    // A picture has no scale: boxes are 1 long, however long they are.
+    let skeleton = Skeleton::chain(set.track_count(), 1.0);
+    let poses = device
+        .choose(set.track_count())
+        .and_then(|()| {
+            let engine = &device.engine;
+            let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+            engine.world(&local, &skeleton)
+        })
+        .map_err(|error| Failure::evaluating(name, &error))?;
+    let (tracks, samples) = (poses.tracks(), poses.samples());
+    let all = || (0..samples).flat_map(move |sample| (0..tracks).map(move |track| (track, sample)));
+    let mut actor = Actor {
+        name: interpolation.method.name.to_owned(),
+        tracks,
+        rotations: all()
+            .filter_map(|(track, sample)| poses.rotation(track, sample))
+            .collect(),
+        places: all()
+            .filter_map(|(track, sample)| poses.position(track, sample))
+            .collect(),
+        body: Body::hanging(BREADTH),
+        trails: Vec::new(),
+        reach: Vec::new(),
+    };
+    for sample in (0..samples).step_by(samples.div_ceil(REACHES).max(1)) {
+        for place in sample * tracks..(sample + 1) * tracks {
+            let (turn, hung) = (actor.rotations[place], actor.places[place]);
+            actor.reach.extend([hung, hung + turn * Vec3::NEG_Y]);
+        }
+    }
+    Ok(actor)
+}
+
+/// What is around chains.
+pub(super) fn around_chains() -> Surroundings {
+    Surroundings {
+        ground: Vec::new(),
+        length: 1.0,
+        margin: BREADTH * 0.7,
+        shadows: false,
+    }
+}
+
+/// The bodies of a source, an actor for each maker, with their curves in the colour of ink, and what
+/// is around them.
+pub(super) fn travellers(
+    device: &mut Opened,
+    name: &str,
+    (source, makers): (&Source, &[Maker]),
+    scenery: &Scenery,
+    frames: &Frames,
+    ink: Colour,
+) -> Result<(Vec<Actor>, Surroundings), Failure> {
+    let ground: Vec<Mesh> = scenery.read()?;
+    let mut actors = Vec::new();
+    let mut length = None;
+    for &maker in makers {
+        let trail = source.trail(device, name, maker)?;
+        let length = *length.get_or_insert_with(|| scenery.length(&trail.places));
+        let body = Body::going(length, !ground.is_empty(), source.body_turn());
+        let bodies = source.sample(device, name, maker, frames)?;
+        let poses = trail.places.iter().zip(&trail.rotations);
+        let corners = poses.flat_map(|(&at, &turn)| body.corners(turn).map(|corner| at + corner));
+        actors.push(Actor {
+            name: bodies.name,
+            tracks: bodies.tracks,
+            rotations: bodies.rotations,
+            places: bodies.places,
+            body,
+            trails: trails(&trail, scenery.axes, length, ink),
+            reach: corners.collect(),
+        });
+    }
+    let surroundings = Surroundings {
+        ground: meshes(&ground),
+        length: length.unwrap_or(1.0),
+        margin: 0.0,
+        shadows: true,
+    };
+    Ok((actors, surroundings))
+}

@@ -1,0 +1,304 @@
+//! Bodies on paths, sampled for pictures: of files of paths, and of clips whose joints all are roots that
+//! move, as `tumble follow` writes them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use glam::{DQuat, DVec3, Quat, Vec3, Vec4};
+use tumble::{Channel, Engine, Error, Frames, Interpolation, Method, TrackSet};
+use tumble_formats::motion::Motion;
+use tumble_formats::path::looks_like_paths;
+use tumble_formats::sample::ChannelMethods;
+use tumble_formats::world::world;
+use tumble_routes::mesh::Mesh;
+
+use crate::arguments::device::Opened;
+use crate::arguments::input;
+use crate::arguments::path::{FrameArgument, PathArguments};
+use crate::batch::room;
+use crate::commands::follow::followed;
+use crate::commands::route::surface::Surface;
+use crate::messages::colours::{self, Colour};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+
+/// A picture of a curve has so many points, and its keys.
+const FINE: usize = 600;
+/// A net of control points is drawn as so many facets along a side.
+const FACETS: usize = 32;
+
+/// What is drawn beside the bodies on paths.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Scenery {
+    /// Draw the ground and what stands on it: meshes (.obj, .ply, .glb, .gltf) or nets (.npy); bodies
+    /// stand on their paths then, instead of about them
+    #[arg(long = "mesh", value_name = "FILES", value_delimiter = ',')]
+    pub(crate) meshes: Vec<PathBuf>,
+    /// The length of a body on a path [default: a tenth of the path's size]
+    #[arg(long, value_name = "LENGTH", value_parser = crate::arguments::path::positive)]
+    pub(crate) body: Option<f64>,
+    /// How many frames are drawn as small axes along a path
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    pub(crate) axes: usize,
+}
+
+impl Scenery {
+    /// The meshes, in the order in which they were named.
+    pub(crate) fn read(&self) -> Result<Vec<Mesh>, Failure> {
+        let read = |path: &PathBuf| match Surface::read(path)? {
+            Surface::Mesh(mesh) => Ok(*mesh),
+            Surface::Net(net) => net.facets(FACETS).map_err(|error| {
+                let message = format!("{}: cannot be drawn: {error}", path.display());
+                Failure::new(ALL_INPUTS, message)
+            }),
+        };
+        self.meshes.iter().map(read).collect()
+    }
+
+    /// The length of the bodies on paths through these places.
+    pub(crate) fn length(&self, places: &[Vec3]) -> f32 {
+        let low = places.iter().copied().reduce(Vec3::min).unwrap_or_default();
+        let high = places.iter().copied().reduce(Vec3::max).unwrap_or_default();
+        let tenth = (high - low).length() / 10.0;
+        let own = if tenth > 0.0 && tenth.is_finite() {
+            tenth
+        } else {
+            1.0
+        };
+        self.body.map_or(own, |length| length as f32)
+    }
+}
+
+/// Bodies at some samples.
+#[derive(Debug, Clone)]
+pub(crate) struct Travel {
+    /// The name of the frame, or of the method.
+    pub(crate) name: String,
+    pub(crate) times: Vec<f64>,
+    pub(crate) tracks: usize,
+    /// `[sample][track]`.
+    pub(crate) rotations: Vec<Quat>,
+    /// `[sample][track]`.
+    pub(crate) places: Vec<Vec3>,
+}
+
+impl Travel {
+    /// The places of one body.
+    pub(crate) fn line(&self, track: usize) -> impl Iterator<Item = Vec3> {
+        self.places.iter().skip(track).step_by(self.tracks).copied()
+    }
+
+    /// Angular velocities in the bodies' own axes between neighbouring samples, `[sample][track]`; the last
+    /// sample has that of the one before it.
+    pub(crate) fn velocities(&self) -> Vec<Vec4> {
+        let samples = self.times.len();
+        let mut found = Vec::with_capacity(self.rotations.len());
+        for sample in 0..samples {
+            let from = sample.min(samples.saturating_sub(2));
+            let seconds = self
+                .times
+                .get(from + 1)
+                .map_or(1.0, |next| next - self.times[from]);
+            for track in 0..self.tracks {
+                let [before, after] = [from, from + 1].map(|own| {
+                    let place = own * self.tracks + track;
+                    self.rotations
+                        .get(place)
+                        .unwrap_or(&Quat::IDENTITY)
+                        .as_dquat()
+                });
+                let step = match samples {
+                    0 | 1 => DVec3::ZERO,
+                    _ => between(before, after).to_scaled_axis(),
+                };
+                found.push((step / seconds).as_vec3().extend(0.0));
+            }
+        }
+        found
+    }
+
+    /// The samples of a body that lie nearest to `count` places evenly spaced along its way.
+    pub(crate) fn evenly(&self, track: usize, count: usize) -> Vec<usize> {
+        let places: Vec<Vec3> = self.line(track).collect();
+        let mut way = 0.0;
+        let mut ways = vec![0.0];
+        for pair in places.windows(2) {
+            way += f64::from((pair[1] - pair[0]).length());
+            ways.push(way);
+        }
+        let last = count.saturating_sub(1).max(1);
+        let mut found: Vec<usize> = (0..count)
+            .map(|i| {
+                let wanted = way * i as f64 / last as f64;
+                let after = ways.partition_point(|&own| own < wanted);
+                let after = after.min(ways.len() - 1);
+                let before = after.saturating_sub(1);
+                match ways[after] - wanted < wanted - ways[before] {
+                    true => after,
+                    false => before,
+                }
+            })
+            .collect();
+        found.dedup();
+        found.retain(|&sample| sample < places.len());
+        found
+    }
+}
+
+/// The rotation, in the first one's own axes, that leads from one to another by the shorter way.
+fn between(before: DQuat, after: DQuat) -> DQuat {
+    let step = (before.normalize().inverse() * after.normalize()).normalize();
+    if step.w < 0.0 { -step } else { step }
+}
+
+/// Where bodies come from.
+pub(crate) enum Source {
+    /// Paths, and how they are followed.
+    Paths(TrackSet, Box<PathArguments>),
+    /// Roots that move by themselves.
+    Clip(Box<Motion>),
+}
+
+/// What makes one result of a source: a frame for paths, a method for clips.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Maker {
+    Frame(FrameArgument),
+    Method(Interpolation),
+}
+
+impl Maker {
+    pub(crate) fn colour(self) -> Colour {
+        match self {
+            Self::Frame(frame) => frame.colour(),
+            Self::Method(interpolation) => colours::of_method(interpolation.method),
+        }
+    }
+}
+
+/// Whether a file is one of paths; standard input is none.
+pub(crate) fn is_path_file(path: &Path) -> bool {
+    !input::is_standard(path) && looks_like_paths(path)
+}
+
+/// Whether all joints of a clip are roots, and some of them move.
+pub(crate) fn is_travel(clip: &Motion) -> bool {
+    let moves = |track| {
+        let keys = clip.set.vector_keys(Channel::Translation, track);
+        keys.is_some_and(|keys| keys.keys.len() > 1)
+    };
+    clip.no_world.is_none()
+        && clip.skeleton.iter().all(|joint| joint.parent.is_none())
+        && (0..clip.set.track_count()).any(moves)
+}
+
+impl Source {
+    /// The paths of a file.
+    pub(crate) fn of_paths(path: &Path, arguments: &PathArguments) -> Result<Self, Failure> {
+        Ok(Self::Paths(
+            arguments.read(path)?,
+            Box::new(arguments.clone()),
+        ))
+    }
+
+    pub(crate) fn set(&self) -> &TrackSet {
+        match self {
+            Self::Paths(set, _) => set,
+            Self::Clip(clip) => &clip.set,
+        }
+    }
+
+    /// How a body that faces along z, with y upwards, is turned to face as the others do.
+    pub(crate) fn body_turn(&self) -> Quat {
+        match self {
+            Self::Paths(_, arguments) => arguments.body_turn(),
+            Self::Clip(_) => Quat::IDENTITY,
+        }
+    }
+
+    /// The times of all keys, in order.
+    pub(crate) fn key_times(&self) -> Vec<f64> {
+        let set = self.set();
+        let keys = |track| set.vector_keys(Channel::Translation, track);
+        let all = (0..set.track_count()).filter_map(keys);
+        let mut times: Vec<f64> = all.flat_map(|keys| keys.times).copied().collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// The bodies at some frames.
+    pub(crate) fn sample(
+        &self,
+        device: &mut Opened,
+        name: &str,
+        maker: Maker,
+        frames: &Frames,
+    ) -> Result<Travel, Failure> {
+        let set = self.set();
+        let tracks = set.track_count();
+        let timeline = frames
+            .resolve(tracks, set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let times = (0..timeline.len())
+            .map(|frame| timeline.time(0, frame))
+            .collect();
+        match (self, maker) {
+            (Self::Paths(set, arguments), Maker::Frame(frame)) => {
+                let follow = arguments.follow(set, name, frame)?;
+                let found = followed(device, name, set, &follow, frames)?;
+                let places = found.positions.as_slice().iter();
+                Ok(Travel {
+                    name: frame.name().to_owned(),
+                    times,
+                    tracks,
+                    rotations: found.rotations.as_quats().to_vec(),
+                    places: places.map(|place| place.truncate()).collect(),
+                })
+            }
+            (Self::Clip(clip), Maker::Method(interpolation)) => {
+                room::in_memory(name, set, frames, 7)?;
+                let with = |method: Method| Interpolation {
+                    method,
+                    ..interpolation
+                };
+                let methods = ChannelMethods {
+                    method: Some(interpolation.method),
+                    with: &with,
+                };
+                let work = |engine: &Engine| methods.sample(engine, clip, frames);
+                let samples = device
+                    .work(work)
+                    .map_err(|error: Error| Failure::evaluating(name, &error))?;
+                let poses = world(clip, &samples)
+                    .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
+                Ok(Travel {
+                    name: interpolation.method.name.to_owned(),
+                    times,
+                    tracks,
+                    rotations: poses.iter().map(|pose| pose.rotation).collect(),
+                    places: poses.iter().map(|pose| pose.position).collect(),
+                })
+            }
+            _ => Err(Failure::usage(format!(
+                "{name}: frames are for paths, methods for clips"
+            ))),
+        }
+    }
+
+    /// The bodies at many even times from the first key to the last, and at the keys: a curve with its
+    /// corners.
+    pub(crate) fn trail(
+        &self,
+        device: &mut Opened,
+        name: &str,
+        maker: Maker,
+    ) -> Result<Travel, Failure> {
+        let mut times = self.key_times();
+        if let (Some(&first), Some(&last)) = (times.first(), times.last()) {
+            let at = |i: usize| first + (last - first) * i as f64 / FINE as f64;
+            times.extend((1..FINE).map(at));
+            times.sort_by(f64::total_cmp);
+            times.dedup();
+        }
+        self.sample(device, name, maker, &Frames::at(times))
+    }
+}

@@ -1,0 +1,166 @@
+// Bodies on paths, drawn by three.js: a box for each, the curve that it goes along, and frames as small axes
+// on the curve (x red, y green, z blue).
+
+import {
+  BoxGeometry, Color, Group, InstancedMesh, Matrix4, MeshBasicMaterial, MeshLambertMaterial, Quaternion, Vector3,
+} from "three";
+import { position } from "./data.js";
+
+// Of the length of a body: how broad and high it is, how thick and long lines and axes are.
+const BREADTH = 0.6;
+const HEIGHT = 0.4;
+const LINE = 0.05;
+const AXIS = 0.04;
+const AXIS_LENGTH = 0.55;
+const AXES = [0xd55e00, 0x009e73, 0x0072b2];
+// The curve, on light ground and on dark.
+const CURVE = 0x6b727a;
+// Lines of more pieces than this are drawn more coarsely, in all and along one path.
+const MOST_PIECES = 40_000;
+
+export class Bodies {
+  constructor(input, result, colours, ghost) {
+    const { length, turn, stand } = input.bodies;
+    this.input = input;
+    this.colours = colours;
+    this.length = length;
+    this.result = result;
+    const material = () => new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    const box = new BoxGeometry(BREADTH * length, HEIGHT * length, length);
+    const roof = new BoxGeometry(BREADTH * length, HEIGHT * length * 0.08, length);
+    roof.translate(0, HEIGHT * length * 0.54, 0);
+    const own = new Quaternion(...turn);
+    for (const geometry of [box, roof]) {
+      if (stand) geometry.translate(0, (HEIGHT * length) / 2, 0);
+      geometry.applyQuaternion(own);
+    }
+    this.meshes = [box, roof].map((geometry) => {
+      const mesh = new InstancedMesh(geometry, material(), input.boxes);
+      mesh.frustumCulled = false;
+      return mesh;
+    });
+    this.object = new Group().add(...this.meshes, ...this.lines(ghost));
+    this.paint(-1);
+  }
+
+  /** The curves and the axes on them, which stand still. */
+  lines(ghost) {
+    const { boxes, samples, bodies } = this.input;
+    const step = Math.max(1, Math.ceil((samples * boxes) / MOST_PIECES));
+    const pieces = [];
+    const axes = [];
+    const turned = new Quaternion();
+    for (let body = 0; body < boxes; body++) {
+      const places = [];
+      for (let sample = 0; sample < samples; sample += step) places.push([sample, this.at(sample, body)]);
+      const ways = [0];
+      for (let i = 1; i < places.length; i++) {
+        const [from, to] = [places[i - 1][1], places[i][1]];
+        ways.push(ways[i - 1] + from.distanceTo(to));
+        if (ways[i] > ways[i - 1]) pieces.push([from, to]);
+      }
+      const way = ways[ways.length - 1];
+      let next = 0;
+      places.forEach(([sample, place], i) => {
+        if (next >= bodies.axes || ways[i] < (way * next) / Math.max(bodies.axes - 1, 1) - 1e-9 * way) return;
+        while (next < bodies.axes && (way * next) / Math.max(bodies.axes - 1, 1) <= ways[i]) next += 1;
+        turned.fromArray(this.result.rotations, (sample * boxes + body) * 4).normalize();
+        const ends = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) =>
+          new Vector3(...axis).applyQuaternion(turned).multiplyScalar(AXIS_LENGTH * this.length).add(place),
+        );
+        axes.push(...ends.map((end) => [place, end]));
+      });
+    }
+    const look = (colour) => new MeshBasicMaterial({ color: colour, transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    this.curve = bars(pieces, LINE * this.length, look(CURVE));
+    this.axes = bars(axes, AXIS * this.length, look(0xffffff));
+    const colour = new Color();
+    axes.forEach((_, i) => this.axes.setColorAt(i, colour.set(AXES[i % 3])));
+    return [this.curve, this.axes];
+  }
+
+  at(sample, body) {
+    return new Vector3(...position(this.result, this.input.boxes, sample, body));
+  }
+
+  /** Colours the bodies; the chosen one (-1: none) is lighter. */
+  paint(chosen) {
+    const colour = new Color();
+    const white = new Color(0xffffff);
+    for (let body = 0; body < this.input.boxes; body++) {
+      colour.set(this.colours[body % this.colours.length]);
+      if (body === chosen) colour.lerp(white, 0.35);
+      this.meshes[0].setColorAt(body, colour);
+      this.meshes[1].setColorAt(body, colour.lerp(white, 0.6));
+    }
+    for (const mesh of this.meshes) mesh.instanceColor.needsUpdate = true;
+  }
+
+  place(result, sample, { shift }) {
+    this.result = result;
+    const matrix = new Matrix4();
+    const turned = new Quaternion();
+    const one = new Vector3(1, 1, 1);
+    for (let body = 0; body < this.input.boxes; body++) {
+      turned.fromArray(result.rotations, (sample * this.input.boxes + body) * 4).normalize();
+      const place = this.at(sample, body);
+      place.x += shift;
+      matrix.compose(place, turned, one);
+      for (const mesh of this.meshes) matrix.toArray(mesh.instanceMatrix.array, body * 16);
+    }
+    for (const mesh of this.meshes) mesh.instanceMatrix.needsUpdate = true;
+    this.curve.position.x = shift;
+    this.axes.position.x = shift;
+  }
+
+  /** Places that bodies take at some samples. */
+  points(result, samples) {
+    const points = [];
+    const step = Math.max(1, Math.floor(samples / 200));
+    for (let sample = 0; sample < samples; sample += step) {
+      for (let body = 0; body < this.input.boxes; body++) {
+        points.push(new Vector3(...position(result, this.input.boxes, sample, body)));
+      }
+    }
+    return points;
+  }
+
+  /** Where a body is: read back from what is drawn. */
+  ends(body) {
+    const matrix = new Matrix4();
+    this.meshes[0].getMatrixAt(body, matrix);
+    return [new Vector3().setFromMatrixPosition(matrix).toArray()];
+  }
+
+  /** How a body is turned: read back from what is drawn. */
+  shown(body) {
+    const matrix = new Matrix4();
+    this.meshes[0].getMatrixAt(body, matrix);
+    return new Quaternion().setFromRotationMatrix(matrix).toArray();
+  }
+
+  dispose() {
+    for (const mesh of [...this.meshes, this.curve, this.axes]) {
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+      mesh.dispose();
+    }
+  }
+}
+
+/** Straight bars between pairs of places. */
+function bars(pairs, breadth, material) {
+  const mesh = new InstancedMesh(new BoxGeometry(1, 1, 1), material, pairs.length);
+  mesh.frustumCulled = false;
+  const matrix = new Matrix4();
+  const turned = new Quaternion();
+  const forward = new Vector3(0, 0, 1);
+  pairs.forEach(([from, to], i) => {
+    const along = to.clone().sub(from);
+    const length = along.length();
+    turned.setFromUnitVectors(forward, along.divideScalar(length));
+    matrix.compose(from.clone().lerp(to, 0.5), turned, new Vector3(breadth, breadth, length + breadth * 0.4));
+    mesh.setMatrixAt(i, matrix);
+  });
+  return mesh;
+}
