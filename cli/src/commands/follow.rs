@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{DVec3, Quat, Vec3};
 use tumble::{
-    BodyAxis, Direction, Ends, Engine, Error, Follow, Followed, Frame, Frames, Layout, PathSpeed,
+    BodyAxis, Direction, Engine, Error, Follow, Followed, Frame, Frames, Layout, PathSpeed,
     TrackSet, Twist, VectorMethod,
 };
 use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
@@ -19,6 +19,7 @@ use tumble_formats::{Limits, ReadOptions};
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::gather::Gathered;
 use crate::arguments::input;
+use crate::arguments::interpolation::EndsArgument;
 use crate::arguments::time::{Samples, Sampling};
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::room;
@@ -88,22 +89,6 @@ pub(crate) struct Arguments {
     upward: BodyAxis,
     #[command(flatten)]
     device: DeviceArguments,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum EndsArgument {
-    /// the parabola through the last three points
-    Parabolic,
-    /// no acceleration
-    Natural,
-    /// start and end at rest
-    Clamped,
-    /// the velocity of the straight line between the last two points
-    Secant,
-    /// the last point repeats the first
-    Loop,
-    /// the first and the last interval stand still
-    Frozen,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -285,17 +270,7 @@ impl Arguments {
     fn follow(&self, set: &TrackSet, name: &str) -> Result<Follow, Failure> {
         Ok(Follow {
             method: self.method,
-            ends: match self.ends {
-                EndsArgument::Parabolic => Ends::Parabolic,
-                EndsArgument::Natural => Ends::Natural,
-                EndsArgument::Clamped => Ends::Clamped {
-                    start: DVec3::ZERO,
-                    end: DVec3::ZERO,
-                },
-                EndsArgument::Secant => Ends::Secant,
-                EndsArgument::Loop => Ends::Loop,
-                EndsArgument::Frozen => Ends::Frozen,
-            },
+            ends: self.ends.ends(),
             direction: self.direction.of(set, name)?,
             frame: match self.frame {
                 FrameArgument::Minimal => Frame::Minimal,
