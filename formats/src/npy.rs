@@ -82,7 +82,13 @@ impl<W: Write> NpyWriter<W> {
             Layout::TrackMajor => (tracks, samples),
             Layout::FrameMajor => (samples, tracks),
         };
-        Self::new(writer, rows, columns, result.order.unwrap_or_default(), result.encoding)
+        Self::new(
+            writer,
+            rows,
+            columns,
+            result.order.unwrap_or_default(),
+            result.encoding,
+        )
     }
 
     /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is

@@ -15,10 +15,16 @@ impl Motion {
         }
         let mut skeleton = self.skeleton.clone();
         for joint in &mut skeleton {
-            joint.parent = joint.parent.and_then(|parent| place.get(parent).copied().flatten());
+            joint.parent = joint
+                .parent
+                .and_then(|parent| place.get(parent).copied().flatten());
         }
-        let skeleton = tracks.iter().filter_map(|&track| skeleton.get(track).copied());
-        let channels = tracks.iter().filter_map(|&track| self.channels.get(track).copied());
+        let skeleton = tracks
+            .iter()
+            .filter_map(|&track| skeleton.get(track).copied());
+        let channels = tracks
+            .iter()
+            .filter_map(|&track| self.channels.get(track).copied());
         Self {
             name: self.name.clone(),
             set: self.set.select(tracks.iter().copied()),
@@ -57,13 +63,20 @@ mod tests {
     fn joints_keep_their_parents_and_their_keys() {
         let mut clip = Motion::default();
         // A hand before the arm that it hangs on.
-        for (track, (name, parent)) in [("hand", Some(1)), ("arm", Some(3)), ("leg", Some(3)), ("hip", None)]
-            .into_iter()
-            .enumerate()
+        for (track, (name, parent)) in [
+            ("hand", Some(1)),
+            ("arm", Some(3)),
+            ("leg", Some(3)),
+            ("hip", None),
+        ]
+        .into_iter()
+        .enumerate()
         {
             let keys = [Quat::from_rotation_x(track as f32)];
             clip.set.push(name, &[0.5], &keys).unwrap();
-            clip.set.set_translations(track, &[0.5], &[Vec3::X * track as f32], &[]).unwrap();
+            clip.set
+                .set_translations(track, &[0.5], &[Vec3::X * track as f32], &[])
+                .unwrap();
             clip.skeleton.push(Joint {
                 parent,
                 rest: Transform::default(),
@@ -75,7 +88,10 @@ mod tests {
         assert_eq!(parents, [Some(1), Some(2), None]);
         assert_eq!(own.set.track_name(2), "hip");
         let moved = own.set.vector_keys(Channel::Translation, 2).unwrap();
-        assert_eq!((moved.times, moved.keys), (&[0.5][..], &[Vec3::X * 3.0][..]));
+        assert_eq!(
+            (moved.times, moved.keys),
+            (&[0.5][..], &[Vec3::X * 3.0][..])
+        );
         assert_eq!(clip.select(&[0]).skeleton[0].parent, None);
         clip.skeleton[3].parent = Some(0);
         assert_eq!(clip.with_ancestors(&[1]), [0, 1, 3]);

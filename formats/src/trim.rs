@@ -216,16 +216,21 @@ mod tests {
 
     fn clip(sampler: Option<Sampler>) -> Motion {
         let mut clip = Motion::default();
-        for (track, times) in [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], [0.5, 0.75, 2.0, 2.5, 4.0, 6.0, 9.0, 10.0]]
-            .iter()
-            .enumerate()
+        for (track, times) in [
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
+            [0.5, 0.75, 2.0, 2.5, 4.0, 6.0, 9.0, 10.0],
+        ]
+        .iter()
+        .enumerate()
         {
             let keys: Vec<Quat> = (0..8u8)
                 .map(|key| Quat::from_rotation_y(f32::from(key * key) * 0.2 + track as f32))
                 .collect();
             clip.set.push("", times, &keys).unwrap();
             let places: Vec<Vec3> = keys.iter().map(|q| *q * Vec3::X).collect();
-            clip.set.set_translations(track, times, &places, &[]).unwrap();
+            clip.set
+                .set_translations(track, times, &places, &[])
+                .unwrap();
             clip.channels.push(Channels {
                 rotation: sampler,
                 translation: sampler,
@@ -244,11 +249,14 @@ mod tests {
             with: &Interpolation::from,
         };
         let [a, b] = [whole, part].map(|clip| methods.sample(&engine, clip, &frames).unwrap());
-        let angle = |(a, b): (&Quat, &Quat)| {
-            tumble::reference::angle_between(a.as_dquat(), b.as_dquat())
-        };
+        let angle =
+            |(a, b): (&Quat, &Quat)| tumble::reference::angle_between(a.as_dquat(), b.as_dquat());
         (
-            a.rotations.iter().zip(&b.rotations).map(angle).fold(0.0, f64::max),
+            a.rotations
+                .iter()
+                .zip(&b.rotations)
+                .map(angle)
+                .fold(0.0, f64::max),
             a.translations
                 .iter()
                 .zip(&b.translations)
@@ -267,7 +275,10 @@ mod tests {
             assert_eq!(part.set.track(1).times, [1.25, 2.0, 2.5, 4.0, 5.5]);
             assert_eq!(part.set.track(0).keys[1..5], whole.set.track(0).keys[2..6]);
             let (angle, distance) = largest(&whole, &part, 1.25, 5.5);
-            assert!(angle < 1e-6 && distance < 1e-6, "{sampler:?}: {angle} {distance}");
+            assert!(
+                angle < 1e-6 && distance < 1e-6,
+                "{sampler:?}: {angle} {distance}"
+            );
         }
     }
 
@@ -296,7 +307,10 @@ mod tests {
             let refused = trim(&whole, start, end, &engine);
             assert!(matches!(refused, Err(TrimError::Empty { .. })));
         }
-        whole.set.set_tangents(0, &[[Quat::IDENTITY; 2]; 8]).unwrap();
+        whole
+            .set
+            .set_tangents(0, &[[Quat::IDENTITY; 2]; 8])
+            .unwrap();
         assert!(trim(&whole, 2.0, 5.0, &engine).is_ok());
         let refused = trim(&whole, 2.0, 5.5, &engine).unwrap_err();
         assert!(refused.to_string().contains("5.5 s"), "{refused}");

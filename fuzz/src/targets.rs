@@ -201,11 +201,17 @@ pub(crate) fn outputs(bytes: &[u8]) -> u64 {
         .resolve(tracks, None)
         .expect("a few times");
     let mut text = Vec::new();
-    let written =
-        CsvWriter::new(&mut text, &set, &timeline, ComponentOrder::Wxyz, Encoding::F32).and_then(|mut writer| {
-            writer.write(&quats)?;
-            writer.finish()
-        });
+    let written = CsvWriter::new(
+        &mut text,
+        &set,
+        &timeline,
+        ComponentOrder::Wxyz,
+        Encoding::F32,
+    )
+    .and_then(|mut writer| {
+        writer.write(&quats)?;
+        writer.finish()
+    });
     assert_eq!(written.is_ok(), count == tracks * frames, "{written:?}");
     if written.is_ok() {
         let mut reader = csv::Reader::from_reader(&*text);

@@ -86,7 +86,9 @@ impl Manner {
         ] {
             if value.is_some() && is_none(|method| method.name == KOCHANEK_BARTELS.name) {
                 let own = KOCHANEK_BARTELS.name;
-                return Err(format!("{option} is for {own}; add -m {own}, or leave it out"));
+                return Err(format!(
+                    "{option} is for {own}; add -m {own}, or leave it out"
+                ));
             }
         }
         if self.ends.is_some() && is_none(|method| method.uses_neighbours) {

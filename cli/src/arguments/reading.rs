@@ -126,10 +126,22 @@ impl Reading {
     ) -> Result<(), String> {
         for (name, is_given, option) in [
             ("raw-times", self.raw_times, FormatOption::RawTimes),
-            ("duplicates", self.duplicates.is_some(), FormatOption::Duplicates),
-            ("source-fps", self.source_fps.is_some(), FormatOption::SourceRate),
+            (
+                "duplicates",
+                self.duplicates.is_some(),
+                FormatOption::Duplicates,
+            ),
+            (
+                "source-fps",
+                self.source_fps.is_some(),
+                FormatOption::SourceRate,
+            ),
             ("map", self.map.is_some(), FormatOption::Map),
-            ("time-unit", self.time_unit.is_some(), FormatOption::TimeUnit),
+            (
+                "time-unit",
+                self.time_unit.is_some(),
+                FormatOption::TimeUnit,
+            ),
         ] {
             if is_given && !formats().any(|format| format.takes(option)) {
                 let all = FORMATS.iter().filter(|format| format.takes(option));

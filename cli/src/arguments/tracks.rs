@@ -43,7 +43,9 @@ impl FromStr for Selector {
         let meaning = match (first.parse(), last.parse()) {
             (Ok(first), Ok(last)) if first <= last => Meaning::Places(first, last),
             (Ok(first), Ok(last)) => {
-                return Err(format!("the range ends at {last}, before it starts at {first}"));
+                return Err(format!(
+                    "the range ends at {last}, before it starts at {first}"
+                ));
             }
             _ if text.is_empty() => {
                 return Err("give a name, a place, a range or a pattern".to_owned());
@@ -75,7 +77,9 @@ impl Selector {
             Meaning::Places(first, last) => (*first..=*last).collect(),
             Meaning::Pattern(pattern) => {
                 let options = MatchOptions::new();
-                all().filter(|&track| pattern.matches_with(&names[track], options)).collect()
+                all()
+                    .filter(|&track| pattern.matches_with(&names[track], options))
+                    .collect()
             }
         }
     }
@@ -91,16 +95,25 @@ impl Tracks {
             return Ok(None);
         }
         let set = &clip.set;
-        let names: Vec<String> = (0..set.track_count()).map(|track| set.track_name(track)).collect();
+        let names: Vec<String> = (0..set.track_count())
+            .map(|track| set.track_name(track))
+            .collect();
         let mut wanted = vec![false; names.len()];
         for selector in &self.tracks {
             let found = selector.of(&names);
             if found.is_empty() {
                 let text = &selector.text;
                 let near = words::nearest(text, names.iter().map(String::as_str));
-                let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+                let near = near
+                    .map(|near| format!("; did you mean `{near}`?"))
+                    .unwrap_or_default();
                 let count = words::count(names.len(), "track");
-                let mut list = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+                let mut list = names
+                    .iter()
+                    .take(NAMED)
+                    .cloned()
+                    .collect::<Vec<_>>()
+                    .join(", ");
                 if names.len() > NAMED {
                     list += " … (`tumble info --json` names all)";
                 }
@@ -110,11 +123,17 @@ impl Tracks {
             }
             found.into_iter().for_each(|track| wanted[track] = true);
         }
-        Ok(Some((0..names.len()).filter(|&track| wanted[track]).collect()))
+        Ok(Some(
+            (0..names.len()).filter(|&track| wanted[track]).collect(),
+        ))
     }
 
     /// The clip of the tracks that are asked for alone.
-    pub(crate) fn select<'a>(&self, clip: &'a Motion, name: &str) -> Result<Cow<'a, Motion>, Failure> {
+    pub(crate) fn select<'a>(
+        &self,
+        clip: &'a Motion,
+        name: &str,
+    ) -> Result<Cow<'a, Motion>, Failure> {
         Ok(match self.of(clip, name)? {
             Some(tracks) => Cow::Owned(clip.select(&tracks)),
             None => Cow::Borrowed(clip),
@@ -133,11 +152,15 @@ impl Tracks {
         };
         let all = clip.with_ancestors(&tracks);
         if all.len() > tracks.len() {
-            let more: Vec<String> = all.iter()
+            let more: Vec<String> = all
+                .iter()
                 .filter(|track| !tracks.contains(track))
                 .map(|&track| clip.set.track_name(track))
                 .collect();
-            words::note(&format!("{name}: with what these tracks hang on: {}", more.join(", ")));
+            words::note(&format!(
+                "{name}: with what these tracks hang on: {}",
+                more.join(", ")
+            ));
         }
         Ok(Cow::Owned(clip.select(&all)))
     }
@@ -145,7 +168,9 @@ impl Tracks {
     /// The boxes of a chain that are asked for and all before them, on which they hang; nothing
     /// where all are.
     pub(crate) fn chain(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
-        let last = self.of(clip, name)?.and_then(|tracks| tracks.last().copied());
+        let last = self
+            .of(clip, name)?
+            .and_then(|tracks| tracks.last().copied());
         Ok(last.map(|last| (0..=last).collect()))
     }
 }
@@ -161,7 +186,10 @@ mod tests {
         for name in ["hips", "LeftArm", "LeftHand", "7", "RightArm", "RightHand"] {
             clip.set.push(name, &[0.0], &[Quat::IDENTITY]).unwrap();
         }
-        let tracks = list.split(',').map(str::parse).collect::<Result<_, String>>()?;
+        let tracks = list
+            .split(',')
+            .map(str::parse)
+            .collect::<Result<_, String>>()?;
         let tracks = Tracks { tracks };
         tracks.of(&clip, "walk").map_err(Failure::into_message)
     }

@@ -105,7 +105,9 @@ impl Arguments {
         };
         let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
         let (start, end) = (self.start.unwrap_or(first), self.end.unwrap_or(last));
-        trim(&clip, start, end, &engine).map(Cow::Owned).map_err(failed)
+        trim(&clip, start, end, &engine)
+            .map(Cow::Owned)
+            .map_err(failed)
     }
 
     fn convert(

@@ -225,9 +225,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let set = arguments.read(path)?;
         let follow = arguments.follow(&set, &name)?;
         let frames = samples.of(&set, &name);
-        room::in_memory(&name, &set, &frames, 6)?;
+        let timeline = room::in_memory(&name, &set, &frames, 6)?;
+        let poses = set.track_count() * timeline.len();
         let work = |engine: &Engine| engine.follow(&set, &follow, &frames, Layout::FrameMajor);
-        let found = device.work(work).map_err(|error| failed(&name, &error))?;
+        let found = device
+            .choose(poses)
+            .and_then(|()| device.work(work))
+            .map_err(|error| failed(&name, &error))?;
         for warning in &found.warnings {
             words::warning(&format!("{name}: {warning}"));
         }

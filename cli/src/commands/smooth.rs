@@ -1,5 +1,6 @@
 //! `tumble smooth`: motion without its noise.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -7,15 +8,16 @@ use tumble::{
     Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, Smoothing,
     SmoothingEnds, SmoothingKernel, Vectors,
 };
-use tumble_formats::format::ResultShape;
+use tumble_formats::format::{MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};
-use tumble_formats::npy::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
 
 use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::results::{Results, each_file};
 use crate::batch::output::Target;
+use crate::batch::place::Written;
 use crate::batch::room;
 use crate::batch::run::Evaluated;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -34,6 +36,8 @@ Examples:
   tumble smooth walk.bvh --kernel savitzky-golay:4:3 -o smooth.bvh
   tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    given: Given,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
@@ -80,10 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
     let mut device = arguments.device.open()?;
-    let options = format!(
-        "smooth {smoothing:?} {:?} {:?}",
-        arguments.fps, arguments.inputs.reading
-    );
+    let options = format!("smooth {}", arguments.given.options());
     arguments.results.make(
         &arguments.inputs,
         &files,
@@ -92,11 +93,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         |path, loaded, target, done| {
             let mut make = |name: &str, clips: &[&Motion], target: &Target| {
                 let started = Instant::now();
+                let tracks = &arguments.inputs.tracks;
+                let own = |clip| match target.format().takes_motion(&[clip]) {
+                    true => tracks.select_with_ancestors(clip, name),
+                    false => tracks.select(clip, name),
+                };
+                let clips = clips.iter().map(|&clip| own(clip));
+                let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
+                let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
                 let samples = clips
                     .iter()
                     .map(|clip| smoothed(&mut device, name, clip, &smoothing, arguments.fps))
                     .collect::<Result<Vec<_>, Failure>>()?;
-                let written = write(name, clips, &samples, &smoothing, target)?;
+                let written = write(
+                    name,
+                    &clips,
+                    &samples,
+                    &smoothing,
+                    (target, loaded.box_length),
+                )?;
                 let times = samples.iter().map(|own| own.0.times.len()).sum();
                 let told = format!(
                     "{name}: {}, {}, on {} in {} → {target}",
@@ -157,7 +172,8 @@ fn smoothed(
             }
         },
     };
-    room::in_memory(name, &clip.set, &frames, 6)?;
+    let timeline = room::in_memory(name, &clip.set, &frames, 6)?;
+    let rotations = clip.set.track_count() * timeline.len();
     let methods = ChannelMethods {
         method: None,
         with: &|method: Method| Interpolation::from(method),
@@ -177,7 +193,8 @@ fn smoothed(
         Ok::<_, Error>(samples)
     };
     let samples = device
-        .work(work)
+        .choose(rotations)
+        .and_then(|()| device.work(work))
         .map_err(|error| Failure::evaluating(name, &error))?;
     Ok((samples, rate))
 }
@@ -188,8 +205,8 @@ fn write(
     clips: &[&Motion],
     samples: &[(Samples, Option<FrameRate>)],
     smoothing: &Smoothing,
-    target: &Target,
-) -> Result<crate::batch::place::Written, Failure> {
+    (target, box_length): (&Target, Option<f64>),
+) -> Result<Written, Failure> {
     let notes = [
         ("kernel", smoothing.kernel.to_string()),
         ("input", name.to_owned()),
@@ -205,7 +222,7 @@ fn write(
             set: &clip.set,
             timeline: &timeline,
             layout: Layout::TrackMajor,
-            order: ComponentOrder::Xyzw,
+            order: None,
             encoding: tumble::Encoding::F32,
             notes: &notes,
         };
@@ -223,7 +240,10 @@ fn write(
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
         .map(|(clip, (own, rate))| own.of(clip, *rate, &notes))
         .collect();
-    let options = target.motion_options();
+    let options = MotionOptions {
+        box_length,
+        ..target.motion_options()
+    };
     let Some(write) = format.write_motion else {
         let message = format!(
             "{target}: {} holds one animation; choose one with --animation",

@@ -60,7 +60,12 @@ impl Loader {
     }
 
     /// A run with these faults, and what it logged.
-    pub(super) fn run(&self, place: &Path, line: &[&str], environment: &[(&str, &str)]) -> (Run, Log) {
+    pub(super) fn run(
+        &self,
+        place: &Path,
+        line: &[&str],
+        environment: &[(&str, &str)],
+    ) -> (Run, Log) {
         self.run_command(command(place, line), environment)
     }
 

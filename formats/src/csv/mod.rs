@@ -11,8 +11,8 @@ use glam::Quat;
 
 use tumble::{Encoding, Layout, Timeline, TrackSet};
 
-use crate::npy::ComponentOrder;
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
+use crate::npy::ComponentOrder;
 
 /// As in `.dat` files.
 pub(crate) const ORDER: ComponentOrder = ComponentOrder::Wxyz;
@@ -39,7 +39,9 @@ pub static FORMAT: Format = Format {
                 ..
             } = result;
             let order = order.unwrap_or(ORDER);
-            Ok(Box::new(CsvWriter::new(out, set, timeline, order, encoding)?))
+            Ok(Box::new(CsvWriter::new(
+                out, set, timeline, order, encoding,
+            )?))
         },
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),

@@ -37,11 +37,18 @@ pub(super) fn write_motion(
     }
     let offset = sampled.clip.time_offset as f64;
     if let Some(pair) = sampled.times.windows(2).find(|pair| pair[1] <= pair[0]) {
-        let message = format!("time {} is followed by {}; times increase strictly", pair[0], pair[1]);
+        let message = format!(
+            "time {} is followed by {}; times increase strictly",
+            pair[0], pair[1]
+        );
         return Err(refuse(Code::TimeNotIncreasing, message).into());
     }
     let mut warnings = Warnings::new(&options.name);
-    let is_placed = sampled.clip.skeleton.iter().any(|joint| joint.parent.is_some());
+    let is_placed = sampled
+        .clip
+        .skeleton
+        .iter()
+        .any(|joint| joint.parent.is_some());
     if is_placed || !sampled.translations.is_empty() || !sampled.scales.is_empty() {
         warnings.warn(Code::RotationsAlone, || {
             let message = ".dat holds rotations; skeleton, translations and scales are left out";

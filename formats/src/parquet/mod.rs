@@ -14,8 +14,8 @@ use parquet::arrow::arrow_reader::{
 };
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::npy::ComponentOrder;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
+use crate::npy::ComponentOrder;
 use crate::parquet::pages::check_pages;
 use crate::parquet::write::ParquetSink;
 use crate::source::Source;
@@ -43,7 +43,8 @@ pub static FORMAT: Format = Format {
         poses: |poses, out| write_poses(poses, |table| ParquetSink::new(out, table)),
     }),
     write_motion: Some(|clips, options, out| {
-        write_motion(clips, options.order, |table| ParquetSink::new(out, table)).map(|()| Vec::new())
+        write_motion(clips, options.order, |table| ParquetSink::new(out, table))
+            .map(|()| Vec::new())
     }),
     many_clips: true,
     options: &FormatOption::OF_TABLES,

@@ -202,7 +202,13 @@ pub(crate) fn write_motion<S: Sink>(
         if let Some((clip, _)) = &mut batch.clip {
             *clip = place as i32;
         }
-        write_clip(sampled, codes, [turned, moved, scaled], &mut batch, &mut sink)?;
+        write_clip(
+            sampled,
+            codes,
+            [turned, moved, scaled],
+            &mut batch,
+            &mut sink,
+        )?;
         batch.flush(&mut sink)?;
         sink.end_part()?;
     }

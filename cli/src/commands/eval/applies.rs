@@ -32,7 +32,12 @@ impl Arguments {
         } else {
             kinds.extend(format.write.is_some().then_some(Kind::Rotations));
             let motion = format.write_motion.is_some();
-            kinds.extend(motion.then_some([Kind::Motion, Kind::Baked]).into_iter().flatten());
+            kinds.extend(
+                motion
+                    .then_some([Kind::Motion, Kind::Baked])
+                    .into_iter()
+                    .flatten(),
+            );
         }
         let mut refusals = kinds.into_iter().map(|kind| self.refusal(kind, format));
         let first = refusals.next().flatten();
@@ -44,7 +49,8 @@ impl Arguments {
 
     /// Refuses options that say nothing to a result of this kind.
     pub(super) fn check(&self, kind: Kind, format: &Format) -> Result<(), Failure> {
-        self.refusal(kind, format).map_or(Ok(()), |message| Err(Failure::usage(message)))
+        self.refusal(kind, format)
+            .map_or(Ok(()), |message| Err(Failure::usage(message)))
     }
 
     fn refusal(&self, kind: Kind, format: &Format) -> Option<String> {
@@ -72,7 +78,9 @@ impl Arguments {
                 })
             })
             .or_else(|| {
-                let given = ["scale", "offsets"].into_iter().find(|it| self.given.has(it))?;
+                let given = ["scale", "offsets"]
+                    .into_iter()
+                    .find(|it| self.given.has(it))?;
                 (kind == Kind::Rotations).then(|| {
                     format!(
                         "--{given} says nothing to rotations alone; leave it out, or write \
@@ -107,7 +115,9 @@ impl Arguments {
             Kind::Rotations => format.write.as_ref()?.layout,
             Kind::Poses => Some(Layout::FrameMajor),
             Kind::Motion | Kind::Baked => {
-                return Some(format!("{name} has a layout of its own for clips; leave out --layout"));
+                return Some(format!(
+                    "{name} has a layout of its own for clips; leave out --layout"
+                ));
             }
         };
         match (only, self.layout) {

@@ -3,8 +3,6 @@
 mod applies;
 mod motion;
 mod rotations;
-#[cfg(test)]
-mod tests;
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -242,7 +240,9 @@ impl Job<'_> {
             None => Kind::Rotations,
         };
         let refused = |failure: Failure| failure.of(name);
-        self.arguments.check(kind, target.format()).map_err(refused)?;
+        self.arguments
+            .check(kind, target.format())
+            .map_err(refused)?;
         if kind == Kind::Baked {
             return self.bake(name, clips, target);
         }
@@ -252,7 +252,9 @@ impl Job<'_> {
                 let message = "some tracks make a new file: meshes and all else stay behind";
                 words::note(&format!("{name}: {message}"));
             }
-            let selected = clips.iter().map(|&clip| tracks.select_with_ancestors(clip, name));
+            let selected = clips
+                .iter()
+                .map(|&clip| tracks.select_with_ancestors(clip, name));
             let selected: Vec<Cow<'_, Motion>> = selected.collect::<Result<_, Failure>>()?;
             let clips: Vec<&Motion> = selected.iter().map(|clip| &**clip).collect();
             return self.motion(name, &clips, target);
@@ -276,13 +278,23 @@ impl Job<'_> {
             method,
             with: &with,
         };
-        let own: Vec<Method> = methods.groups_of(clip).iter().map(|group| group.0).collect();
+        let own: Vec<Method> = methods
+            .groups_of(clip)
+            .iter()
+            .map(|group| group.0)
+            .collect();
         let checked = self.arguments.manner.check(&own);
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
     }
 
     /// Says which way a clip's rotations take, where that is asked for.
-    fn explain(&mut self, name: &str, clip: &Motion, frames: &Frames, layout: Layout) -> Result<(), Failure> {
+    fn explain(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<(), Failure> {
         if !self.arguments.explain_route {
             return Ok(());
         }
@@ -301,13 +313,17 @@ impl Job<'_> {
             let route = samples
                 .map_err(Error::from)
                 .and_then(|timeline| {
-                    self.device.choose(clip.set.track_count() * timeline.len())?;
+                    self.device
+                        .choose(clip.set.track_count() * timeline.len())?;
                     self.device.work(explain)
                 })
                 .map_err(|error| Failure::evaluating(name, &error))?;
             words::note(&match whole {
                 true => format!("{name}: {route}"),
-                false => format!("{name}, {} by {method}: {route}", words::count(tracks.len(), "track")),
+                false => format!(
+                    "{name}, {} by {method}: {route}",
+                    words::count(tracks.len(), "track")
+                ),
             });
         }
         Ok(())

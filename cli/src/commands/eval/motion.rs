@@ -142,16 +142,27 @@ impl Job<'_> {
         let times = || all.iter().flat_map(|samples| &samples.times).copied();
         let span = times().reduce(f64::min).zip(times().reduce(f64::max));
         let format = target.format();
-        let own = format.takes(FormatOption::Order).then_some(format.write.as_ref()).flatten();
+        let own = format
+            .takes(FormatOption::Order)
+            .then_some(format.write.as_ref())
+            .flatten();
         let order = own.map(|write| self.arguments.order().unwrap_or(write.order));
         let size = (tracks.unwrap_or(0), samples, span);
         Ok(self.evaluated(name, size, &method, written, target, order))
     }
 
     /// Refuses to scale a clip that goes nowhere. `boxes`: the result has the length of boxes.
-    pub(super) fn check_scale(&self, name: &str, clip: &Motion, boxes: bool) -> Result<(), Failure> {
+    pub(super) fn check_scale(
+        &self,
+        name: &str,
+        clip: &Motion,
+        boxes: bool,
+    ) -> Result<(), Failure> {
         let is_placed = clip.has_vectors()
-            || clip.skeleton.iter().any(|joint| joint.rest.translation != Vec3::ZERO)
+            || clip
+                .skeleton
+                .iter()
+                .any(|joint| joint.rest.translation != Vec3::ZERO)
             || boxes && self.loaded.box_length.is_some();
         if self.arguments.given.has("scale") && !is_placed {
             return Err(Failure::usage(format!(

@@ -133,7 +133,8 @@ impl Job<'_> {
         if let Some(tracks) = &selected {
             let frames = numbers.chunks_exact(width * set.track_count());
             let pose = |frame: &[f32], track: usize| frame[track * width..][..width].to_vec();
-            let own = frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
+            let own =
+                frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
             numbers = own.collect();
         }
         let set = &selected.map_or_else(|| set.clone(), |tracks| set.select(tracks));

@@ -162,12 +162,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             words::count(methods.len(), "method")
         )));
     }
+    arguments.manner.check(&methods).map_err(Failure::usage)?;
     let kind = Kind::of(&arguments.out)?;
     if kind != Kind::Folder {
         Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
     }
     let name = input::name(path);
-    let set = arguments.inputs.load_one(path)?.set;
+    let clip = arguments.inputs.load_one(path)?;
+    let set = match arguments.inputs.tracks.chain(&clip, &name)? {
+        Some(tracks) => clip.set.select(tracks),
+        None => clip.set,
+    };
     let mut frames = samples.of(&set, &name);
     let mut timeline = frames
         .resolve(set.track_count(), set.time_span())
@@ -218,8 +223,11 @@ impl Arguments {
         let interpolation = self.manner.with(method);
         // A picture has no scale: boxes are 1 long, however long they are.
         let skeleton = Skeleton::chain(set.track_count(), 1.0);
+        let samples = frames.resolve(set.track_count(), set.time_span());
+        let samples = samples.map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let rotations = set.track_count() * samples.len();
         device
-            .choose(set.track_count())
+            .choose(rotations)
             .and_then(|()| {
                 let engine = &device.engine;
                 let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
