@@ -1,6 +1,6 @@
 //! A part of a clip, from one time to another.
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackError, TrackSet};
 
 use crate::grid::{Precision, fits};
@@ -209,6 +209,7 @@ impl Part {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
     use tumble::Device;
 
     use super::*;
