@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::program::{command, finish, run, sample_folder, succeed};
+use crate::program::{sample_folder, succeed};
 use crate::support::vulkan_devices;
 
 #[test]

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::browser::Page;
-use crate::program::{run, sample_folder, succeed};
+use crate::program::{sample_folder, succeed};
 use glam::Quat;
 use sha1::{Digest, Sha1};
 use tumble::METHODS;
