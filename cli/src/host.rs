@@ -78,12 +78,12 @@ pub fn devices() -> Result<Vec<Device>, Refused> {
 }
 
 /// Opens the device of that name, as `--device` takes it: `first`, `cpu`, `vulkan`, an index, a name
-/// or part of it.
+/// or part of it; `auto` is the CPU here, see [`auto`].
 ///
 /// # Errors
 /// When there is no such device, or it cannot be opened.
 pub fn open(name: &str, options: &EngineOptions) -> Result<Engine, Refused> {
-    let opened = DeviceArguments::of(name, options).open()?;
+    let opened = DeviceArguments::of(name, options).open_any()?;
     Ok(opened.engine)
 }
 

@@ -4,6 +4,8 @@
 mod batch;
 mod cli;
 mod cli_arguments;
+mod cli_files;
+mod cli_listings;
 mod configurations;
 mod dat_fixtures;
 mod faults;

@@ -9,13 +9,15 @@
 //! box. Read as a stream; what is refused costs memory in proportion to what was
 //! read, never to a number that the file claims.
 
-use std::io::{self, BufRead, Write};
+pub mod write;
+
+use std::io::BufRead;
 use std::path::Path;
 
 use glam::{DQuat, Quat};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, Loaded, ReadOptions};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::keys::QUIET_NORM;
 use crate::motion::Motion;
 use crate::quaternion::{dot, nearest_unit};
@@ -39,8 +41,9 @@ pub static FORMAT: Format = Format {
     probe: |_| false,
     read: open_dat,
     write: None,
-    write_motion: None,
+    write_motion: Some(write::write_motion),
     many_clips: false,
+    options: &[FormatOption::BoxLength],
 };
 
 /// Reads a file; `-` is standard input.
@@ -373,27 +376,4 @@ impl Keys {
             ..Loaded::of(clip, lines.warnings)
         })
     }
-}
-
-/// Writes a set whose tracks share their times, with boxes of that length. Numbers have as
-/// many digits as it takes to read the same bits again.
-///
-/// # Errors
-/// When writing fails, or (`InvalidInput`) the tracks' times differ.
-pub fn write_dat(writer: &mut impl Write, set: &TrackSet, box_length: f64) -> io::Result<()> {
-    let times = set.tracks().next().map_or(&[][..], |track| track.times);
-    if set.tracks().any(|track| track.times != times) {
-        let message = "a .dat file has one list of times for all tracks; these differ";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
-    }
-    writeln!(writer, "# {} {box_length:?}", set.track_count())?;
-    for (i, time) in times.iter().enumerate() {
-        write!(writer, "{time:?}")?;
-        for track in set.tracks() {
-            let q = track.keys[i];
-            write!(writer, " {:?} {:?} {:?} {:?}", q.w, q.x, q.y, q.z)?;
-        }
-        writeln!(writer)?;
-    }
-    Ok(())
 }

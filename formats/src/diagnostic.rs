@@ -256,6 +256,7 @@ codes! {
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
     Scales = "W203", "scales are left out", "The format has rotations and translations only.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
+    RotationsAlone = "W205", "rotations alone", "The format has no room for a skeleton, translations or scales: they are left out.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
     LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";

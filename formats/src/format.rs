@@ -57,6 +57,52 @@ pub struct Format {
     pub write_motion: Option<WriteMotion>,
     /// Whether one file holds any number of clips.
     pub many_clips: bool,
+    /// What its reader and its writers can be told.
+    pub options: &'static [FormatOption],
+}
+
+/// What not every format can be told: programs refuse to tell it the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FormatOption {
+    /// [`ReadOptions::raw_times`].
+    RawTimes,
+    /// [`ReadOptions::duplicates`].
+    Duplicates,
+    /// [`ReadOptions::source_rate`].
+    SourceRate,
+    /// [`ReadOptions::map`].
+    Map,
+    /// [`ReadOptions::time_unit`].
+    TimeUnit,
+    /// [`MotionOptions::sequence`].
+    Sequence,
+    /// [`MotionOptions::linear`].
+    Linear,
+    /// [`MotionOptions::order`].
+    Order,
+    /// [`MotionOptions::box_length`].
+    BoxLength,
+}
+
+impl FormatOption {
+    /// All that tables and arrays, whose meaning is not fixed, can be told when they are read.
+    pub(crate) const OF_ARRAYS: [Self; 5] = [
+        Self::RawTimes,
+        Self::Duplicates,
+        Self::SourceRate,
+        Self::Map,
+        Self::TimeUnit,
+    ];
+
+    /// The same, and the order of the columns that are written.
+    pub(crate) const OF_TABLES: [Self; 6] = [
+        Self::RawTimes,
+        Self::Duplicates,
+        Self::SourceRate,
+        Self::Map,
+        Self::TimeUnit,
+        Self::Order,
+    ];
 }
 
 /// Reads the keyframes of a file.
@@ -178,6 +224,10 @@ pub struct MotionOptions {
     /// Arrays of a [`Document`] that hold a number a frame, of which the format does not know what
     /// they are (`dmpls`): they are interpolated linearly instead of being left out.
     pub linear: Vec<String>,
+    /// The order of a quaternion's columns, for tables [default: CSV w x y z, the others x y z w].
+    pub order: Option<ComponentOrder>,
+    /// The length of each box, for chains of boxes [default: 1].
+    pub box_length: Option<f64>,
 }
 
 /// Why samples could not be written.
@@ -196,6 +246,8 @@ pub struct WriteResults {
     /// Whether it is text, a line for each frame, in which numbers keep every digit: encodings
     /// that are shorter than f32 are not for it.
     pub is_text: bool,
+    /// The order of a quaternion's components where none is asked for.
+    pub order: ComponentOrder,
     /// The only layout that it has, if it has but one.
     pub layout: Option<Layout>,
     /// The fewest bytes that a rotation takes.
@@ -233,8 +285,8 @@ pub struct ResultShape<'a> {
     pub timeline: &'a Timeline,
     /// The order of tracks and samples.
     pub layout: Layout,
-    /// The order of a quaternion's components.
-    pub order: ComponentOrder,
+    /// The order of a quaternion's components [default: CSV w x y z, the others x y z w].
+    pub order: Option<ComponentOrder>,
     /// What a rotation is written as.
     pub encoding: Encoding,
     /// What made them, for formats that have room for it: `("method", "slerp")`.
@@ -276,6 +328,12 @@ impl Format {
             && (self.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
     }
 
+    /// Whether it can be told that.
+    #[must_use]
+    pub fn takes(&self, option: FormatOption) -> bool {
+        self.options.contains(&option)
+    }
+
     /// Whether results are written in it.
     #[must_use]
     pub fn is_writable(&self) -> bool {
@@ -295,8 +353,14 @@ impl Format {
     /// # Errors
     /// The first fault that refuses the file.
     pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-        let start = Source::start(path);
-        Self::detect(path, &start).open(path, options)
+        Self::detected(path).open(path, options)
+    }
+
+    /// The format that a file is in: see [`Format::detect`]. Nothing is known of one that cannot be
+    /// read, and that is told about when it is opened.
+    #[must_use]
+    pub fn detected(path: &Path) -> &'static Self {
+        Self::detect(path, &Source::start(path))
     }
 
     /// Reads a file in this format.

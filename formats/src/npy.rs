@@ -8,7 +8,7 @@ use npyz::WriterBuilder;
 
 use tumble::{ComponentType, Encoding, Layout};
 
-use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
+use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npz::open_npy;
 
 /// The order of a quaternion's components in a file.
@@ -21,6 +21,17 @@ pub enum ComponentOrder {
     Wxyz,
 }
 
+impl ComponentOrder {
+    /// As it is written: `xyzw`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Xyzw => "xyzw",
+            Self::Wxyz => "wxyz",
+        }
+    }
+}
+
 /// `NumPy`'s array files.
 pub static FORMAT: Format = Format {
     name: "npy",
@@ -30,6 +41,7 @@ pub static FORMAT: Format = Format {
     read: open_npy,
     write: Some(WriteResults {
         is_text: false,
+        order: ComponentOrder::Xyzw,
         layout: None,
         rotation_bytes: |encoding| encoding.bytes() as f64,
         rotations: |out, result| Ok(Box::new(NpyWriter::of(out, result)?)),
@@ -37,6 +49,7 @@ pub static FORMAT: Format = Format {
     }),
     write_motion: None,
     many_clips: false,
+    options: &FormatOption::OF_ARRAYS,
 };
 
 /// Rotations written at once, so that a signal is noticed soon: 4 MB.
@@ -69,7 +82,13 @@ impl<W: Write> NpyWriter<W> {
             Layout::TrackMajor => (tracks, samples),
             Layout::FrameMajor => (samples, tracks),
         };
-        Self::new(writer, rows, columns, result.order, result.encoding)
+        Self::new(
+            writer,
+            rows,
+            columns,
+            result.order.unwrap_or_default(),
+            result.encoding,
+        )
     }
 
     /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is

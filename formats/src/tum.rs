@@ -10,7 +10,7 @@ use tumble::{Channel, TrackError, TrackSet};
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::format::{Format, Loaded, MotionOptions, ReadOptions, WriteError};
+use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
 use crate::grid::{Precision, restore};
 use crate::keys::{Origin, select};
 use crate::motion::{Joint, Motion, Sampled, Transform};
@@ -37,6 +37,7 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write_motion),
     many_clips: false,
+    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
 };
 
 /// Reads a file; `-` is standard input.

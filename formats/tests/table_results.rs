@@ -235,7 +235,7 @@ impl Shape {
             set: &self.set,
             timeline: &self.timeline,
             layout,
-            order: ComponentOrder::Xyzw,
+            order: Some(ComponentOrder::Xyzw),
             encoding,
             notes: &NOTES[..1],
         }
@@ -330,7 +330,7 @@ fn every_representation_has_its_columns() {
             assert_eq!(found, wanted, "{format}: {encoding:?}");
         }
         let first = ResultShape {
-            order: ComponentOrder::Wxyz,
+            order: Some(ComponentOrder::Wxyz),
             ..shape.result(Layout::FrameMajor, Encoding::F32)
         };
         let batch = batches(format, &write(format, &first, &all, 6).unwrap()).remove(0);

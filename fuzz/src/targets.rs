@@ -13,7 +13,8 @@ use tumble::{
 use tumble_formats::Limits;
 use tumble_formats::ReadOptions;
 use tumble_formats::csv::CsvWriter;
-use tumble_formats::dat::{read_dat, write_dat};
+use tumble_formats::dat::read_dat;
+use tumble_formats::dat::write::write_dat;
 use tumble_formats::npy::{ComponentOrder, NpyWriter};
 use tumble_formats::times::read_times;
 use tumble_formats::{Diagnostic, Place};
@@ -200,11 +201,17 @@ pub(crate) fn outputs(bytes: &[u8]) -> u64 {
         .resolve(tracks, None)
         .expect("a few times");
     let mut text = Vec::new();
-    let written =
-        CsvWriter::new(&mut text, &set, &timeline, Encoding::F32).and_then(|mut writer| {
-            writer.write(&quats)?;
-            writer.finish()
-        });
+    let written = CsvWriter::new(
+        &mut text,
+        &set,
+        &timeline,
+        ComponentOrder::Wxyz,
+        Encoding::F32,
+    )
+    .and_then(|mut writer| {
+        writer.write(&quats)?;
+        writer.finish()
+    });
     assert_eq!(written.is_ok(), count == tracks * frames, "{written:?}");
     if written.is_ok() {
         let mut reader = csv::Reader::from_reader(&*text);

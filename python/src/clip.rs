@@ -56,6 +56,13 @@ pub(crate) struct Source {
     pub(crate) box_length: Option<f64>,
 }
 
+impl Clip {
+    /// The length of each box, where the clip is of a file about boxes.
+    pub(crate) fn box_length(&self) -> Option<f64> {
+        self.source.as_ref().and_then(|own| own.box_length)
+    }
+}
+
 #[pymethods]
 impl Clip {
     #[new]

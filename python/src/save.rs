@@ -31,14 +31,15 @@ const CHUNK: usize = 1 << 20;
 
 /// Writes clips to a file, whole or not at all; its format is that of the name's ending.
 ///
-/// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order="xyzw",
+/// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
 /// layout="track", overwrite=True, engine=None, **options)`
 ///
 /// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
 /// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
 /// into the same format baked: all else in the file stays as it is. Without, the keys are written
 /// at their own times. NPY, and CSV, Parquet and Arrow for clips without a skeleton, hold rotations
-/// alone, in the `order` and `layout` that is asked for; the bytes are those that the program
+/// alone, in the `order` ("xyzw" or "wxyz"; CSV has w first where none is asked for) and `layout`
+/// that is asked for; the bytes are those that the program
 /// `tumble` writes.
 ///
 /// `sequence`: of BVH's angles, such as "ZXY". `linear`: arrays of an NPZ file with a number for
@@ -55,7 +56,7 @@ const CHUNK: usize = 1 << 20;
 /// (1, 31, 4)
 #[pyfunction]
 #[pyo3(signature = (
-    path, clips, /, *, format=None, sequence=None, linear=vec![], order="xyzw", layout="track",
+    path, clips, /, *, format=None, sequence=None, linear=vec![], order=None, layout="track",
     overwrite=true, engine=None, **options
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -66,7 +67,7 @@ pub(crate) fn save(
     format: Option<&str>,
     sequence: Option<&str>,
     linear: Vec<String>,
-    order: &str,
+    order: Option<&str>,
     layout: &str,
     overwrite: bool,
     engine: Option<&Bound<'_, crate::engine::Engine>>,
@@ -84,6 +85,11 @@ pub(crate) fn save(
         .map(str::parse)
         .transpose()
         .map_err(|error| input(format!("sequence: {error}")))?;
+    let order = order.map(Order::named).transpose()?;
+    let order = order.map(|order| match order {
+        Order::Xyzw => ComponentOrder::Xyzw,
+        Order::Wxyz => ComponentOrder::Wxyz,
+    });
     let job = Save {
         format: format_named(name)?,
         motion: MotionOptions {
@@ -91,8 +97,9 @@ pub(crate) fn save(
             format: name.to_lowercase(),
             sequence,
             linear,
+            order,
+            box_length: clips.first().and_then(Clip::box_length),
         },
-        order: Order::named(order)?,
         layout: layout_named(layout)?,
         engine: match engine {
             Some(engine) => engine.get(),
@@ -144,7 +151,6 @@ pub(crate) fn clips_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Clip>> {
 struct Save<'a> {
     format: &'static Format,
     motion: MotionOptions,
-    order: Order,
     layout: Layout,
     engine: &'a crate::engine::Engine,
     request: &'a Request,
@@ -307,10 +313,7 @@ impl Save<'_> {
             set: &clip.set,
             timeline: &timeline,
             layout,
-            order: match self.order {
-                Order::Xyzw => ComponentOrder::Xyzw,
-                Order::Wxyz => ComponentOrder::Wxyz,
-            },
+            order: self.motion.order,
             encoding: Encoding::F32,
             notes: &notes,
         };

@@ -10,6 +10,7 @@ use tumble::{
     Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, TrackSet, VulkanError,
 };
 
+use crate::arguments::given::Given;
 use crate::batch::output::{Ended, Sink};
 use crate::commands::probe;
 use crate::messages::exit::{DEVICE, Failure, NO_VULKAN};
@@ -20,14 +21,16 @@ const CHUNK: usize = 1 << 20;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviceArguments {
-    /// first (Vulkan device, else the CPU), auto (the fastest for the job), cpu, vulkan, or
-    /// a device by its index or part of its name (`tumble devices`)
-    #[arg(long, value_name = "DEVICE", default_value = "first")]
+    /// auto (the CPU for fewer than 2^20 rotations and where there is no graphics card, else the
+    /// fastest by a measured probe), first (Vulkan device that is exact, else the CPU), cpu, vulkan,
+    /// or a device by its index or part of its name (`tumble devices`); the bits are the same
+    #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: Choice,
-    /// Use a device although its self-tests fail: its bits may differ from the CPU's
+    /// Use the device that --device names although its self-tests fail: its bits may differ from
+    /// the CPU's
     #[arg(long)]
     allow_inexact: bool,
-    /// Device memory to use besides results, such as 256MiB
+    /// Memory of a Vulkan device to use besides results, such as 256MiB
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     memory: Option<u64>,
     /// Threads of the CPU, for front ends that leave the choice.
@@ -69,7 +72,50 @@ pub(crate) struct Opened {
     /// Another device may stand in: the bits are the same.
     automatic: bool,
     /// Each job goes to the device that is fastest for it.
-    by_cost: bool,
+    by_cost: Option<ByCost>,
+}
+
+/// Fewer rotations than this the CPU has done before another device is open: the rule of
+/// [`Engine::auto`], here so that small jobs load no driver.
+const FEW: usize = 1 << 20;
+
+/// The devices of jobs whose size decides.
+struct ByCost {
+    cpu: Engine,
+    /// For large jobs; found when there is one.
+    large: Option<Engine>,
+    options: EngineOptions,
+}
+
+impl ByCost {
+    fn engine(&mut self, rotations: usize) -> Result<Engine, Error> {
+        if rotations < FEW {
+            return Ok(self.cpu.clone());
+        }
+        if self.large.is_none() {
+            self.large = Some(self.fastest()?);
+        }
+        Ok(self.large.as_ref().unwrap_or(&self.cpu).clone())
+    }
+
+    /// The fastest device for large jobs, with the options.
+    fn fastest(&self) -> Result<Engine, Error> {
+        if probe::drivers().is_err() {
+            return Ok(self.cpu.clone());
+        }
+        let found = Engine::auto(usize::MAX)?;
+        let Some(info) = found.device_info() else {
+            return Ok(self.cpu.clone());
+        };
+        if self.options.memory.is_none() {
+            return Ok(found);
+        }
+        let all = probe::devices()?.into_iter();
+        let same = all.filter(|device| device.name() == info.name).next();
+        same.map_or(Ok(found.clone()), |device| {
+            Engine::with_options(device, &self.options)
+        })
+    }
 }
 
 impl DeviceArguments {
@@ -84,14 +130,50 @@ impl DeviceArguments {
         }
     }
 
+    /// The device of a command line, which says nothing of a device that is not used.
     pub(crate) fn open(&self) -> Result<Opened, Failure> {
+        if self.device == Choice::Cpu && self.memory.is_some() {
+            let message = "--memory is that of a Vulkan device; leave it out with --device cpu";
+            return Err(Failure::usage(message));
+        }
+        if self.allow_inexact && matches!(self.device, Choice::Cpu | Choice::Auto) {
+            return Err(Failure::usage(
+                "--allow-inexact is for a Vulkan device that is asked for; give it too: --device \
+                 vulkan, or a name (`tumble devices`)",
+            ));
+        }
+        self.open_any()
+    }
+
+    /// The same device for commands that compare it with the CPU: the first Vulkan device where the
+    /// command line names none.
+    pub(crate) fn compared(&self, given: &Given) -> Self {
+        let device = match given.has("device") {
+            true => self.device.clone(),
+            false => Choice::First,
+        };
+        Self {
+            device,
+            ..self.clone()
+        }
+    }
+
+    /// The device, whatever else is said.
+    pub(crate) fn open_any(&self) -> Result<Opened, Failure> {
         match &self.device {
             Choice::Cpu => self.cpu("CPU".to_owned()),
-            Choice::Auto => Ok(Opened {
-                // Opened in this process when a job is large enough.
-                by_cost: probe::drivers().is_ok(),
-                ..self.cpu("CPU".to_owned())?
-            }),
+            Choice::Auto => {
+                let opened = self.cpu("CPU".to_owned())?;
+                let by_cost = ByCost {
+                    cpu: opened.engine.clone(),
+                    large: None,
+                    options: self.options(),
+                };
+                Ok(Opened {
+                    by_cost: Some(by_cost),
+                    ..opened
+                })
+            }
             Choice::First => match self.first_exact() {
                 Ok(engine) => Ok(Opened {
                     automatic: true,
@@ -128,7 +210,7 @@ impl DeviceArguments {
             engine,
             label,
             automatic: false,
-            by_cost: false,
+            by_cost: None,
         })
     }
 
@@ -153,7 +235,7 @@ impl Opened {
             engine,
             label,
             automatic: false,
-            by_cost: false,
+            by_cost: None,
         }
     }
 
@@ -164,8 +246,8 @@ impl Opened {
 
     /// Chooses the device for so many rotations, where cost decides.
     pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
-        if self.by_cost {
-            self.engine = Engine::auto(rotations)?;
+        if let Some(by_cost) = &mut self.by_cost {
+            self.engine = by_cost.engine(rotations)?;
             self.label = self.engine.device_name().to_owned();
             self.automatic = self.is_vulkan();
         }
@@ -233,6 +315,7 @@ impl Opened {
         self.engine = Engine::new(Device::Cpu)?;
         self.label = format!("CPU ({} failed)", self.label);
         self.automatic = false;
+        self.by_cost = None;
         Ok(())
     }
 
@@ -289,7 +372,7 @@ fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> {
             let known = devices
                 .iter()
                 .map(Device::name)
-                .chain(["first", "auto", "cpu", "vulkan"]);
+                .chain(["auto", "first", "cpu", "vulkan"]);
             let hint = words::nearest(given, known)
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default();
@@ -310,7 +393,7 @@ fn listing(devices: &[Device]) -> String {
         .map(|(index, device)| format!("  {index}  {}", device.name()))
         .collect();
     format!(
-        "  there are: first, auto, cpu, vulkan, and\n{}",
+        "  there are: auto, first, cpu, vulkan, and\n{}",
         lines.join("\n")
     )
 }

@@ -10,6 +10,7 @@ use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::reading::Reading;
+use crate::arguments::tracks::Tracks;
 use crate::messages::exit::{self, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
@@ -31,6 +32,8 @@ pub(crate) struct Inputs {
     max_size: u64,
     #[command(flatten)]
     pub(crate) reading: Reading,
+    #[command(flatten)]
+    pub(crate) tracks: Tracks,
 }
 
 /// `-` is standard input.
@@ -83,7 +86,14 @@ impl Inputs {
                 "standard input cannot be both {all}; put one in a file"
             )));
         }
-        Gathered::new(&self.paths, self.files_from.as_deref())
+        let gathered = Gathered::new(&self.paths, self.files_from.as_deref())?;
+        let format = |path: PathBuf| match self.reading.from {
+            Some(format) => format,
+            None => Format::detected(&path),
+        };
+        let formats = || gathered.paths().into_iter().map(format);
+        self.reading.check(formats).map_err(Failure::usage)?;
+        Ok(gathered)
     }
 
     /// As [`Inputs::gather`], the paths alone.

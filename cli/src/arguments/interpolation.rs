@@ -5,6 +5,7 @@ use std::fmt;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use tumble::method::KOCHANEK_BARTELS;
 use tumble::{Ends, METHODS, Method, Path, Speed, WrapMode};
 
 /// `--path` and `--ends`, which every method takes.
@@ -14,13 +15,8 @@ pub(crate) struct Manner {
     #[arg(long, value_name = "ENDS")]
     ends: Option<EndsArgument>,
     /// Which way round between neighbouring keys
-    #[arg(
-        long,
-        value_name = "PATH",
-        default_value = "shortest",
-        hide_default_value = true
-    )]
-    path: PathArgument,
+    #[arg(long, value_name = "PATH")]
+    path: Option<PathArgument>,
     /// How fast the curve is run through
     #[arg(long, value_name = "SPEED", default_value = "as-keyed")]
     speed: SpeedArgument,
@@ -31,14 +27,14 @@ pub(crate) struct Manner {
     #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
     after: OutsideArgument,
     /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
-    tension: f64,
+    #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
+    tension: Option<f64>,
     /// kochanek-bartels: -1 makes corners at the keys
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
-    continuity: f64,
+    #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
+    continuity: Option<f64>,
     /// kochanek-bartels: 1 follows the interval before a key, -1 that behind it
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, hide_default_value = true)]
-    bias: f64,
+    #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
+    bias: Option<f64>,
 }
 
 fn finite(text: &str) -> Result<f64, String> {
@@ -50,26 +46,10 @@ fn finite(text: &str) -> Result<f64, String> {
 
 impl Manner {
     pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
-        let still = DVec3::ZERO;
-        let ends = self.ends.map(|ends| match ends {
-            EndsArgument::Parabolic => Ends::Parabolic,
-            EndsArgument::Natural => Ends::Natural,
-            EndsArgument::Clamped => Ends::Clamped {
-                start: still,
-                end: still,
-            },
-            EndsArgument::Loop => Ends::Loop,
-            EndsArgument::Secant => Ends::Secant,
-            EndsArgument::Frozen => Ends::Frozen,
-        });
-        let path = match self.path {
-            PathArgument::Shortest => Path::Shortest,
-            PathArgument::AsAuthored => Path::AsAuthored,
-        };
         tumble::Interpolation {
             method,
-            path: method.path.unwrap_or(path),
-            ends: ends.unwrap_or(method.ends),
+            path: method.path.or(self.path()).unwrap_or_default(),
+            ends: self.ends.map_or(method.ends, EndsArgument::ends),
             quantity: tumble::Quantity::Rotation,
             speed: match self.speed {
                 SpeedArgument::AsKeyed => Speed::AsKeyed,
@@ -78,28 +58,90 @@ impl Manner {
             before: self.before.into(),
             after: self.after.into(),
             tcb: tumble::Tcb {
-                tension: self.tension,
-                continuity: self.continuity,
-                bias: self.bias,
+                tension: self.tension.unwrap_or_default(),
+                continuity: self.continuity.unwrap_or_default(),
+                bias: self.bias.unwrap_or_default(),
             },
         }
     }
+
+    fn path(self) -> Option<Path> {
+        Some(match self.path? {
+            PathArgument::Shortest => Path::Shortest,
+            PathArgument::AsAuthored => Path::AsAuthored,
+        })
+    }
+
+    /// Refuses what says nothing to any of these methods.
+    pub(crate) fn check(self, methods: &[Method]) -> Result<(), String> {
+        let names = || {
+            let names: Vec<&str> = methods.iter().map(|method| method.name).collect();
+            names.join(", ")
+        };
+        let is_none = |says: fn(&Method) -> bool| !methods.iter().any(says);
+        for (option, value) in [
+            ("--tension", self.tension),
+            ("--continuity", self.continuity),
+            ("--bias", self.bias),
+        ] {
+            if value.is_some() && is_none(|method| method.name == KOCHANEK_BARTELS.name) {
+                let own = KOCHANEK_BARTELS.name;
+                return Err(format!(
+                    "{option} is for {own}; add -m {own}, or leave it out"
+                ));
+            }
+        }
+        if self.ends.is_some() && is_none(|method| method.uses_neighbours) {
+            return Err(format!(
+                "--ends says nothing to {}, whose curves depend on the two keys that they join; \
+                 leave it out, or choose another method (-m)",
+                names()
+            ));
+        }
+        let path = self.path();
+        let takes = |method: &Method| method.path.is_none() || method.path == path;
+        if path.is_some() && !methods.iter().any(takes) {
+            return Err(format!(
+                "--path: {} always takes the way that the signs of the keys say; leave it out",
+                names()
+            ));
+        }
+        Ok(())
+    }
 }
 
+/// What happens at both ends of a curve, through rotations or through points.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum EndsArgument {
-    /// the parabola through the last three keys
+pub(crate) enum EndsArgument {
+    /// the parabola through the last three keys or points
     Parabolic,
-    /// no angular acceleration
+    /// no acceleration
     Natural,
     /// start and end at rest
     Clamped,
-    /// the velocity of slerp between the last two keys
+    /// the velocity of the straight way between the last two: slerp's, for rotations
     Secant,
-    /// the last key repeats the first
+    /// the last repeats the first
     Loop,
     /// the first and the last segment stand still
     Frozen,
+}
+
+impl EndsArgument {
+    pub(crate) fn ends(self) -> Ends {
+        let still = DVec3::ZERO;
+        match self {
+            Self::Parabolic => Ends::Parabolic,
+            Self::Natural => Ends::Natural,
+            Self::Clamped => Ends::Clamped {
+                start: still,
+                end: still,
+            },
+            Self::Loop => Ends::Loop,
+            Self::Secant => Ends::Secant,
+            Self::Frozen => Ends::Frozen,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -2,10 +2,12 @@
 
 pub(crate) mod device;
 pub(crate) mod gather;
+pub(crate) mod given;
 pub(crate) mod input;
 pub(crate) mod interpolation;
 pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;
 pub(crate) mod time;
+pub(crate) mod tracks;
 pub(crate) mod what;

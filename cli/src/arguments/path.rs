@@ -5,12 +5,12 @@ use std::path::Path;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{DVec3, Mat3, Quat};
-use tumble::{BodyAxis, Direction, Ends, Follow, Frame, PathSpeed, TrackSet, Twist, VectorMethod};
+use tumble::{BodyAxis, Direction, Follow, Frame, PathSpeed, TrackSet, Twist, VectorMethod};
 use tumble_formats::path::{Pace, open_paths};
 use tumble_formats::{Limits, ReadOptions};
 
 use crate::arguments::input;
-use crate::arguments::interpolation::each_once;
+use crate::arguments::interpolation::{EndsArgument, each_once};
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::Failure;
 
@@ -59,22 +59,6 @@ pub(crate) struct PathArguments {
     /// The axis of the body that faces up
     #[arg(long, value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
     upward: Axis,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum EndsArgument {
-    /// the parabola through the last three points
-    Parabolic,
-    /// no acceleration
-    Natural,
-    /// start and end at rest
-    Clamped,
-    /// the velocity of the straight line between the last two points
-    Secant,
-    /// the last point repeats the first
-    Loop,
-    /// the first and the last interval stand still
-    Frozen,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -265,17 +249,7 @@ impl PathArguments {
     ) -> Result<Follow, Failure> {
         Ok(Follow {
             method: self.path_method,
-            ends: match self.path_ends {
-                EndsArgument::Parabolic => Ends::Parabolic,
-                EndsArgument::Natural => Ends::Natural,
-                EndsArgument::Clamped => Ends::Clamped {
-                    start: DVec3::ZERO,
-                    end: DVec3::ZERO,
-                },
-                EndsArgument::Secant => Ends::Secant,
-                EndsArgument::Loop => Ends::Loop,
-                EndsArgument::Frozen => Ends::Frozen,
-            },
+            ends: self.path_ends.ends(),
             direction: self.direction.of(set, name)?,
             frame: match frame {
                 FrameArgument::Minimal => Frame::Minimal,

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use glam::DQuat;
 use tumble::FrameRate;
 use tumble_formats::adjust::{adjust, set_offsets};
-use tumble_formats::format::TimeUnit;
+use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
 use tumble_formats::{FORMATS, Format, Limits, Loaded, ReadOptions};
@@ -44,7 +44,7 @@ pub(crate) struct Reading {
     /// text with x y z a line, in the order of the joints
     #[arg(long, value_name = "FILE")]
     offsets: Option<PathBuf>,
-    /// Multiply all translations by this
+    /// Multiply all translations, and the length of boxes, by this
     #[arg(long, value_name = "FACTOR", value_parser = positive)]
     scale: Option<f64>,
     /// Turn all roots by a quarter about x, so that this axis is up where the other was
@@ -119,6 +119,43 @@ impl Reading {
         }
     }
 
+    /// Refuses what says nothing to any of the inputs' formats.
+    pub(crate) fn check<I: Iterator<Item = &'static Format>>(
+        &self,
+        formats: impl Fn() -> I,
+    ) -> Result<(), String> {
+        for (name, is_given, option) in [
+            ("raw-times", self.raw_times, FormatOption::RawTimes),
+            (
+                "duplicates",
+                self.duplicates.is_some(),
+                FormatOption::Duplicates,
+            ),
+            (
+                "source-fps",
+                self.source_fps.is_some(),
+                FormatOption::SourceRate,
+            ),
+            ("map", self.map.is_some(), FormatOption::Map),
+            (
+                "time-unit",
+                self.time_unit.is_some(),
+                FormatOption::TimeUnit,
+            ),
+        ] {
+            if is_given && !formats().any(|format| format.takes(option)) {
+                let all = FORMATS.iter().filter(|format| format.takes(option));
+                let all: Vec<&str> = all.map(|format| format.name).collect();
+                let own = formats().next().map_or("", |format| format.name);
+                return Err(format!(
+                    "--{name} says nothing to {own}; it is for {}; leave it out",
+                    all.join(", ")
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Leaves the clip that was asked for, in the units and axes that were asked for.
     pub(crate) fn apply(&self, loaded: &mut Loaded, path: &Path) -> Result<(), Failure> {
         if let Some(wanted) = &self.animation {
@@ -135,6 +172,13 @@ impl Reading {
                     )
                 })?;
             }
+        }
+        if self.up.is_some() && loaded.box_length.is_some() {
+            let message = "boxes of a chain hang down, whatever is up; leave out --up";
+            return Err(Failure::usage(format!("{}: {message}", name(path))));
+        }
+        if let (Some(scale), Some(length)) = (self.scale, &mut loaded.box_length) {
+            *length *= scale;
         }
         if self.scale.is_some() || self.up.is_some() {
             let quarter = std::f64::consts::FRAC_PI_2;

@@ -60,13 +60,7 @@ impl Sampling {
         if let Some(path) = &self.times {
             return Ok(Samples::Times(input::times(path)?));
         }
-        if let (Some(start), Some(end)) = (self.start, self.end)
-            && end < start
-        {
-            return Err(Failure::usage(format!(
-                "the range ends at {end} s, before it starts at {start} s; swap --start and --end"
-            )));
-        }
+        check_range(self.start, self.end)?;
         if let Some(meant) = broadcast_rate(self.fps) {
             words::warning(&format!(
                 "{} frames per second is taken as written; the broadcast rate is {meant}",
@@ -142,6 +136,18 @@ fn broadcast_rate(rate: FrameRate) -> Option<FrameRate> {
         .filter_map(|frames| FrameRate::new(frames * 1000, 1001).ok())
         .filter(|&exact| exact != rate)
         .find(|exact| (rate.per_second() / exact.per_second() - 1.0).abs() < MEANT)
+}
+
+/// Refuses a range that ends before it starts.
+pub(crate) fn check_range(start: Option<f64>, end: Option<f64>) -> Result<(), Failure> {
+    if let (Some(start), Some(end)) = (start, end)
+        && end < start
+    {
+        return Err(Failure::usage(format!(
+            "the range ends at {end} s, before it starts at {start} s; swap --start and --end"
+        )));
+    }
+    Ok(())
 }
 
 /// Parses a time.

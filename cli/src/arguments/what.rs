@@ -4,6 +4,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use tumble::{Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, Skeleton};
+use tumble_formats::npy::ComponentOrder;
+
+use crate::arguments::given::Given;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct What {
@@ -22,7 +25,7 @@ pub(crate) struct What {
     /// matrix: how it lies in memory
     #[arg(long, value_enum, default_value = "row")]
     major: Major,
-    /// world: each track's parent, counted from 0, -1 for none [default: a chain, -1,0,1 …]
+    /// world, transform: each track's parent, counted from 0, -1 for none [default: a chain, -1,0,1 …]
     #[arg(
         long,
         value_name = "LIST",
@@ -45,6 +48,8 @@ enum Output {
     World,
 }
 
+const QUATERNION: &str = "quaternion";
+
 /// A value of an argument, with its name and its help.
 type Named<T> = (&'static str, &'static str, T);
 
@@ -54,7 +59,8 @@ fn outputs() -> Vec<Named<Output>> {
     let others = others.map(|(name, help, own)| (name, help, Output::Encoded(own)));
     let poses = "(frames, tracks, 10): translation x y z, rotation x y z w, scale x y z";
     let world = "(frames, tracks, 7): where each box hangs, and how it is turned in the world";
-    let mut outputs = vec![("quaternion", "x y z w", Output::Quaternion)];
+    let order = "x y z w (--order); CSV: w x y z";
+    let mut outputs = vec![(QUATERNION, order, Output::Quaternion)];
     outputs.extend(others);
     outputs.extend([
         ("velocity", "angular velocity, rad/s", Output::Velocity),
@@ -108,6 +114,24 @@ enum AxesArgument {
     World,
 }
 
+/// The order of a quaternion's components.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum OrderArgument {
+    /// as in memory, glTF and SciPy
+    Xyzw,
+    /// as in .dat files
+    Wxyz,
+}
+
+impl OrderArgument {
+    pub(crate) fn order(self) -> ComponentOrder {
+        match self {
+            Self::Xyzw => ComponentOrder::Xyzw,
+            Self::Wxyz => ComponentOrder::Wxyz,
+        }
+    }
+}
+
 /// What whole poses hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PoseKind {
@@ -137,10 +161,19 @@ impl What {
         }
     }
 
-    /// Which track hangs from which, at the ends of boxes of that length.
-    pub(crate) fn skeleton(&self, tracks: usize, length: f64) -> Result<Skeleton, String> {
+    /// Which track hangs from which, at the ends of boxes of that length, and where each hangs.
+    pub(crate) fn skeleton(
+        &self,
+        tracks: usize,
+        length: f64,
+    ) -> Result<(Skeleton, Vec<Vec3>), String> {
+        let hung = |parent: &Option<usize>| match parent {
+            None => Vec3::ZERO,
+            Some(_) => Vec3::new(0.0, -length as f32, 0.0),
+        };
         let Some(parents) = &self.parents else {
-            return Ok(Skeleton::chain(tracks, length));
+            let offsets = (0..tracks).map(|track| hung(&track.checked_sub(1)));
+            return Ok((Skeleton::chain(tracks, length), offsets.collect()));
         };
         if parents.len() != tracks {
             let given = parents.len();
@@ -155,12 +188,10 @@ impl What {
                     .map_err(|_| format!("--parents: {parent} is no track; -1 is none")),
             })
             .collect::<Result<_, _>>()?;
-        let hung = |parent: &Option<usize>| match parent {
-            None => Vec3::ZERO,
-            Some(_) => Vec3::new(0.0, -length as f32, 0.0),
-        };
-        let offsets = parents.iter().map(hung).collect();
-        Skeleton::new(parents, offsets).map_err(|error| format!("--parents: {error}"))
+        let offsets: Vec<Vec3> = parents.iter().map(hung).collect();
+        let skeleton = Skeleton::new(parents, offsets.clone());
+        let skeleton = skeleton.map_err(|error| format!("--parents: {error}"))?;
+        Ok((skeleton, offsets))
     }
 
     /// Whether nothing else was asked for than the rotations themselves.
@@ -171,6 +202,60 @@ impl What {
     /// The axes of Euler angles.
     pub(crate) fn sequence(&self) -> Option<EulerSequence> {
         self.sequence
+    }
+
+    /// The name of what is written.
+    pub(crate) fn name(&self) -> &'static str {
+        match self.output {
+            Output::Quaternion => QUATERNION,
+            Output::Encoded(own) => own.name(),
+            Output::Velocity => "velocity",
+            Output::Acceleration => "acceleration",
+            Output::Transform => "transform",
+            Output::World => "world",
+        }
+    }
+
+    /// The parents that were given.
+    pub(crate) fn has_parents(&self) -> bool {
+        self.parents.is_some()
+    }
+
+    /// Refuses what says nothing to the numbers that are written. `is_angles`: angles are written
+    /// whatever `--output` says (BVH).
+    pub(crate) fn check(&self, given: &Given, is_angles: bool) -> Result<(), String> {
+        let name = self.name();
+        let usual = EncodingOptions {
+            order: MatrixOrder::RowMajor,
+            sequence: EulerSequence::XYZ,
+        };
+        let asks = |other: EncodingOptions| matches!(self.output, Output::Encoded(own) if own.with(usual) != own.with(other));
+        let is_matrix = asks(EncodingOptions {
+            order: MatrixOrder::ColumnMajor,
+            ..usual
+        });
+        let is_euler = asks(EncodingOptions {
+            sequence: "ZXY".parse().unwrap_or(EulerSequence::XYZ),
+            ..usual
+        });
+        let is_rate = matches!(self.output, Output::Velocity | Output::Acceleration);
+        for (option, applies, wants) in [
+            ("sequence", is_euler || is_angles, "--output euler, or BVH"),
+            ("major", is_matrix, "--output matrix or matrix-3x4"),
+            ("axes", is_rate, "--output velocity or acceleration"),
+            (
+                "parents",
+                self.poses().is_some(),
+                "--output world or transform",
+            ),
+        ] {
+            if given.has(option) && !applies {
+                return Err(format!(
+                    "--{option} says nothing to --output {name}; leave it out, or write {wants}"
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Whether whole poses are written, and which.

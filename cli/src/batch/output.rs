@@ -230,6 +230,11 @@ impl Target {
         self.place.path()
     }
 
+    /// Whether it is standard output.
+    pub(crate) fn is_standard(&self) -> bool {
+        self.place.is_standard()
+    }
+
     /// How messages call it, and by which of its format's endings it is called.
     pub(crate) fn motion_options(&self) -> MotionOptions {
         let ending = self.path().extension().unwrap_or_default();
@@ -246,8 +251,7 @@ impl Target {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             Failure::usage(format!(
-                "{self}: {} holds poses of whole clips; for --output, --encoding, --layout and \
-                 --order give {}",
+                "{self}: {} holds whole clips; for rotations or poses alone give {}",
                 self.format.name,
                 names.join(" or ")
             ))

@@ -13,6 +13,7 @@ use tumble_formats::sample::{Samples as Baked, continue_signs};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::gather::Gathered;
+use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::Results;
@@ -50,6 +51,8 @@ Examples:
   tumble follow points.npy --rate 1.5 --method linear --direction ahead:0.5 -o walk.csv
   tumble follow orbit.csv --direction at:0,1,0 --frame fixed -o camera.glb")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    given: Given,
     /// Paths: CSV or NPY files, directories of them, or patterns (`-`: standard input)
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
@@ -97,7 +100,7 @@ impl Arguments {
     /// All that decides over the bytes of a result besides its input.
     fn options(&self, samples: &Samples) -> String {
         let times = samples.digest();
-        format!("follow {:?} {:?} {times}", self.path, self.sampling)
+        format!("follow {} times={times}", self.given.options())
     }
 
     /// The bodies on the paths of one file, written.
@@ -142,9 +145,12 @@ pub(crate) fn followed(
     follow: &Follow,
     frames: &Frames,
 ) -> Result<Followed, Failure> {
-    room::in_memory(name, set, frames, 6)?;
+    let timeline = room::in_memory(name, set, frames, 6)?;
     let work = |engine: &Engine| engine.follow(set, follow, frames, Layout::FrameMajor);
-    let found = device.work(work).map_err(|error| failed(name, &error))?;
+    let found = device
+        .choose(set.track_count() * timeline.len())
+        .and_then(|()| device.work(work))
+        .map_err(|error| failed(name, &error))?;
     for warning in &found.warnings {
         words::warning(&format!("{name}: {warning}"));
     }

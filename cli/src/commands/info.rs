@@ -83,7 +83,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let several = loaded.clips.len() + loaded.refused.len() > 1;
         for clip in &loaded.clips {
             let animation = several.then(|| input::clip_name(clip));
-            summaries.push(Summary::new(input::name(path), animation, clip, &loaded));
+            let name = input::name(path);
+            let clip = arguments.inputs.tracks.select(clip, &name)?;
+            summaries.push(Summary::new(name, animation, &clip, &loaded));
         }
         for refused in &loaded.refused {
             words::note(&refused.to_string());

@@ -15,6 +15,7 @@ use tumble_routes::mesh::Mesh;
 use crate::arguments::device::Opened;
 use crate::arguments::input;
 use crate::arguments::path::{FrameArgument, PathArguments};
+use crate::arguments::tracks::Tracks;
 use crate::batch::room;
 use crate::commands::follow::followed;
 use crate::commands::route::surface::Surface;
@@ -192,11 +193,20 @@ pub(crate) fn is_travel(clip: &Motion) -> bool {
 
 impl Source {
     /// The paths of a file.
-    pub(crate) fn of_paths(path: &Path, arguments: &PathArguments) -> Result<Self, Failure> {
-        Ok(Self::Paths(
-            arguments.read(path)?,
-            Box::new(arguments.clone()),
-        ))
+    pub(crate) fn of_paths(
+        path: &Path,
+        arguments: &PathArguments,
+        tracks: &Tracks,
+    ) -> Result<Self, Failure> {
+        let paths = Motion {
+            set: arguments.read(path)?,
+            ..Motion::default()
+        };
+        let set = match tracks.of(&paths, &input::name(path))? {
+            Some(wanted) => paths.set.select(wanted),
+            None => paths.set,
+        };
+        Ok(Self::Paths(set, Box::new(arguments.clone())))
     }
 
     pub(crate) fn set(&self) -> &TrackSet {
@@ -255,7 +265,7 @@ impl Source {
                 })
             }
             (Self::Clip(clip), Maker::Method(interpolation)) => {
-                room::in_memory(name, set, frames, 7)?;
+                let timeline = room::in_memory(name, set, frames, 7)?;
                 let with = |method: Method| Interpolation {
                     method,
                     ..interpolation
@@ -266,7 +276,8 @@ impl Source {
                 };
                 let work = |engine: &Engine| methods.sample(engine, clip, frames);
                 let samples = device
-                    .work(work)
+                    .choose(tracks * timeline.len())
+                    .and_then(|()| device.work(work))
                     .map_err(|error: Error| Failure::evaluating(name, &error))?;
                 let poses = world(clip, &samples)
                     .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;

@@ -4,13 +4,14 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::TrackSet;
 use tumble::verify::Verification;
+use tumble::{Method, TrackSet};
 
 use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, Selection, methods};
+use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
 use crate::arguments::time::{Samples, Sampling};
 use crate::batch::room;
 use crate::messages::exit::{DIFFERENCE, Failure, for_each};
@@ -23,18 +24,28 @@ use crate::messages::words;
 Every rotation of every frame is computed three times: on the device, by its f32
 twin on the CPU, and by a textbook implementation in f64. The bits of the first two
 must agree; the error against the third has a bound. So is what follows from the
-rotations: velocities, accelerations, every encoding. Exit code 8 when not.
+rotations: velocities, accelerations, every encoding. Exit code 8 when not. The device is the
+first Vulkan device where --device names none: the CPU would be compared with itself.
 
 Examples:
   tumble verify data/pendulum.dat
-  tumble verify *.dat -m slerp --fps 240
+  tumble verify *.dat -m slerp,c2 --fps 240
   tumble verify data/pendulum.dat --device llvmpipe --json")]
 pub(crate) struct Arguments {
     #[command(flatten)]
+    given: Given,
+    #[command(flatten)]
     inputs: Inputs,
-    /// The method to verify, or all
-    #[arg(short, long, value_name = "METHOD", default_value = "all", value_parser = methods())]
-    method: Selection,
+    /// The methods to verify: one or several, or all
+    #[arg(
+        short,
+        long = "method",
+        value_name = "METHODS",
+        value_delimiter = ',',
+        default_value = "all",
+        value_parser = methods()
+    )]
+    methods: Vec<Selection>,
     #[command(flatten)]
     sampling: Sampling,
     #[command(flatten)]
@@ -60,8 +71,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .distinct(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
-    let device = arguments.device.open()?;
-    let steps = (inputs.len() * arguments.method.0.len()) as u64;
+    let methods = chosen(&arguments.methods);
+    arguments.manner.check(&methods).map_err(Failure::usage)?;
+    let device = arguments.device.compared(&arguments.given).open()?;
+    let steps = (inputs.len() * methods.len()) as u64;
     let mut progress = Progress::new("verifying", steps);
     let mut lines = Vec::new();
     let outcome = for_each(&inputs, |path| {
@@ -72,7 +85,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 1 => name.clone(),
                 _ => format!("{name} {}", input::clip_name(clip)),
             };
-            lines.extend(arguments.compare(&device, &samples, &name, &clip.set, &mut progress)?);
+            let clip = arguments.inputs.tracks.select(clip, &name)?;
+            let set = (&*name, &clip.set);
+            lines.extend(arguments.compare(&device, &samples, set, &methods, &mut progress)?);
         }
         Ok(())
     });
@@ -99,15 +114,15 @@ impl Arguments {
         &self,
         device: &Opened,
         samples: &Samples,
-        name: &str,
-        set: &TrackSet,
+        (name, set): (&str, &TrackSet),
+        methods: &[Method],
         progress: &mut Progress,
     ) -> Result<Vec<Line>, Failure> {
         let frames = progress.suspend(|| samples.of(set, name));
         // Two results are in memory at once.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();
-        for &method in &self.method.0 {
+        for &method in methods {
             let interpolation = self.manner.with(method);
             let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;

@@ -47,6 +47,12 @@ impl Failure {
         Self::new(code, "")
     }
 
+    /// The same, of an input.
+    pub(crate) fn of(mut self, input: &str) -> Self {
+        self.message = format!("{input}: {}", self.message);
+        self
+    }
+
     /// The same with more to say.
     pub(crate) fn hinted(mut self, hint: &str) -> Self {
         self.message.push_str(hint);

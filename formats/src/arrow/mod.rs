@@ -14,7 +14,8 @@ use arrow_ipc::reader::{read_dictionary, read_record_batch};
 use crate::arrow::messages::{Body, Messages};
 use crate::arrow::write::ArrowSink;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, Loaded, ReadOptions, WriteResults};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
+use crate::npy::ComponentOrder;
 use crate::source::Source;
 use crate::table::arrays::{Gather, chosen};
 use crate::table::clips::clips;
@@ -32,16 +33,18 @@ pub static FORMAT: Format = Format {
     read: open_arrow,
     write: Some(WriteResults {
         is_text: false,
+        order: ComponentOrder::Xyzw,
         layout: None,
         // The frame, the time and the track beside it.
         rotation_bytes: |encoding| encoding.bytes() as f64 + 20.0,
         rotations: |out, result| write_rotations(result, |table| ArrowSink::new(out, table)),
         poses: |poses, out| write_poses(poses, |table| ArrowSink::new(out, table)),
     }),
-    write_motion: Some(|clips, _, out| {
-        write_motion(clips, |table| ArrowSink::new(out, table)).map(|()| Vec::new())
+    write_motion: Some(|clips, options, out| {
+        write_motion(clips, options.order, |table| ArrowSink::new(out, table)).map(|()| Vec::new())
     }),
     many_clips: true,
+    options: &FormatOption::OF_TABLES,
 };
 
 /// Reads a file; `-` is standard input.

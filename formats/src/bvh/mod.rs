@@ -17,7 +17,7 @@ use crate::bvh::hierarchy::Hierarchy;
 use crate::bvh::motion::Rows;
 use crate::bvh::write::write_motion;
 use crate::diagnostic::Diagnostic;
-use crate::format::{Format, Loaded, ReadOptions};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::Source;
 use crate::text::lines::Lines;
 
@@ -35,6 +35,7 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write_motion),
     many_clips: false,
+    options: &[FormatOption::RawTimes, FormatOption::Sequence],
 };
 
 /// Reads a file; `-` is standard input.

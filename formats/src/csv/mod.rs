@@ -1,5 +1,5 @@
-//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame; or the
-//! numbers of another encoding in the place of those of quaternions.
+//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame, or with w behind z;
+//! or the numbers of another encoding in the place of those of quaternions.
 
 mod motion;
 pub mod read;
@@ -11,7 +11,11 @@ use glam::Quat;
 
 use tumble::{Encoding, Layout, Timeline, TrackSet};
 
-use crate::format::{Format, ResultShape, ResultWriter, WriteResults};
+use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
+use crate::npy::ComponentOrder;
+
+/// As in `.dat` files.
+pub(crate) const ORDER: ComponentOrder = ComponentOrder::Wxyz;
 
 /// Comma-separated values.
 pub static FORMAT: Format = Format {
@@ -22,6 +26,7 @@ pub static FORMAT: Format = Format {
     read: read::open_csv,
     write: Some(WriteResults {
         is_text: true,
+        order: ORDER,
         // A row holds one frame.
         layout: Some(Layout::FrameMajor),
         rotation_bytes: |_| 8.0, // four times a digit and a comma
@@ -30,14 +35,19 @@ pub static FORMAT: Format = Format {
                 set,
                 timeline,
                 encoding,
+                order,
                 ..
             } = result;
-            Ok(Box::new(CsvWriter::new(out, set, timeline, encoding)?))
+            let order = order.unwrap_or(ORDER);
+            Ok(Box::new(CsvWriter::new(
+                out, set, timeline, order, encoding,
+            )?))
         },
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),
     write_motion: Some(|clips, options, out| motion::write_motion(clips, options, out)),
     many_clips: false,
+    options: &FormatOption::OF_TABLES,
 };
 
 impl<W: Write> ResultWriter for CsvWriter<'_, W> {
@@ -55,6 +65,7 @@ impl<W: Write> ResultWriter for CsvWriter<'_, W> {
 pub struct CsvWriter<'a, W: Write> {
     csv: ::csv::Writer<W>,
     timeline: &'a Timeline,
+    order: ComponentOrder,
     encoding: Encoding,
     tracks: usize,
     /// The next frame to be written.
@@ -64,8 +75,8 @@ pub struct CsvWriter<'a, W: Write> {
 }
 
 impl<'a, W: Write> CsvWriter<'a, W> {
-    /// Writes the header for a set's rotations at the samples of a timeline. F16 and
-    /// Snorm16 are written as F32: digits cost nothing here.
+    /// Writes the header for a set's rotations at the samples of a timeline; the order is that of
+    /// quaternions. F16 and Snorm16 are written as F32: digits cost nothing here.
     ///
     /// # Errors
     /// When writing fails.
@@ -73,11 +84,13 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         writer: W,
         set: &TrackSet,
         timeline: &'a Timeline,
+        order: ComponentOrder,
         encoding: Encoding,
     ) -> io::Result<Self> {
         let mut writer = Self {
             csv: ::csv::Writer::from_writer(writer),
             timeline,
+            order,
             encoding,
             tracks: set.track_count(),
             frame: 0,
@@ -117,13 +130,18 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         Ok(())
     }
 
+    /// Whether w comes before the others.
+    fn is_turned(&self) -> bool {
+        self.encoding.is_quaternion() && self.order == ComponentOrder::Wxyz
+    }
+
     fn header(&mut self, set: &TrackSet) -> ::csv::Result<()> {
         self.csv.write_field("frame")?;
         self.csv.write_field("time")?;
         for track in 0..set.track_count() {
             let name = set.track_name(track);
             let mut components = self.encoding.components().to_vec();
-            if self.encoding.is_quaternion() {
+            if self.is_turned() {
                 components.rotate_right(1);
             }
             for component in components {
@@ -140,10 +158,11 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         let mut bytes = vec![0; self.encoding.bytes()];
         for q in frame {
             let mut numbers = q.to_array().to_vec();
-            if self.encoding.is_quaternion() {
-                // `w` first, as in `.dat` files, and never rounded.
+            if self.is_turned() {
                 numbers.rotate_right(1);
-            } else {
+            }
+            // Quaternions are never rounded.
+            if !self.encoding.is_quaternion() {
                 self.encoding.encode(&[q.to_array()], &mut bytes);
                 numbers = bytemuck::pod_collect_to_vec(&bytes);
             }

@@ -1,12 +1,13 @@
-//! A sampled clip as CSV: a row for each sample, w first, then what moves and scales.
+//! A sampled clip as CSV: a row for each sample, the rotation, then what moves and scales.
 
 use std::io::{self, Write};
 
-use crate::csv::io_error;
+use crate::csv::{ORDER, io_error};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
 use crate::names::distinct_names;
+use crate::npy::ComponentOrder;
 use crate::poses::{TRANSFORM, WORLD};
 
 /// Writes one clip; the names of its columns are those that are read.
@@ -33,7 +34,11 @@ pub(crate) fn write_motion(
     } else {
         &TRANSFORM[..3]
     };
-    let mut components = vec!["w", "x", "y", "z"];
+    let turned = options.order.unwrap_or(ORDER) == ComponentOrder::Wxyz;
+    let mut components = match turned {
+        true => vec!["w", "x", "y", "z"],
+        false => vec!["x", "y", "z", "w"],
+    };
     components.extend(moves.iter().filter(|_| moved));
     components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
     let all = sampled.times.len().saturating_mul(tracks);
@@ -61,7 +66,11 @@ pub(crate) fn write_motion(
         row.push((time + sampled.clip.time_offset as f64).to_string());
         for place in frame * tracks..(frame + 1) * tracks {
             let q = sampled.rotations[place];
-            row.extend([q.w, q.x, q.y, q.z].map(|number| number.to_string()));
+            let numbers = match turned {
+                true => [q.w, q.x, q.y, q.z],
+                false => q.to_array(),
+            };
+            row.extend(numbers.map(|number| number.to_string()));
             let vectors = [(moved, sampled.translations), (scaled, sampled.scales)];
             for (_, list) in vectors.into_iter().filter(|(there, _)| *there) {
                 row.extend(list[place].to_array().map(|number| number.to_string()));

@@ -29,7 +29,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, Loaded, ReadOptions};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::gltf::bake::Gltf;
 use crate::gltf::container::Container;
 use crate::gltf::json::Json;
@@ -50,6 +50,7 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write_new::write_new),
     many_clips: true,
+    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
 };
 
 /// The longest GLB: its header says the length in 32 bits.

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, Loaded, ReadOptions};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
 use crate::npz::archive::{Archive, ONLY_ARRAY};
 use crate::npz::document::NpzDocument;
@@ -38,6 +38,14 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write::write_npz),
     many_clips: false,
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::SourceRate,
+        FormatOption::Map,
+        FormatOption::TimeUnit,
+        FormatOption::Linear,
+    ],
 };
 
 /// Reads an NPZ file.

@@ -91,12 +91,11 @@ impl Plan {
             let message = format!("{} times for {} frames", times.len(), self.frames);
             return Err(archive.refuse(list.member, Code::Shape, message));
         }
-        if !array.header.element.is_float() {
-            let unit = options.time_unit.ok_or_else(|| {
-                let message =
-                    "the times are whole numbers; --time-unit says of what (s, ms, us, ns)";
-                archive.refuse(list.member, Code::NoRate, message.to_owned())
-            })?;
+        if !array.header.element.is_float() && options.time_unit.is_none() {
+            let message = "the times are whole numbers; --time-unit says of what (s, ms, us, ns)";
+            return Err(archive.refuse(list.member, Code::NoRate, message.to_owned()));
+        }
+        if let Some(unit) = options.time_unit {
             times
                 .iter_mut()
                 .for_each(|time| *time /= unit.per_second() as f64);

@@ -14,7 +14,8 @@ use parquet::arrow::arrow_reader::{
 };
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, Loaded, ReadOptions, WriteResults};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
+use crate::npy::ComponentOrder;
 use crate::parquet::pages::check_pages;
 use crate::parquet::write::ParquetSink;
 use crate::source::Source;
@@ -34,16 +35,19 @@ pub static FORMAT: Format = Format {
     read: open_parquet,
     write: Some(WriteResults {
         is_text: false,
+        order: ComponentOrder::Xyzw,
         layout: None,
         // Rotations that stand still are compressed to next to nothing.
         rotation_bytes: |_| 0.0,
         rotations: |out, result| write_rotations(result, |table| ParquetSink::new(out, table)),
         poses: |poses, out| write_poses(poses, |table| ParquetSink::new(out, table)),
     }),
-    write_motion: Some(|clips, _, out| {
-        write_motion(clips, |table| ParquetSink::new(out, table)).map(|()| Vec::new())
+    write_motion: Some(|clips, options, out| {
+        write_motion(clips, options.order, |table| ParquetSink::new(out, table))
+            .map(|()| Vec::new())
     }),
     many_clips: true,
+    options: &FormatOption::OF_TABLES,
 };
 
 const MAGIC: &[u8] = b"PAR1";

@@ -25,7 +25,7 @@ pub(crate) fn write_rotations<'a, S: Sink + 'a>(
         Encoding::F32 | Encoding::F16 | Encoding::Snorm16
     );
     let mut components = result.encoding.components().to_vec();
-    let turned = is_quaternion && result.order == ComponentOrder::Wxyz;
+    let turned = is_quaternion && result.order == Some(ComponentOrder::Wxyz);
     if turned {
         components.rotate_right(1);
     }
@@ -160,6 +160,7 @@ fn push_all(components: &mut [Component], numbers: &[f32]) {
 /// When writing fails, or a clip's lists are not of one length.
 pub(crate) fn write_motion<S: Sink>(
     clips: &[Sampled<'_>],
+    order: Option<ComponentOrder>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> Result<(), WriteError> {
     let has = |part: fn(&Sampled<'_>) -> bool| clips.iter().any(part);
@@ -173,7 +174,11 @@ pub(crate) fn write_motion<S: Sink>(
     } else {
         &TRANSFORM[..3]
     };
-    let mut components: Vec<&str> = vec!["x", "y", "z", "w"];
+    let turned = order == Some(ComponentOrder::Wxyz);
+    let mut components: Vec<&str> = match turned {
+        true => vec!["w", "x", "y", "z"],
+        false => vec!["x", "y", "z", "w"],
+    };
     components.extend(translation.iter().filter(|_| moved));
     components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
     let named = clips.len() > 1 || clips.iter().any(|clip| clip.clip.name.is_some());
@@ -197,7 +202,13 @@ pub(crate) fn write_motion<S: Sink>(
         if let Some((clip, _)) = &mut batch.clip {
             *clip = place as i32;
         }
-        write_clip(sampled, codes, (moved, scaled), &mut batch, &mut sink)?;
+        write_clip(
+            sampled,
+            codes,
+            [turned, moved, scaled],
+            &mut batch,
+            &mut sink,
+        )?;
         batch.flush(&mut sink)?;
         sink.end_part()?;
     }
@@ -245,7 +256,7 @@ fn notes(clips: &[Sampled<'_>]) -> Vec<(String, String)> {
 fn write_clip(
     sampled: &Sampled<'_>,
     codes: &[usize],
-    (moved, scaled): (bool, bool),
+    [turned, moved, scaled]: [bool; 3],
     batch: &mut Batch,
     sink: &mut impl Sink,
 ) -> io::Result<()> {
@@ -265,6 +276,9 @@ fn write_clip(
         let time = sampled.times[frame] + sampled.clip.time_offset as f64;
         batch.row(frame, time, codes[track]);
         let mut numbers = q.to_array().to_vec();
+        if turned {
+            numbers.rotate_right(1);
+        }
         if moved {
             let translation = sampled.translations.get(place);
             numbers.extend(translation.copied().unwrap_or_default().to_array());

@@ -334,7 +334,7 @@ def save(
     format: str | None = None,
     sequence: str | None = None,
     linear: Sequence[str] = ...,
-    order: _Order = "xyzw",
+    order: _Order | None = None,
     layout: _Layout = "track",
     overwrite: bool = True,
     engine: Engine | None = None,

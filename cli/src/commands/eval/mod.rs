@@ -1,36 +1,45 @@
 //! `tumble eval`: keyframe files in, rotations and whole poses at every frame out.
 
+mod applies;
 mod motion;
 mod rotations;
 
+use std::borrow::Cow;
+use std::cell::RefCell;
 use std::path::Path;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use tumble::{Encoding, Interpolation, Method};
+use serde::Serialize;
+use tumble::{Encoding, Engine, Error, Frames, Interpolation, Layout, Method};
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
 use tumble_formats::npy::ComponentOrder;
+use tumble_formats::sample::ChannelMethods;
 
 use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Wanted, wanted};
 use crate::arguments::results::{Results, each_file};
 use crate::arguments::time::{Samples, Sampling};
-use crate::arguments::what::{What, quaternions};
+use crate::arguments::what::{OrderArgument, What, quaternions};
 use crate::batch::digest;
 use crate::batch::output::Target;
 use crate::batch::place::Written;
 use crate::batch::run::Evaluated;
+use crate::commands::eval::applies::Kind;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is float32 of shape (tracks, frames, 4) in NPY (or as --output says), or CSV
-with a row for each frame. CPU and Vulkan give the same bits.
+The result is float32 of shape (tracks, frames, 4) in NPY, x y z w (or as --output, --layout
+and --order say), or CSV with a row for each frame, whose header names the columns, w x y z where
+--order says nothing. An option that says nothing to a result is refused. CPU and Vulkan give the
+same bits.
 
 Examples:
   tumble eval data/pendulum.dat -o out.npy
@@ -45,6 +54,8 @@ Examples:
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    given: Given,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
@@ -65,12 +76,13 @@ pub(crate) struct Arguments {
     manner: Manner,
     #[command(flatten)]
     device: DeviceArguments,
-    /// The order of NPY results in memory: (tracks, frames, 4) or (frames, tracks, 4)
+    /// The order of results: (tracks, frames, 4) or (frames, tracks, 4); poses and CSV come frame by
+    /// frame
     #[arg(long, value_enum, default_value = "track")]
     layout: LayoutArgument,
-    /// The order of a quaternion's components in NPY results
-    #[arg(long, value_enum, default_value = "xyzw")]
-    order: OrderArgument,
+    /// The order of a quaternion's components [default: xyzw; CSV of rotations: wxyz]
+    #[arg(long, value_enum)]
+    order: Option<OrderArgument>,
     /// What a component of NPY results is stored as
     #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
     encoding: Encoding,
@@ -83,6 +95,9 @@ pub(crate) struct Arguments {
     /// Also say which way each input takes to its rotations; all ways give the same bits
     #[arg(long)]
     explain_route: bool,
+    /// Print JSON about the results on standard output
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -93,19 +108,27 @@ enum LayoutArgument {
     Frame,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OrderArgument {
-    Xyzw,
-    Wxyz,
-}
-
-impl From<OrderArgument> for ComponentOrder {
-    fn from(order: OrderArgument) -> Self {
-        match order {
-            OrderArgument::Xyzw => Self::Xyzw,
-            OrderArgument::Wxyz => Self::Wxyz,
-        }
-    }
+/// What is told of one result with `--json`.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Told {
+    /// The input, and its animation where it has several.
+    input: String,
+    /// Where the result is; `-` is standard output.
+    output: String,
+    format: &'static str,
+    tracks: usize,
+    frames: usize,
+    /// Of the first and the last frame, seconds; nothing where there are none.
+    first_time: Option<f64>,
+    last_time: Option<f64>,
+    /// What was written of each rotation.
+    what: &'static str,
+    /// The components of a quaternion as they are written; nothing where none are, or where the
+    /// format has an order of its own.
+    order: Option<&'static str>,
+    method: String,
+    device: String,
+    seconds: f64,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -113,23 +136,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;
+    if let Some(method) = arguments.method.0 {
+        let checked = arguments.manner.check(&[method]);
+        checked.map_err(Failure::usage)?;
+    }
     let samples = arguments.sampling.samples()?;
     let plan = arguments.results.plan(&inputs)?;
-    let is_text = |target: &Target| target.format().write.as_ref().is_some_and(|it| it.is_text);
-    let short = arguments.encoding != Encoding::F32;
-    if short && plan.targets.iter().any(is_text) {
-        return Err(Failure::usage(
-            "--encoding is for binary results (NPY); text holds every digit",
-        ));
+    // All targets have one format.
+    if let Some(target) = plan.targets.first() {
+        arguments.check_before(target.format())?;
     }
-    let encoding = arguments.what.encoding(arguments.encoding);
-    if short && encoding != arguments.encoding {
-        return Err(Failure::usage("--encoding is for quaternions"));
+    if arguments.json && plan.targets.iter().any(Target::is_standard) {
+        return Err(Failure::usage(
+            "--json and the result cannot both go to standard output; give -o FILE",
+        ));
     }
     let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let results = &arguments.results;
-    results.make(
+    let mut told = Vec::new();
+    let outcome = results.make(
         &arguments.inputs,
         &inputs,
         plan,
@@ -144,33 +170,43 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 started: Instant::now(),
             };
             let name = input::name(path);
+            let latest = RefCell::new(None);
+            let mut done = |name: &str, evaluated: Evaluated| {
+                done(name, evaluated)?;
+                told.extend(latest.take());
+                Ok(())
+            };
             each_file(
                 &name,
                 (path, loaded),
                 target,
-                done,
-                |name, clips, target| job.evaluate(name, clips, target),
+                &mut done,
+                |name, clips, target| {
+                    let (evaluated, own) = job.evaluate(name, clips, target)?;
+                    latest.replace(Some(own));
+                    Ok(evaluated)
+                },
             )
         },
-    )
+    );
+    if arguments.json {
+        words::json(&told)?;
+    }
+    outcome
 }
 
 impl Arguments {
     /// All that decides over the bytes of a result besides its input.
     fn options(&self, samples: &Samples) -> String {
-        let times = samples.digest();
-        format!(
-            "{} {:?} {:?} {:?} {times} {:?} {:?} {:?} {:?} {:?}",
-            self.method,
-            self.inputs.reading,
-            self.linear,
-            self.sampling,
-            self.manner,
-            self.layout,
-            self.order,
-            self.encoding,
-            self.what
-        )
+        let mut options = self.given.options();
+        if let Samples::Times(_) = samples {
+            options += &format!(" times={}", samples.digest());
+        }
+        options
+    }
+
+    fn order(&self) -> Option<ComponentOrder> {
+        self.order.map(OrderArgument::order)
     }
 }
 
@@ -191,12 +227,36 @@ impl Job<'_> {
         name: &str,
         clips: &[&Motion],
         target: &Target,
-    ) -> Result<Evaluated, Failure> {
-        if self.is_baked(target) {
+    ) -> Result<(Evaluated, Told), Failure> {
+        for clip in clips {
+            self.check_manner(name, clip)?;
+        }
+        let what = &self.arguments.what;
+        let kind = match what.poses() {
+            _ if self.is_baked(target) => Kind::Baked,
+            _ if self.is_motion(clips, target) => Kind::Motion,
+            Some(_) => Kind::Poses,
+            None => Kind::Rotations,
+        };
+        let refused = |failure: Failure| failure.of(name);
+        self.arguments
+            .check(kind, target.format())
+            .map_err(refused)?;
+        if kind == Kind::Baked {
             return self.bake(name, clips, target);
         }
-        if self.is_motion(clips, target) {
-            return self.motion(name, clips, target);
+        let tracks = &self.arguments.inputs.tracks;
+        if kind == Kind::Motion {
+            if self.arguments.given.has("tracks") && self.keeps(target) {
+                let message = "some tracks make a new file: meshes and all else stay behind";
+                words::note(&format!("{name}: {message}"));
+            }
+            let selected = clips
+                .iter()
+                .map(|&clip| tracks.select_with_ancestors(clip, name));
+            let selected: Vec<Cow<'_, Motion>> = selected.collect::<Result<_, Failure>>()?;
+            let clips: Vec<&Motion> = selected.iter().map(|clip| &**clip).collect();
+            return self.motion(name, &clips, target);
         }
         let [clip] = clips else {
             let message = format!(
@@ -204,7 +264,68 @@ impl Job<'_> {
             );
             return Err(Failure::usage(message));
         };
-        self.rotations(name, clip, target)
+        if let (Kind::Poses, Some(poses)) = (kind, what.poses()) {
+            return self.poses(name, clip, poses, target);
+        }
+        self.rotations(name, &*tracks.select(clip, name)?, target)
+    }
+
+    /// Refuses what says nothing to the methods of a clip's channels, and units of what has none.
+    fn check_manner(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let own: Vec<Method> = methods
+            .groups_of(clip)
+            .iter()
+            .map(|group| group.0)
+            .collect();
+        let checked = self.arguments.manner.check(&own);
+        checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
+    }
+
+    /// Says which way a clip's rotations take, where that is asked for.
+    fn explain(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<(), Failure> {
+        if !self.arguments.explain_route {
+            return Ok(());
+        }
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let groups = methods.groups_of(clip);
+        let whole = groups.len() == 1;
+        for (method, tracks) in groups {
+            let set = clip.set.select(tracks.iter().copied());
+            let explain =
+                |engine: &Engine| engine.explain_route(&set, with(method), frames, layout);
+            let samples = frames.resolve(set.track_count(), clip.set.time_span());
+            let route = samples
+                .map_err(Error::from)
+                .and_then(|timeline| {
+                    self.device
+                        .choose(clip.set.track_count() * timeline.len())?;
+                    self.device.work(explain)
+                })
+                .map_err(|error| Failure::evaluating(name, &error))?;
+            words::note(&match whole {
+                true => format!("{name}: {route}"),
+                false => format!(
+                    "{name}, {} by {method}: {route}",
+                    words::count(tracks.len(), "track")
+                ),
+            });
+        }
+        Ok(())
     }
 
     /// What made a result, for formats that have room for it.
@@ -231,22 +352,39 @@ impl Job<'_> {
     fn evaluated(
         &self,
         name: &str,
-        (tracks, frames): (usize, usize),
+        (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
         method: &str,
         written: Written,
         target: &Target,
-    ) -> Evaluated {
+        order: Option<ComponentOrder>,
+    ) -> (Evaluated, Told) {
+        let elapsed = self.started.elapsed();
         let told = format!(
             "{name}: {} × {}, {method}, on {} in {} → {target}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
             self.device.label,
-            words::duration(self.started.elapsed()),
+            words::duration(elapsed),
         );
-        Evaluated {
+        let own = Told {
+            input: name.to_owned(),
+            output: target.path().display().to_string(),
+            format: target.format().name,
+            tracks,
+            frames,
+            first_time: span.map(|span| span.0),
+            last_time: span.map(|span| span.1),
+            what: self.arguments.what.name(),
+            order: order.map(ComponentOrder::name),
+            method: method.to_owned(),
+            device: self.device.label.clone(),
+            seconds: elapsed.as_secs_f64(),
+        };
+        let evaluated = Evaluated {
             written,
             device: self.device.label.clone(),
             told,
-        }
+        };
+        (evaluated, own)
     }
 }

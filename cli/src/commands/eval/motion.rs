@@ -1,8 +1,9 @@
 //! Results that are motion files themselves: clips with their skeletons, sampled.
 
-use tumble::{FrameRate, Frames};
+use glam::Vec3;
+use tumble::{FrameRate, Frames, Layout};
 
-use tumble_formats::format::{MotionOptions, WriteError};
+use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::{Diagnostic, sample};
 
@@ -10,15 +11,22 @@ use crate::arguments::time::Samples;
 use crate::batch::output::Target;
 use crate::batch::room;
 use crate::batch::run::Evaluated;
-use crate::commands::eval::Job;
+use crate::commands::eval::{Job, Told};
 use crate::messages::exit::Failure;
 
 impl Job<'_> {
     /// Whether the result is the input's own file with other keys.
     pub(super) fn is_baked(&self, target: &Target) -> bool {
-        let document = self.loaded.document.as_ref();
+        // Some tracks alone are another file.
         self.arguments.what.is_rotations()
-            && document.is_some_and(|document| document.writes(target.format()))
+            && !self.arguments.given.has("tracks")
+            && self.keeps(target)
+    }
+
+    /// Whether the input's own file can be written again.
+    pub(super) fn keeps(&self, target: &Target) -> bool {
+        let document = self.loaded.document.as_ref();
+        document.is_some_and(|document| document.writes(target.format()))
     }
 
     /// Whether the result is a motion file: of a format that holds nothing else, or of a clip that
@@ -33,7 +41,7 @@ impl Job<'_> {
         name: &str,
         clips: &[&Motion],
         target: &Target,
-    ) -> Result<Evaluated, Failure> {
+    ) -> Result<(Evaluated, Told), Failure> {
         let frames = |clip: &Motion| Ok(self.samples.of(&clip.set, name));
         let times: Vec<Frames> = clips
             .iter()
@@ -64,7 +72,7 @@ impl Job<'_> {
         name: &str,
         clips: &[&Motion],
         target: &Target,
-    ) -> Result<Evaluated, Failure> {
+    ) -> Result<(Evaluated, Told), Failure> {
         let (
             Some(document),
             &Samples::Rate {
@@ -98,6 +106,8 @@ impl Job<'_> {
         MotionOptions {
             sequence: self.arguments.what.sequence(),
             linear: self.arguments.linear.clone(),
+            order: self.arguments.order(),
+            box_length: self.loaded.box_length,
             ..target.motion_options()
         }
     }
@@ -111,11 +121,14 @@ impl Job<'_> {
         rate: Option<FrameRate>,
         target: &Target,
         write: impl FnOnce(&[Sampled<'_>], &mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
-    ) -> Result<Evaluated, Failure> {
+    ) -> Result<(Evaluated, Told), Failure> {
         let mut all: Vec<sample::Samples> = Vec::new();
         for (clip, frames) in clips.iter().zip(frames) {
+            let boxes = target.format().takes(FormatOption::BoxLength);
+            self.check_scale(name, clip, boxes)?;
             // Rotations, translations, scales, and what they are written as.
             room::in_memory(name, &clip.set, frames, 6)?;
+            self.explain(name, clip, frames, Layout::FrameMajor)?;
             all.push(self.sample(name, clip, frames)?);
         }
         let method = self.arguments.method.to_string();
@@ -126,12 +139,36 @@ impl Job<'_> {
         let written = target.write_motion(|out| write(&sampled, out))?;
         let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
         let samples = all.iter().map(|samples| samples.times.len()).sum();
-        Ok(self.evaluated(
-            name,
-            (tracks.unwrap_or(0), samples),
-            &method,
-            written,
-            target,
-        ))
+        let times = || all.iter().flat_map(|samples| &samples.times).copied();
+        let span = times().reduce(f64::min).zip(times().reduce(f64::max));
+        let format = target.format();
+        let own = format
+            .takes(FormatOption::Order)
+            .then_some(format.write.as_ref())
+            .flatten();
+        let order = own.map(|write| self.arguments.order().unwrap_or(write.order));
+        let size = (tracks.unwrap_or(0), samples, span);
+        Ok(self.evaluated(name, size, &method, written, target, order))
+    }
+
+    /// Refuses to scale a clip that goes nowhere. `boxes`: the result has the length of boxes.
+    pub(super) fn check_scale(
+        &self,
+        name: &str,
+        clip: &Motion,
+        boxes: bool,
+    ) -> Result<(), Failure> {
+        let is_placed = clip.has_vectors()
+            || clip
+                .skeleton
+                .iter()
+                .any(|joint| joint.rest.translation != Vec3::ZERO)
+            || boxes && self.loaded.box_length.is_some();
+        if self.arguments.given.has("scale") && !is_placed {
+            return Err(Failure::usage(format!(
+                "{name}: --scale says nothing to a clip without translations; leave it out"
+            )));
+        }
+        Ok(())
     }
 }

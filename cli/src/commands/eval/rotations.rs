@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 use tumble::method::SLERP;
-use tumble::{Engine, Error, Frames, Layout};
+use tumble::{Engine, Error, Frames, Layout, Timeline};
 use tumble_formats::format::ResultShape;
 use tumble_formats::motion::Motion;
+use tumble_formats::npy::ComponentOrder;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
@@ -14,18 +15,17 @@ use crate::arguments::what::PoseKind;
 use crate::batch::output::Target;
 use crate::batch::room;
 use crate::batch::run::Evaluated;
-use crate::commands::eval::{Job, LayoutArgument};
+use crate::commands::eval::{Job, LayoutArgument, Told};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::words;
 
 impl Job<'_> {
-    /// One clip's rotations, or what is made of them, or whole poses.
+    /// One clip's rotations, or what is made of them.
     pub(super) fn rotations(
         &mut self,
         name: &str,
         clip: &Motion,
         target: &Target,
-    ) -> Result<Evaluated, Failure> {
+    ) -> Result<(Evaluated, Told), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
         let frames = self.samples.of(set, name);
         let timeline = frames
@@ -41,24 +41,27 @@ impl Job<'_> {
         if let time::Samples::Rate { rate, .. } = self.samples {
             notes.push(("rate", rate.to_string()));
         }
+        let format = target.results()?;
+        let order = arguments.order().unwrap_or(format.order);
+        let order = encoding.is_quaternion().then_some(order);
+        notes.extend(order.map(|order| ("order", order.name().to_owned())));
         let result = ResultShape {
             name,
             set,
             timeline: &timeline,
-            layout: target.results()?.layout.unwrap_or(wished),
-            order: arguments.order.into(),
+            layout: format.layout.unwrap_or(wished),
+            order,
             encoding,
             notes: &notes,
         };
-        if let Some(kind) = arguments.what.poses() {
-            return self.poses(&result, clip, &frames, kind, target);
-        }
+        self.explain(name, clip, &frames, result.layout)?;
         let (method, with) = self.methods();
         let methods = ChannelMethods {
             method,
             with: &with,
         };
         let size = (set.track_count(), timeline.len());
+        let told = (size.0, size.1, span(&timeline));
         let Some(method) = methods.method_of(clip) else {
             // Tracks of different samplers are evaluated apart, and put together in memory.
             room::in_memory(name, set, &frames, 2)?;
@@ -72,66 +75,80 @@ impl Job<'_> {
                 })
                 .map_err(|error| Failure::evaluating(name, &error))?;
             let written = target.write_whole(&result, &found)?;
-            return Ok(self.evaluated(name, size, "each channel's own method", written, target));
+            let method = "each channel's own method";
+            return Ok(self.evaluated(name, told, method, written, target, order));
         };
         let interpolation = with(method);
-        if arguments.explain_route {
-            let explain =
-                |engine: &Engine| engine.explain_route(set, interpolation, &frames, result.layout);
-            let route = self
-                .device
-                .choose(size.0 * size.1)
-                .and_then(|()| self.device.work(explain))
-                .map_err(|error| Failure::evaluating(name, &error))?;
-            words::note(&format!("{name}: {route}"));
-        }
         let written = target.write_rotations(&result, |sink| {
             self.device
                 .stream(set, interpolation, &frames, result.layout, sink)
         })?;
-        Ok(self.evaluated(name, size, method.name, written, target))
+        Ok(self.evaluated(name, told, method.name, written, target, order))
     }
 
     /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each
-    /// of which hangs at the end of the one before it.
-    fn poses(
+    /// of which hangs at the end of the one before it. All tracks are evaluated, those that are
+    /// asked for are written: where a joint is depends on all that it hangs on.
+    pub(super) fn poses(
         &mut self,
-        result: &ResultShape<'_>,
+        name: &str,
         clip: &Motion,
-        frames: &Frames,
         kind: PoseKind,
         target: &Target,
-    ) -> Result<Evaluated, Failure> {
-        let ResultShape {
-            name,
-            set,
-            timeline,
-            ..
-        } = *result;
-        let size = (set.track_count(), timeline.len());
+    ) -> Result<(Evaluated, Told), Failure> {
+        let set = &clip.set;
+        let frames = &self.samples.of(set, name);
+        let timeline = frames
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
         // The rotations, and twice what becomes of them.
         room::in_memory(name, set, frames, 8)?;
-        let numbers = if clip.skeleton.is_empty() && !clip.has_vectors() {
+        self.check_scale(name, clip, true)?;
+        self.explain(name, clip, frames, Layout::FrameMajor)?;
+        let mut numbers = if clip.skeleton.is_empty() && !clip.has_vectors() {
             self.chain(name, clip, frames, kind)?
         } else {
+            if self.arguments.what.has_parents() {
+                let message = "has a skeleton, or places, of its own; leave out --parents";
+                return Err(Failure::usage(format!("{name}: {message}")));
+            }
             let samples = self.sample(name, clip, frames)?;
             numbers_of(clip, &samples, kind)
                 .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?
         };
-        let components: &[&str] = match kind {
-            PoseKind::World => &WORLD,
-            PoseKind::Transform => &TRANSFORM,
+        let mut components = match kind {
+            PoseKind::World => WORLD.to_vec(),
+            PoseKind::Transform => TRANSFORM.to_vec(),
         };
+        let width = components.len();
+        let order = self.arguments.order().unwrap_or_default();
+        if let Some(place) = components.iter().position(|name| *name == "x")
+            && order == ComponentOrder::Wxyz
+        {
+            components[place..place + 4].rotate_right(1);
+            let poses = numbers.chunks_exact_mut(width);
+            poses.for_each(|pose| pose[place..place + 4].rotate_right(1));
+        }
+        let selected = self.arguments.inputs.tracks.of(clip, name)?;
+        if let Some(tracks) = &selected {
+            let frames = numbers.chunks_exact(width * set.track_count());
+            let pose = |frame: &[f32], track: usize| frame[track * width..][..width].to_vec();
+            let own =
+                frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
+            numbers = own.collect();
+        }
+        let set = &selected.map_or_else(|| set.clone(), |tracks| set.select(tracks));
+        let size = (set.track_count(), timeline.len(), span(&timeline));
         let poses = Poses {
             set,
-            timeline,
-            components,
+            timeline: &timeline,
+            components: &components,
             numbers: &numbers,
         };
         let write = target.results()?.poses;
         let written = target.prepare(|out| write(&poses, out))?;
         let method = self.arguments.method.to_string();
-        Ok(self.evaluated(name, size, &method, written, target))
+        Ok(self.evaluated(name, size, &method, written, target, Some(order)))
     }
 
     /// The poses of boxes that hang at the ends of others.
@@ -144,7 +161,7 @@ impl Job<'_> {
     ) -> Result<Vec<f32>, Failure> {
         let set = &clip.set;
         let (tracks, length) = (set.track_count(), self.loaded.box_length.unwrap_or(1.0));
-        let skeleton = self
+        let (skeleton, offsets) = self
             .arguments
             .what
             .skeleton(tracks, length)
@@ -170,13 +187,9 @@ impl Job<'_> {
                         Ok(numbers.collect::<Vec<f32>>())
                     }
                     PoseKind::Transform => {
-                        let hung = |place: usize| match place % tracks {
-                            0 => 0.0,
-                            _ => -length as f32,
-                        };
-                        let quats = local.as_quats().iter().enumerate();
-                        let numbers = quats.flat_map(|(place, q)| {
-                            [0.0, hung(place), 0.0, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
+                        let hung = offsets.iter().cycle();
+                        let numbers = local.as_quats().iter().zip(hung).flat_map(|(q, at)| {
+                            [at.x, at.y, at.z, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
                         });
                         Ok(numbers.collect())
                     }
@@ -207,6 +220,12 @@ impl Job<'_> {
         });
         found.map_err(|error| Failure::evaluating(name, &error))
     }
+}
+
+/// The first and the last time of a result.
+fn span(timeline: &Timeline) -> Option<(f64, f64)> {
+    let last = timeline.len().checked_sub(1)?;
+    Some((timeline.time(0, 0), timeline.time(0, last)))
 }
 
 /// The numbers of the poses of a clip with a skeleton, or with translations or scales.

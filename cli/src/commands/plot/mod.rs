@@ -68,17 +68,22 @@ pub(crate) struct Arguments {
         long = "dimension",
         value_name = "D",
         value_delimiter = ',',
-        conflicts_with = "boxes"
+        conflicts_with_all = ["boxes", "tracks"]
     )]
     dimensions: Vec<usize>,
     /// Only this box, counted from 1 (may be repeated)
-    #[arg(long = "box", value_name = "N", value_delimiter = ',')]
+    #[arg(
+        long = "box",
+        value_name = "N",
+        value_delimiter = ',',
+        conflicts_with = "tracks"
+    )]
     boxes: Vec<usize>,
     /// sphere: which axis of a box is followed; -y points along it
     #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
     axis: AxisArgument,
     /// Every figure of a report, and a page that shows them, in a directory
-    #[arg(long, conflicts_with_all = ["show", "dimensions", "boxes"])]
+    #[arg(long, conflicts_with_all = ["show", "dimensions", "boxes", "tracks", "axis"])]
     report: bool,
     /// svg or png [default: by the name of the output, else svg]
     #[arg(long, value_enum)]
@@ -172,6 +177,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     refuse_shared_names(&inputs)?;
     let out = arguments.place(&inputs)?;
     let methods = arguments.methods();
+    arguments.manner.check(&methods).map_err(Failure::usage)?;
     let interpolations: Vec<Interpolation> = methods
         .iter()
         .map(|&method| arguments.manner.with(method))
@@ -200,9 +206,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             return studio.draw(&figure, &file);
         }
-        let set = arguments.inputs.load_one(path)?.set;
+        let clip = arguments.inputs.load_one(path)?;
+        let tracks = arguments.inputs.tracks.of(&clip, &name)?;
+        let set = clip.set;
         let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
-        let subjects = arguments.subjects(&set, &name)?;
+        let subjects = arguments.subjects(&set, tracks, &name)?;
         let pictures = match &out {
             Out::One(file) => vec![(
                 file.clone(),
@@ -265,7 +273,7 @@ impl Arguments {
         match self.show {
             None | Some(Show::Path) if is_path_file(path) => {
                 let frames = self.path.frames().into_iter().map(Maker::Frame);
-                let source = travel::Source::of_paths(path, &self.path)?;
+                let source = travel::Source::of_paths(path, &self.path, &self.inputs.tracks)?;
                 Ok(Some((source, frames.collect())))
             }
             Some(Show::Path) => {
@@ -275,6 +283,7 @@ impl Arguments {
                     return Err(Failure::usage(format!("{name}: {message}")));
                 }
                 let methods = interpolations.iter().copied().map(Maker::Method);
+                let clip = self.inputs.tracks.select(&clip, &name)?.into_owned();
                 let source = travel::Source::Clip(Box::new(clip));
                 Ok(Some((source, methods.collect())))
             }
@@ -320,7 +329,12 @@ impl Arguments {
     }
 
     /// What to draw of a set; refuses what is not there.
-    fn subjects(&self, set: &TrackSet, name: &str) -> Result<Subjects, Failure> {
+    fn subjects(
+        &self,
+        set: &TrackSet,
+        tracks: Option<Vec<usize>>,
+        name: &str,
+    ) -> Result<Subjects, Failure> {
         let boxes = set.track_count();
         if !self.dimensions.is_empty() && self.show() != Show::Components {
             return Err(Failure::usage(
@@ -344,7 +358,7 @@ impl Arguments {
         let dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
         let mut own = chosen("box", &self.boxes, 0..boxes)?;
         if own.is_empty() {
-            own = (0..boxes).collect();
+            own = tracks.unwrap_or_else(|| (0..boxes).collect());
         }
         Ok(Subjects {
             boxes: own,

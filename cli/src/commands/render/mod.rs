@@ -175,15 +175,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             words::count(methods.len(), "method")
         )));
     }
+    arguments.manner.check(&methods).map_err(Failure::usage)?;
     let kind = Kind::of(&arguments.out)?;
     if kind != Kind::Folder {
         Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
     }
     let name = input::name(path);
-    let source = match is_path_file(path) {
-        true => Source::of_paths(path, &arguments.path)?,
-        false => Source::Clip(Box::new(arguments.inputs.load_one(path)?)),
-    };
+    let source = arguments.source(path, &name)?;
     let set = source.set();
     let mut frames = samples.of(set, &name);
     let mut timeline = frames
@@ -227,6 +225,24 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// The paths or the clip of a file: of clips whose boxes hang on each other also what carries the
+    /// tracks that are asked for.
+    fn source(&self, path: &Path, name: &str) -> Result<Source, Failure> {
+        let tracks = &self.inputs.tracks;
+        if is_path_file(path) {
+            return Source::of_paths(path, &self.path, tracks);
+        }
+        let clip = self.inputs.load_one(path)?;
+        let wanted = match is_travel(&clip) {
+            true => tracks.of(&clip, name)?,
+            false => tracks.chain(&clip, name)?,
+        };
+        Ok(Source::Clip(Box::new(match wanted {
+            Some(wanted) => clip.select(&wanted),
+            None => clip,
+        })))
+    }
+
     /// What is drawn: bodies where there are paths, else a chain, by each frame or method.
     fn actors(
         &self,

@@ -2,6 +2,7 @@
 
 mod picture;
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -10,13 +11,13 @@ use tumble::{
     Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, Smoothing,
     SmoothingEnds, SmoothingKernel, Vectors,
 };
-use tumble_formats::format::ResultShape;
+use tumble_formats::format::{MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};
-use tumble_formats::npy::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::gather::Gathered;
+use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::results::{Results, each_file};
 use crate::batch::output::Target;
@@ -41,6 +42,8 @@ Examples:
   tumble smooth walk.bvh -o calm.bvh --plot calm.svg
   tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    given: Given,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
@@ -92,10 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let plan = arguments.results.plan(&files)?;
     let plot = arguments.plot(&files)?;
     let mut device = arguments.device.open()?;
-    let options = format!(
-        "smooth {smoothing:?} {:?} {:?}",
-        arguments.fps, arguments.inputs.reading
-    );
+    let options = format!("smooth {}", arguments.given.options());
     arguments.results.make(
         &arguments.inputs,
         &files,
@@ -104,11 +104,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         |path, loaded, target, done| {
             let mut make = |name: &str, clips: &[&Motion], target: &Target| {
                 let started = Instant::now();
+                let tracks = &arguments.inputs.tracks;
+                let own = |clip| match target.format().takes_motion(&[clip]) {
+                    true => tracks.select_with_ancestors(clip, name),
+                    false => tracks.select(clip, name),
+                };
+                let clips = clips.iter().map(|&clip| own(clip));
+                let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
+                let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
                 let samples = clips
                     .iter()
                     .map(|clip| smoothed(&mut device, name, clip, &smoothing, arguments.fps))
                     .collect::<Result<Vec<_>, Failure>>()?;
-                if let ([clip], [own], Some(place)) = (clips, &*samples, &plot) {
+                if let ([clip], [own], Some(place)) = (&*clips, &*samples, &plot) {
                     let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
                     let names: Vec<String> = names.collect();
                     let subject = Subject {
@@ -123,7 +131,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     };
                     picture::draw(&subject, place)?;
                 }
-                let written = write(name, clips, &samples, &smoothing, target)?;
+                let written = write(
+                    name,
+                    &clips,
+                    &samples,
+                    &smoothing,
+                    (target, loaded.box_length),
+                )?;
                 let times = samples.iter().map(|own| own.after.times.len()).sum();
                 let told = format!(
                     "{name}: {}, {}, on {} in {} → {target}",
@@ -206,7 +220,8 @@ fn smoothed(
             }
         },
     };
-    room::in_memory(name, &clip.set, &frames, 7)?;
+    let timeline = room::in_memory(name, &clip.set, &frames, 7)?;
+    let rotations = clip.set.track_count() * timeline.len();
     let methods = ChannelMethods {
         method: None,
         with: &|method: Method| Interpolation::from(method),
@@ -227,7 +242,8 @@ fn smoothed(
         Ok::<_, Error>((before, samples))
     };
     let (before, after) = device
-        .work(work)
+        .choose(rotations)
+        .and_then(|()| device.work(work))
         .map_err(|error| Failure::evaluating(name, &error))?;
     Ok(Smoothed {
         before,
@@ -242,7 +258,7 @@ fn write(
     clips: &[&Motion],
     samples: &[Smoothed],
     smoothing: &Smoothing,
-    target: &Target,
+    (target, box_length): (&Target, Option<f64>),
 ) -> Result<Written, Failure> {
     let notes = [
         ("kernel", smoothing.kernel.to_string()),
@@ -259,7 +275,7 @@ fn write(
             set: &clip.set,
             timeline: &timeline,
             layout: Layout::TrackMajor,
-            order: ComponentOrder::Xyzw,
+            order: None,
             encoding: tumble::Encoding::F32,
             notes: &notes,
         };
@@ -277,7 +293,10 @@ fn write(
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
         .map(|(clip, own)| own.after.of(clip, own.rate, &notes))
         .collect();
-    let options = target.motion_options();
+    let options = MotionOptions {
+        box_length,
+        ..target.motion_options()
+    };
     let Some(write) = format.write_motion else {
         let message = format!(
             "{target}: {} holds one animation; choose one with --animation",

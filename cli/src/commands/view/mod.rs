@@ -108,6 +108,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         refused += loaded.refused.len();
         let several = loaded.clips.len() + loaded.refused.len() > 1;
         for clip in loaded.clips {
+            let clip = arguments.own_tracks(clip, path)?;
             let one = Shown::new(path, clip, loaded.box_length, several);
             if one.clip.set.is_empty() {
                 words::note(&format!("{}: nothing moves; it is left out", one.name));
@@ -149,6 +150,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// The tracks of a clip that are asked for, and what they hang on: joints, or the boxes of a
+    /// chain before them.
+    fn own_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
+        let (name, tracks) = (input::name(path), &self.inputs.tracks);
+        if clip.skeleton.is_empty() && !clip.has_vectors() {
+            let chain = tracks.chain(&clip, &name)?;
+            return Ok(chain.map_or(clip.clone(), |chain| clip.select(&chain)));
+        }
+        Ok(tracks.select_with_ancestors(&clip, &name)?.into_owned())
+    }
+
     /// The page of clips that are read already, of a file of that name.
     pub(crate) fn html(
         &self,

@@ -1,0 +1,221 @@
+//! `--tracks`: some tracks only.
+
+use std::borrow::Cow;
+use std::str::FromStr;
+
+use clap::Args;
+use glob::{MatchOptions, Pattern};
+use tumble_formats::motion::Motion;
+
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Which tracks of each clip.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct Tracks {
+    /// Only these tracks: names, patterns ('*Hand*'), places from 0, and ranges of them (3..7, both
+    /// ends are of it); clips keep the joints that they hang on too
+    #[arg(long = "tracks", value_name = "LIST", value_delimiter = ',', help_heading = READING)]
+    tracks: Vec<Selector>,
+}
+
+const READING: &str = "Reading motion files";
+
+/// One entry of the list. A name counts before what it could mean else.
+#[derive(Debug, Clone)]
+struct Selector {
+    text: String,
+    meaning: Meaning,
+}
+
+#[derive(Debug, Clone)]
+enum Meaning {
+    Name,
+    Places(usize, usize),
+    Pattern(Pattern),
+}
+
+impl FromStr for Selector {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (first, last) = text.split_once("..").unwrap_or((text, text));
+        let meaning = match (first.parse(), last.parse()) {
+            (Ok(first), Ok(last)) if first <= last => Meaning::Places(first, last),
+            (Ok(first), Ok(last)) => {
+                return Err(format!(
+                    "the range ends at {last}, before it starts at {first}"
+                ));
+            }
+            _ if text.is_empty() => {
+                return Err("give a name, a place, a range or a pattern".to_owned());
+            }
+            _ if text.contains(['*', '?', '[']) => {
+                Meaning::Pattern(Pattern::new(text).map_err(|error| error.to_string())?)
+            }
+            _ => Meaning::Name,
+        };
+        Ok(Self {
+            text: text.to_owned(),
+            meaning,
+        })
+    }
+}
+
+impl Selector {
+    /// The tracks that are meant, by their names.
+    fn of(&self, names: &[String]) -> Vec<usize> {
+        let all = || 0..names.len();
+        let named: Vec<usize> = all().filter(|&track| names[track] == self.text).collect();
+        if !named.is_empty() {
+            return named;
+        }
+        match &self.meaning {
+            Meaning::Name => Vec::new(),
+            // A range that is not there as a whole is a mistake.
+            Meaning::Places(_, last) if *last >= names.len() => Vec::new(),
+            Meaning::Places(first, last) => (*first..=*last).collect(),
+            Meaning::Pattern(pattern) => {
+                let options = MatchOptions::new();
+                all()
+                    .filter(|&track| pattern.matches_with(&names[track], options))
+                    .collect()
+            }
+        }
+    }
+}
+
+/// A message names no more tracks than this.
+const NAMED: usize = 12;
+
+impl Tracks {
+    /// The tracks that are asked for, in the order of the clip; nothing where all are.
+    pub(crate) fn of(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
+        if self.tracks.is_empty() {
+            return Ok(None);
+        }
+        let set = &clip.set;
+        let names: Vec<String> = (0..set.track_count())
+            .map(|track| set.track_name(track))
+            .collect();
+        let mut wanted = vec![false; names.len()];
+        for selector in &self.tracks {
+            let found = selector.of(&names);
+            if found.is_empty() {
+                let text = &selector.text;
+                let near = words::nearest(text, names.iter().map(String::as_str));
+                let near = near
+                    .map(|near| format!("; did you mean `{near}`?"))
+                    .unwrap_or_default();
+                let count = words::count(names.len(), "track");
+                let mut list = names
+                    .iter()
+                    .take(NAMED)
+                    .cloned()
+                    .collect::<Vec<_>>()
+                    .join(", ");
+                if names.len() > NAMED {
+                    list += " … (`tumble info --json` names all)";
+                }
+                return Err(Failure::usage(format!(
+                    "{name}: --tracks: there is no `{text}`{near}; it has {count}, {list}"
+                )));
+            }
+            found.into_iter().for_each(|track| wanted[track] = true);
+        }
+        Ok(Some(
+            (0..names.len()).filter(|&track| wanted[track]).collect(),
+        ))
+    }
+
+    /// The clip of the tracks that are asked for alone.
+    pub(crate) fn select<'a>(
+        &self,
+        clip: &'a Motion,
+        name: &str,
+    ) -> Result<Cow<'a, Motion>, Failure> {
+        Ok(match self.of(clip, name)? {
+            Some(tracks) => Cow::Owned(clip.select(&tracks)),
+            None => Cow::Borrowed(clip),
+        })
+    }
+
+    /// The clip of the tracks that are asked for and of all that they hang on: without those they
+    /// would be elsewhere.
+    pub(crate) fn select_with_ancestors<'a>(
+        &self,
+        clip: &'a Motion,
+        name: &str,
+    ) -> Result<Cow<'a, Motion>, Failure> {
+        let Some(tracks) = self.of(clip, name)? else {
+            return Ok(Cow::Borrowed(clip));
+        };
+        let all = clip.with_ancestors(&tracks);
+        if all.len() > tracks.len() {
+            let more: Vec<String> = all
+                .iter()
+                .filter(|track| !tracks.contains(track))
+                .map(|&track| clip.set.track_name(track))
+                .collect();
+            words::note(&format!(
+                "{name}: with what these tracks hang on: {}",
+                more.join(", ")
+            ));
+        }
+        Ok(Cow::Owned(clip.select(&all)))
+    }
+
+    /// The boxes of a chain that are asked for and all before them, on which they hang; nothing
+    /// where all are.
+    pub(crate) fn chain(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
+        let last = self
+            .of(clip, name)?
+            .and_then(|tracks| tracks.last().copied());
+        Ok(last.map(|last| (0..=last).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    fn chosen(list: &str) -> Result<Option<Vec<usize>>, String> {
+        let mut clip = Motion::default();
+        for name in ["hips", "LeftArm", "LeftHand", "7", "RightArm", "RightHand"] {
+            clip.set.push(name, &[0.0], &[Quat::IDENTITY]).unwrap();
+        }
+        let tracks = list
+            .split(',')
+            .map(str::parse)
+            .collect::<Result<_, String>>()?;
+        let tracks = Tracks { tracks };
+        tracks.of(&clip, "walk").map_err(Failure::into_message)
+    }
+
+    #[test]
+    fn names_places_ranges_and_patterns_choose_tracks() {
+        for (list, tracks) in [
+            ("RightArm,hips", vec![0, 4]),
+            ("1..2,0", vec![0, 1, 2]),
+            ("*Arm", vec![1, 4]),
+            ("7", vec![3]),
+            ("5,5,*Hand", vec![2, 5]),
+            ("[LR]*", vec![1, 2, 4, 5]),
+        ] {
+            assert_eq!(chosen(list), Ok(Some(tracks)), "{list}");
+        }
+        for (list, says) in [
+            ("hip", "there is no `hip`; did you mean `hips`?"),
+            ("4..6", "there is no `4..6`"),
+            ("*Foot", "it has 6 tracks, hips, LeftArm"),
+            ("3..1", "before it starts at 3"),
+            ("hips,", "give a name"),
+            ("[", "wildcard"),
+        ] {
+            let refused = chosen(list).unwrap_err();
+            assert!(refused.contains(says), "{list}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Pipes, signals, full disks and files that cannot be read or written.
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use crate::program::{command, finish, run, sample_folder};
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_ends_quietly_and_a_full_disk_does_not() {
+    let place = sample_folder();
+    let big = ["eval", "a.dat", "--fps", "100000", "-o", "-"];
+    for (line, code) in [
+        (&big[..], 141),
+        (&["methods"], 0),
+        (&["completions", "bash"], 0),
+    ] {
+        let mut child = command(place.path(), line)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let run = finish(child.wait_with_output().unwrap());
+        assert_eq!((run.code, run.words.as_str()), (code, ""), "{line:?}");
+    }
+    if cfg!(target_os = "linux") {
+        for line in [&big[..], &["methods"]] {
+            let full = fs::File::options().write(true).open("/dev/full").unwrap();
+            let run = finish(command(place.path(), line).stdout(full).output().unwrap());
+            assert_eq!(run.code, 7, "{line:?}: {}", run.words);
+            assert!(run.words.contains("cannot be written"), "{}", run.words);
+        }
+    }
+}
+
+/// Renaming a result over a pipe or a device would replace it.
+#[cfg(unix)]
+#[test]
+fn an_output_that_is_no_file_is_refused() {
+    let place = sample_folder();
+    let pipe = place.path().join("pipe.npy");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let run = run(
+        place.path(),
+        &["eval", "a.dat", "-o", "pipe.npy", "--overwrite"],
+    );
+    assert_eq!(run.code, 2, "{}", run.words);
+    assert!(!pipe.metadata().unwrap().is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_stop_the_program_and_leave_no_file() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let place = sample_folder();
+        fs::create_dir(place.path().join("out")).unwrap();
+        // Some seconds of text.
+        let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
+        let mut child = command(place.path(), &line).spawn().unwrap();
+        let out = place.path().join("out");
+        while fs::read_dir(&out).unwrap().count() == 0 {
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "it ended before it could be stopped"
+            );
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let sent = Command::new("kill")
+            .args([&format!("-{signal}"), &child.id().to_string()])
+            .status();
+        assert!(sent.unwrap().success());
+        let started = std::time::Instant::now();
+        assert_eq!(child.wait().unwrap().code(), Some(code));
+        assert!(started.elapsed().as_secs() < 3, "{:?}", started.elapsed());
+        assert_eq!(
+            fs::read_dir(&out).unwrap().count(),
+            0,
+            "something was left behind"
+        );
+    }
+}
+
+/// A disk that is full, as a limit on the size of files shows it: the temporary file goes,
+/// the old output stays.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
+    let place = sample_folder();
+    let program = env!("CARGO_BIN_EXE_tumble");
+    let line = format!(
+        "ulimit -f 100; exec '{program}' eval a.dat --fps 100000 -o old.npy --overwrite --device cpu"
+    );
+    let mut shell = Command::new("sh");
+    shell.current_dir(place.path()).args(["-c", &line]);
+    let before = names(place.path());
+    let run = finish(shell.output().unwrap());
+    assert_eq!(run.code, 7, "{}", run.words);
+    assert!(
+        run.words
+            .contains("old.npy: cannot be written: File too large"),
+        "{}",
+        run.words
+    );
+    assert_eq!(fs::read(place.path().join("old.npy")).unwrap(), b"old");
+    assert_eq!(names(place.path()), before);
+}
+
+#[cfg(unix)]
+fn names(folder: &std::path::Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Where nobody may write, nothing is worked out first.
+#[cfg(unix)]
+#[test]
+fn a_read_only_directory_is_refused_before_any_work() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let place = sample_folder();
+    let folder = place.path().join("folder");
+    fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
+    // Whoever may do everything has to be told otherwise.
+    let is_root = fs::write(folder.join("try"), "").is_ok();
+    let line = ["eval", "a.dat", "-o", "folder/o.npy", "--device", "cpu"];
+    let mut command = command(place.path(), &line);
+    if is_root {
+        std::os::unix::fs::chown(place.path(), Some(65_534), None).unwrap();
+        fs::set_permissions(place.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        std::os::unix::process::CommandExt::uid(&mut command, 65_534);
+    }
+    let run = finish(command.output().unwrap());
+    assert_eq!(run.code, 7, "{}", run.words);
+    assert!(
+        run.words
+            .contains("folder/o.npy: cannot be written: Permission denied"),
+        "{}",
+        run.words
+    );
+    let _ = fs::remove_file(folder.join("try"));
+}
+
+/// Named pipes are read when that is asked for, standard input always; a file that grows
+/// while it is read is refused.
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_standard_input_and_files_that_change() {
+    use std::io::Write;
+
+    let place = sample_folder();
+    let text = fs::read(place.path().join("a.dat")).unwrap();
+    let pipe = place.path().join("pipe.dat");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    let refused = run(place.path(), &["eval", "pipe.dat", "-o", "o.npy"]);
+    assert_eq!(refused.code, 4);
+    assert!(
+        refused.words.contains("is a named pipe"),
+        "{}",
+        refused.words
+    );
+    assert!(refused.words.contains("--pipes"), "{}", refused.words);
+    let line = [
+        "eval", "pipe.dat", "--pipes", "-o", "o.npy", "--device", "cpu",
+    ];
+    let child = command(place.path(), &line)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    fs::write(&pipe, &text).unwrap();
+    let read = finish(child.wait_with_output().unwrap());
+    assert_eq!(read.code, 0, "{}", read.words);
+    let expected = fs::read(place.path().join("o.npy")).unwrap();
+
+    let mut child = command(place.path(), &["eval", "-", "-o", "-", "--device", "cpu"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(&text).unwrap();
+    let run = finish(child.wait_with_output().unwrap());
+    assert_eq!((run.code, run.out == expected), (0, true), "{}", run.words);
+
+    // Large enough that it is still being read when it grows.
+    let grown = place.path().join("grown.dat");
+    let mut file = fs::File::create(&grown).unwrap();
+    file.write_all(b"# 1 1\n").unwrap();
+    let rows: String = (0..400_000).map(|i| format!("{i} 1 0 0 0\n")).collect();
+    file.write_all(rows.as_bytes()).unwrap();
+    let child = command(place.path(), &["info", "grown.dat"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    for i in 0..100 {
+        writeln!(file, "{} 1 0 0 0", 400_000 + i).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let run = finish(child.wait_with_output().unwrap());
+    assert_eq!(run.code, 4, "{}", run.words);
+    assert!(run.words.contains("error[E003]"), "{}", run.words);
+}
+
+/// Inputs that no file in a clone can stand for.
+#[cfg(unix)]
+#[test]
+fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    let place = sample_folder();
+    let at = place.path();
+    symlink(at.join("loop2.dat"), at.join("loop1.dat")).unwrap();
+    symlink(at.join("loop1.dat"), at.join("loop2.dat")).unwrap();
+    let _listener = std::os::unix::net::UnixListener::bind(at.join("socket.dat")).unwrap();
+    // More than 64 MiB of one line.
+    let mut long = b"# 1 1\n0 1 0 0 0".to_vec();
+    long.resize(65 << 20, b' ');
+    fs::write(at.join("long.dat"), long).unwrap();
+    fs::copy(at.join("a.dat"), at.join("secret.dat")).unwrap();
+    fs::set_permissions(at.join("secret.dat"), fs::Permissions::from_mode(0o000)).unwrap();
+    let is_root = fs::read(at.join("secret.dat")).is_ok();
+    fs::set_permissions(at, fs::Permissions::from_mode(0o777)).unwrap();
+    for (name, code, words) in [
+        ("loop1.dat", "E001", "symbolic links"),
+        ("socket.dat", "E002", "is a socket"),
+        ("long.dat", "E007", "longer than 67108864 bytes"),
+        ("secret.dat", "E001", "Permission denied"),
+    ] {
+        let mut command = command(at, &["eval", name, "-o", "o.npy", "--device", "cpu"]);
+        if is_root {
+            std::os::unix::process::CommandExt::uid(&mut command, 65_534);
+        }
+        let run = finish(command.output().unwrap());
+        assert_eq!(run.code, 4, "{}", run.words);
+        assert!(run.words.contains(words), "{}", run.words);
+        assert!(
+            run.words.contains(&format!("error[{code}]")),
+            "{}",
+            run.words
+        );
+        assert!(!at.join("o.npy").exists());
+    }
+}

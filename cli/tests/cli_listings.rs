@@ -1,0 +1,199 @@
+//! What the program tells of files, devices and methods, and what it measures: as text and as JSON.
+
+use std::fs;
+
+use crate::program::{sample_folder, succeed};
+use crate::support::vulkan_devices;
+
+#[test]
+fn verify_passes_on_good_data_and_says_what_it_compared() {
+    let place = sample_folder();
+    let run = succeed(place.path(), &["verify", "a.dat", "b.dat", "--json"]);
+    let lines: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    assert_eq!(lines.as_array().unwrap().len(), 2 * tumble::METHODS.len());
+    for line in lines.as_array().unwrap() {
+        assert_eq!(
+            (&line["pass"], &line["differing"]),
+            (&true.into(), &0.into()),
+            "{line}"
+        );
+        assert_eq!(line["rotations"], 102);
+    }
+    let table = String::from_utf8(succeed(place.path(), &["verify", "a.dat"]).out).unwrap();
+    for method in tumble::METHODS {
+        assert!(table.contains(method.name), "{table}");
+    }
+    if let Some(device) = vulkan_devices().first() {
+        assert_eq!(lines[0]["device"], device.name());
+        assert!(table.contains(&format!("between {} and the CPU, 0 differ", device.name())));
+    }
+}
+
+#[test]
+fn devices_and_info_speak_json() {
+    let place = sample_folder();
+    let run = succeed(place.path(), &["devices", "--json"]);
+    let listing: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let found = listing["devices"].as_array().unwrap();
+    for (entry, device) in found.iter().zip(&vulkan_devices()) {
+        assert_eq!(entry["name"], device.name());
+        assert_eq!(entry["exact"], true, "{entry}");
+        assert!(entry["self_tests"].as_array().unwrap().len() >= 8);
+    }
+    assert_eq!(found.len(), vulkan_devices().len());
+
+    let run = succeed(place.path(), &["info", "a.dat", "--json"]);
+    let info: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let expected = [
+        ("tracks", 2.0),
+        ("keys", 10.0),
+        ("first_time", 0.0),
+        ("last_time", 2.0),
+    ];
+    for (name, value) in expected
+        .into_iter()
+        .chain([("box_length", 3.0), ("longest_step", 0.5)])
+    {
+        assert_eq!(info[0][name].as_f64(), Some(value), "{name}: {info}");
+    }
+    assert_eq!(info[0]["uniform"], true);
+    let degrees = info[0]["largest_rotation_degrees"].as_f64().unwrap();
+    assert!((degrees - 0.9f64.to_degrees()).abs() < 1e-3, "{degrees}");
+}
+
+#[test]
+fn generate_is_deterministic_and_can_be_read_back() {
+    let place = sample_folder();
+    let line = [
+        "generate",
+        "--boxes",
+        "3",
+        "--keys",
+        "7",
+        "--seconds",
+        "4",
+        "--random",
+        "-o",
+    ];
+    let write = |name: &str, seed: &str| {
+        succeed(place.path(), &[&line[..], &[name, "--seed", seed]].concat());
+        fs::read(place.path().join(name)).unwrap()
+    };
+    let first = write("g1.dat", "5");
+    assert!(
+        first == write("g2.dat", "5"),
+        "the same seed gave another file"
+    );
+    assert!(
+        first != write("g3.dat", "6"),
+        "another seed gave the same file"
+    );
+    assert!(first == succeed(place.path(), &[&line[..], &["-", "--seed", "5"]].concat()).out);
+    let info = succeed(place.path(), &["info", "g1.dat", "--json"]).out;
+    let info: serde_json::Value = serde_json::from_slice(&info).unwrap();
+    assert_eq!(
+        (&info[0]["tracks"], &info[0]["keys"]),
+        (&3.into(), &21.into())
+    );
+    assert_eq!(info[0]["last_time"].as_f64(), Some(4.0));
+    assert_eq!(info[0]["warnings"], serde_json::json!([]));
+}
+
+#[test]
+fn listings_say_what_there_is() {
+    let place = sample_folder();
+    let methods = String::from_utf8(succeed(place.path(), &["methods"]).out).unwrap();
+    for method in tumble::METHODS {
+        assert!(
+            methods.contains(method.name) && methods.contains(method.summary),
+            "{methods}"
+        );
+    }
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = String::from_utf8(succeed(place.path(), &["completions", shell]).out).unwrap();
+        // clap completes values only for these.
+        let values = ["bash", "zsh", "fish"].contains(&shell);
+        assert!(script.contains("method"), "{shell} does not complete flags");
+        assert!(
+            script.contains("bessel-overhauser") || !values,
+            "{shell} does not complete methods"
+        );
+    }
+    let version = String::from_utf8(succeed(place.path(), &["--version"]).out).unwrap();
+    assert_eq!(
+        version.trim(),
+        format!("tumble {}", env!("CARGO_PKG_VERSION"))
+    );
+    for line in [&["--help"][..], &["eval", "--help"], &["verify", "--help"]] {
+        let help = String::from_utf8(succeed(place.path(), line).out).unwrap();
+        assert!(help.contains("Examples:"), "{help}");
+    }
+}
+
+#[test]
+fn bench_reads_and_resamples_clips_of_every_format() {
+    let place = sample_folder();
+    let line = "bench files --json --rounds 1 --shrink 1500";
+    let line: Vec<&str> = line.split(' ').collect();
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    let formats: Vec<&str> = (sections.iter())
+        .map(|section| section["method"].as_str().unwrap())
+        .collect();
+    assert!(
+        formats.contains(&"bvh") && formats.contains(&"parquet"),
+        "{formats:?}"
+    );
+    for section in sections {
+        // Two clips of 22 joints, 240 frames at 30 a second: 479 at 60.
+        assert_eq!(section["rotations"], 2 * 22 * 479, "{section}");
+        assert!(
+            section["file_bytes"].as_u64().unwrap() > 2 * 22 * 240 * 12,
+            "{section}"
+        );
+        for row in section["rows"].as_array().unwrap() {
+            assert!(
+                row["share_of_reading_rate"].as_f64().unwrap() > 0.0,
+                "{row}"
+            );
+        }
+    }
+}
+
+/// That everything is measured and told; not how fast it is.
+#[test]
+fn bench_measures_every_workload_in_one_run() {
+    let place = sample_folder();
+    let workloads = ["sparse", "dense", "small", "crowd", "long"];
+    let mut line = vec!["bench", "--json", "--rounds", "2", "--shrink", "2000"];
+    line.extend(workloads);
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    assert_eq!(sections.len(), 2 * workloads.len());
+    for section in sections {
+        let rows = section["rows"].as_array().unwrap();
+        let names: Vec<&str> = rows.iter().map(|r| r["name"].as_str().unwrap()).collect();
+        assert_eq!(
+            names[..3],
+            [
+                "memory write rate",
+                "naive (glam, rayon)",
+                "CPU, evaluation alone"
+            ]
+        );
+        assert!(names.contains(&"CPU, from keys"), "{names:?}");
+        for row in rows {
+            assert!(row["milliseconds"].as_f64().unwrap() > 0.0, "{row}");
+            assert!(row["ratio_to_naive"].as_f64().unwrap() > 0.0, "{row}");
+        }
+        // The segments of dense keys are not kept on a device.
+        if std::env::var_os("CI").is_some() && section["workload"] != "dense" {
+            let device = rows
+                .iter()
+                .find(|row| row["parts"][1][0] == "submit to fence");
+            assert!(device.unwrap()["parts"][1][1].as_f64().unwrap() > 0.0);
+        }
+    }
+}

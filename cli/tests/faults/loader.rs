@@ -1,0 +1,123 @@
+//! The loader that fails on purpose, and what it logs.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::program::{Run, command, finish};
+use crate::support::{lavapipe, vulkan_devices};
+
+/// The system's loader, and a folder in which ours has its name.
+pub(super) struct Loader {
+    real: PathBuf,
+    own: tempfile::TempDir,
+}
+
+/// A library that `cargo test` has built among the examples.
+pub(super) fn example(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
+    let profile = if folder.ends_with("release") {
+        "release"
+    } else {
+        "dev"
+    };
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--quiet", "--example", name, "--profile", profile])
+        .status();
+    assert!(built.unwrap().success(), "the example {name} builds");
+    folder.join(format!("examples/lib{name}.so"))
+}
+
+impl Loader {
+    /// Nothing where there is no Vulkan to go wrong.
+    pub(super) fn new() -> Option<Self> {
+        if vulkan_devices().is_empty() {
+            return None;
+        }
+        let list = Command::new("/sbin/ldconfig").arg("-p").output().unwrap();
+        let list = String::from_utf8(list.stdout).unwrap();
+        let line = list.lines().find(|line| line.contains("libvulkan.so.1 "));
+        let real = line.and_then(|line| line.split("=> ").nth(1)).unwrap();
+        let own = tempfile::tempdir().unwrap();
+        fs::copy(example("fault_loader"), own.path().join("libvulkan.so.1")).unwrap();
+        Some(Self {
+            real: real.trim().into(),
+            own,
+        })
+    }
+
+    pub(super) fn command(&self, mut command: Command) -> Command {
+        command
+            .env("LD_LIBRARY_PATH", self.own.path())
+            .env("REAL_LOADER", &self.real);
+        // One device: what fails is then the one that is asked for.
+        if let Some(lavapipe) = lavapipe() {
+            command.env("VK_DRIVER_FILES", lavapipe);
+            command.env_remove("VK_ADD_DRIVER_FILES");
+        }
+        command
+    }
+
+    /// A run with these faults, and what it logged.
+    pub(super) fn run(
+        &self,
+        place: &Path,
+        line: &[&str],
+        environment: &[(&str, &str)],
+    ) -> (Run, Log) {
+        self.run_command(command(place, line), environment)
+    }
+
+    pub(super) fn run_command(&self, command: Command, environment: &[(&str, &str)]) -> (Run, Log) {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("log");
+        let mut command = self.command(command);
+        command.env("FAULT_LOG", &log).envs(environment.to_vec());
+        let run = finish(command.output().unwrap());
+        assert!(
+            !run.words.contains("internal error") && !run.words.contains("panicked"),
+            "{environment:?}: {}",
+            run.words
+        );
+        (run, Log::new(&fs::read_to_string(log).unwrap_or_default()))
+    }
+}
+
+/// What the loader saw.
+#[derive(Debug)]
+pub(super) struct Log {
+    /// Calls of the process that made most of them (the other one probed the drivers).
+    pub(super) calls: BTreeMap<String, usize>,
+    /// Objects created and not destroyed, in all processes.
+    pub(super) left: BTreeMap<String, i64>,
+    /// Allocations that were refused for want of memory.
+    pub(super) short: usize,
+}
+
+impl Log {
+    fn new(text: &str) -> Self {
+        let mut calls: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+        let (mut left, mut short) = (BTreeMap::new(), 0);
+        for line in text.lines() {
+            let words: Vec<&str> = line.split(' ').collect();
+            let name = words[2].to_owned();
+            match words[1] {
+                "call" => {
+                    let process = calls.entry(words[0].to_owned()).or_default();
+                    *process.entry(name).or_default() += 1;
+                }
+                "made" => *left.entry(name).or_default() += 1,
+                "gone" => *left.entry(name).or_default() -= 1,
+                _ => short += 1,
+            }
+        }
+        left.retain(|_, count| *count != 0);
+        let most = |calls: &BTreeMap<String, usize>| calls.values().sum::<usize>();
+        Self {
+            calls: calls.into_values().max_by_key(most).unwrap_or_default(),
+            left,
+            short,
+        }
+    }
+}

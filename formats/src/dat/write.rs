@@ -1,0 +1,97 @@
+//! Keys as `.dat`: the header, then a line for each time.
+
+use std::borrow::Borrow;
+use std::io::{self, Write};
+
+use glam::Quat;
+use tumble::TrackSet;
+
+use crate::dat::MAX_BOXES;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{MotionOptions, WriteError};
+use crate::motion::Sampled;
+use crate::warnings::Warnings;
+
+/// Writes a clip's samples, and says what the format has no room for.
+///
+/// # Errors
+/// When writing fails, or there are several clips, too many tracks, or a time that does not increase.
+pub(super) fn write_motion(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let refuse = |code, message: String| Diagnostic::new(&options.name, code, message);
+    let [sampled] = clips else {
+        let message = format!("{} clips; a .dat file holds one, choose one", clips.len());
+        return Err(refuse(Code::SeveralClips, message).into());
+    };
+    let tracks = sampled.clip.set.track_count();
+    if !(1..=MAX_BOXES).contains(&tracks) {
+        let message = format!("{tracks} tracks; a .dat file holds 1 to {MAX_BOXES}");
+        return Err(refuse(Code::Boxes, message).into());
+    }
+    if sampled.rotations.len() != sampled.times.len().saturating_mul(tracks) {
+        let message = "a clip's samples are not as many as its times and tracks";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
+    }
+    let offset = sampled.clip.time_offset as f64;
+    if let Some(pair) = sampled.times.windows(2).find(|pair| pair[1] <= pair[0]) {
+        let message = format!(
+            "time {} is followed by {}; times increase strictly",
+            pair[0], pair[1]
+        );
+        return Err(refuse(Code::TimeNotIncreasing, message).into());
+    }
+    let mut warnings = Warnings::new(&options.name);
+    let is_placed = sampled
+        .clip
+        .skeleton
+        .iter()
+        .any(|joint| joint.parent.is_some());
+    if is_placed || !sampled.translations.is_empty() || !sampled.scales.is_empty() {
+        warnings.warn(Code::RotationsAlone, || {
+            let message = ".dat holds rotations; skeleton, translations and scales are left out";
+            (None, message)
+        });
+    }
+    let times = sampled.times.iter().map(|time| time + offset);
+    let rows = times.zip(sampled.rotations.chunks_exact(tracks));
+    write_rows(out, tracks, options.box_length.unwrap_or(1.0), rows)?;
+    Ok(warnings.into_list())
+}
+
+/// Writes a set whose tracks share their times, with boxes of that length. Numbers have as
+/// many digits as it takes to read the same bits again.
+///
+/// # Errors
+/// When writing fails, or (`InvalidInput`) the tracks' times differ.
+pub fn write_dat(mut writer: &mut impl Write, set: &TrackSet, box_length: f64) -> io::Result<()> {
+    let times = set.tracks().next().map_or(&[][..], |track| track.times);
+    if set.tracks().any(|track| track.times != times) {
+        let message = "a .dat file has one list of times for all tracks; these differ";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+    }
+    let row = |i: usize| set.tracks().map(move |track| track.keys[i]);
+    let rows = times.iter().enumerate().map(|(i, &time)| (time, row(i)));
+    write_rows(&mut writer, set.track_count(), box_length, rows)
+}
+
+/// Writes the header, and a line for each time with a rotation for each box.
+fn write_rows<Q: Borrow<Quat>>(
+    writer: &mut dyn Write,
+    boxes: usize,
+    box_length: f64,
+    rows: impl Iterator<Item = (f64, impl IntoIterator<Item = Q>)>,
+) -> io::Result<()> {
+    writeln!(writer, "# {boxes} {box_length:?}")?;
+    for (time, rotations) in rows {
+        write!(writer, "{time:?}")?;
+        for q in rotations {
+            let q = q.borrow();
+            write!(writer, " {:?} {:?} {:?} {:?}", q.w, q.x, q.y, q.z)?;
+        }
+        writeln!(writer)?;
+    }
+    Ok(())
+}

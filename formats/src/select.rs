@@ -1,0 +1,99 @@
+//! Some tracks of a clip as a clip of their own.
+
+use crate::motion::Motion;
+
+impl Motion {
+    /// The clip of these tracks, in that order. A joint whose parent is not among them is a root.
+    ///
+    /// # Panics
+    /// When one of them passes the number of tracks.
+    #[must_use]
+    pub fn select(&self, tracks: &[usize]) -> Self {
+        let mut place = vec![None; self.set.track_count()];
+        for (own, &track) in tracks.iter().enumerate() {
+            place[track] = Some(own);
+        }
+        let mut skeleton = self.skeleton.clone();
+        for joint in &mut skeleton {
+            joint.parent = joint
+                .parent
+                .and_then(|parent| place.get(parent).copied().flatten());
+        }
+        let skeleton = tracks
+            .iter()
+            .filter_map(|&track| skeleton.get(track).copied());
+        let channels = tracks
+            .iter()
+            .filter_map(|&track| self.channels.get(track).copied());
+        Self {
+            name: self.name.clone(),
+            set: self.set.select(tracks.iter().copied()),
+            skeleton: skeleton.collect(),
+            channels: channels.collect(),
+            no_world: self.no_world.clone(),
+            ..*self
+        }
+    }
+
+    /// These tracks and all that they hang on, in the order of the clip.
+    #[must_use]
+    pub fn with_ancestors(&self, tracks: &[usize]) -> Vec<usize> {
+        let mut wanted = vec![false; self.set.track_count()];
+        for &track in tracks {
+            let mut next = Some(track);
+            // Where it has been before there is nothing new, in a circle neither.
+            while let Some(own) = next.filter(|&own| wanted.get(own) == Some(&false)) {
+                wanted[own] = true;
+                next = self.skeleton.get(own).and_then(|joint| joint.parent);
+            }
+        }
+        (0..wanted.len()).filter(|&track| wanted[track]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+    use tumble::Channel;
+
+    use super::*;
+    use crate::motion::{Joint, Transform};
+
+    #[test]
+    fn joints_keep_their_parents_and_their_keys() {
+        let mut clip = Motion::default();
+        // A hand before the arm that it hangs on.
+        for (track, (name, parent)) in [
+            ("hand", Some(1)),
+            ("arm", Some(3)),
+            ("leg", Some(3)),
+            ("hip", None),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let keys = [Quat::from_rotation_x(track as f32)];
+            clip.set.push(name, &[0.5], &keys).unwrap();
+            clip.set
+                .set_translations(track, &[0.5], &[Vec3::X * track as f32], &[])
+                .unwrap();
+            clip.skeleton.push(Joint {
+                parent,
+                rest: Transform::default(),
+            });
+        }
+        assert_eq!(clip.with_ancestors(&[0]), [0, 1, 3]);
+        let own = clip.select(&[0, 1, 3]);
+        let parents: Vec<_> = own.skeleton.iter().map(|joint| joint.parent).collect();
+        assert_eq!(parents, [Some(1), Some(2), None]);
+        assert_eq!(own.set.track_name(2), "hip");
+        let moved = own.set.vector_keys(Channel::Translation, 2).unwrap();
+        assert_eq!(
+            (moved.times, moved.keys),
+            (&[0.5][..], &[Vec3::X * 3.0][..])
+        );
+        assert_eq!(clip.select(&[0]).skeleton[0].parent, None);
+        clip.skeleton[3].parent = Some(0);
+        assert_eq!(clip.with_ancestors(&[1]), [0, 1, 3]);
+    }
+}

@@ -1,0 +1,319 @@
+//! A part of a clip, from one time to another.
+
+use glam::Vec3;
+use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackError, TrackSet};
+
+use crate::grid::{Precision, fits};
+use crate::motion::Motion;
+use crate::sample::ChannelMethods;
+
+/// Why a part of a clip cannot be cut out.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrimError {
+    /// Nothing of the clip lies there.
+    #[error("nothing lies from {start} to {end} s: keys lie from {first} to {last} s")]
+    Empty {
+        /// Where the part starts, seconds.
+        start: f64,
+        /// Where it ends.
+        end: f64,
+        /// The first key of the clip.
+        first: f64,
+        /// The last.
+        last: f64,
+    },
+    /// A key at the cut would need what the clip gives its keys beside their values.
+    #[error(
+        "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and none lies at \
+         {time} s: cut at one of its keys, or sample it (`tumble eval --start --end`)"
+    )]
+    Given {
+        /// The first such track, from 0.
+        track: usize,
+        /// Its name.
+        name: String,
+        /// Where the cut is, seconds.
+        time: f64,
+    },
+    /// A key at the cut could not be evaluated.
+    #[error(transparent)]
+    Evaluating(#[from] Error),
+    /// What was evaluated is no key.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+}
+
+/// The keys of a clip from `start` to `end`, seconds, at their own times. Where a channel goes over a
+/// cut and has no key there it gets one, evaluated by its own sampler; so what is interpolated
+/// between two keys (steps, lines and arcs) stays the same curve. A curve that depends on keys
+/// beyond the cut changes in the intervals beside it.
+///
+/// # Errors
+/// When nothing lies there, a cut would need a tangent that no key has, or `engine` fails.
+pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Motion, TrimError> {
+    let set = &clip.set;
+    let (first, last) = set.time_span().unwrap_or_default();
+    let overlaps = start <= end && start <= last && end >= first;
+    if !overlaps {
+        return Err(TrimError::Empty {
+            start,
+            end,
+            first,
+            last,
+        });
+    }
+    let methods = ChannelMethods {
+        method: None,
+        with: &Interpolation::from,
+    };
+    let cuts = methods.sample(engine, clip, &Frames::at(vec![start, end]))?;
+    let tracks = set.track_count();
+    let mut trimmed = TrackSet::new();
+    for (index, track) in set.tracks().enumerate() {
+        let name = || set.track_name(index);
+        let given = |time| TrimError::Given {
+            track: index,
+            name: name(),
+            time,
+        };
+        let part = Part::of(track.times, start, end);
+        let has_more =
+            !track.tangents.is_empty() || !track.velocities.is_empty() || !track.tcb.is_empty();
+        if let Some(time) = part.made().filter(|_| has_more) {
+            return Err(given(time));
+        }
+        let values = [cuts.rotations[index], cuts.rotations[tracks + index]];
+        let (times, mut keys) = part.keys(track.times, track.keys, values);
+        // The sign in which the curve goes on.
+        for place in 1..keys.len() {
+            if part.is_made(place) && keys[place].dot(keys[place - 1]) < 0.0 {
+                keys[place] = -keys[place];
+            }
+        }
+        if let [first, second, ..] = &mut keys[..]
+            && part.before
+            && first.dot(*second) < 0.0
+        {
+            *first = -*first;
+        }
+        trimmed.push(track.name.unwrap_or_default(), &times, &keys)?;
+        let own = trimmed.track_count() - 1;
+        if !track.tangents.is_empty() {
+            trimmed.set_tangents(own, &track.tangents[part.kept.clone()])?;
+        }
+        if !track.velocities.is_empty() {
+            trimmed.set_velocities(own, &track.velocities[part.kept.clone()])?;
+        }
+        if !track.tcb.is_empty() {
+            trimmed.set_tcb(own, &track.tcb[part.kept.clone()])?;
+        }
+        for (channel, samples) in [
+            (Channel::Translation, &cuts.translations),
+            (Channel::Scale, &cuts.scales),
+        ] {
+            let Some(vectors) = set.vector_keys(channel, index) else {
+                continue;
+            };
+            let part = Part::of(vectors.times, start, end);
+            if let Some(time) = part.made().filter(|_| !vectors.tangents.is_empty()) {
+                return Err(given(time));
+            }
+            let values: [Vec3; 2] = [samples[index], samples[tracks + index]];
+            let (times, keys) = part.keys(vectors.times, vectors.keys, values);
+            let tangents = match vectors.tangents.is_empty() {
+                true => &[],
+                false => &vectors.tangents[part.kept.clone()],
+            };
+            match channel {
+                Channel::Translation => trimmed.set_translations(own, &times, &keys, tangents)?,
+                Channel::Scale => trimmed.set_scales(own, &times, &keys, tangents)?,
+            }
+        }
+    }
+    let rate = clip.rate.filter(|&rate| {
+        let times = trimmed.tracks().flat_map(|track| track.times);
+        fits(times.copied(), rate, Precision::F64)
+    });
+    Ok(Motion {
+        set: trimmed,
+        rate,
+        ..clip.clone()
+    })
+}
+
+/// What of a channel's keys lies between the cuts, and where keys are to be made.
+struct Part {
+    /// The keys that stay.
+    kept: std::ops::Range<usize>,
+    start: f64,
+    end: f64,
+    /// A key is made at the start.
+    before: bool,
+    /// A key is made at the end.
+    after: bool,
+}
+
+impl Part {
+    fn of(times: &[f64], start: f64, end: f64) -> Self {
+        let first = times.partition_point(|&time| time < start);
+        let behind = times.partition_point(|&time| time <= end).max(first);
+        // A single key says the same at all times, and so it stays where it is.
+        if times.len() == 1 {
+            return Self {
+                kept: 0..1,
+                start,
+                end,
+                before: false,
+                after: false,
+            };
+        }
+        // Where a channel only begins or ends in between, it is held as before.
+        let before = first > 0 && times.get(first).is_none_or(|&time| time > start);
+        let after = behind < times.len()
+            && (behind == 0 || times[behind - 1] < end)
+            && (end > start || !before);
+        Self {
+            kept: first..behind,
+            start,
+            end,
+            before,
+            after,
+        }
+    }
+
+    /// The time of a key that is made.
+    fn made(&self) -> Option<f64> {
+        match (self.before, self.after) {
+            (true, _) => Some(self.start),
+            (false, true) => Some(self.end),
+            (false, false) => None,
+        }
+    }
+
+    /// Whether the key at a place of the new ones is made.
+    fn is_made(&self, place: usize) -> bool {
+        let behind = usize::from(self.before) + self.kept.len();
+        self.before && place == 0 || self.after && place == behind
+    }
+
+    /// The keys of the part; `made` are the values at the two cuts.
+    fn keys<T: Copy>(&self, times: &[f64], keys: &[T], made: [T; 2]) -> (Vec<f64>, Vec<T>) {
+        let before = self.before.then_some((self.start, made[0]));
+        let after = self.after.then_some((self.end, made[1]));
+        let kept = times[self.kept.clone()].iter().copied();
+        let kept = kept.zip(keys[self.kept.clone()].iter().copied());
+        before.into_iter().chain(kept).chain(after).unzip()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+    use tumble::Device;
+
+    use super::*;
+    use crate::motion::{Channels, Sampler};
+
+    fn clip(sampler: Option<Sampler>) -> Motion {
+        let mut clip = Motion::default();
+        for (track, times) in [
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
+            [0.5, 0.75, 2.0, 2.5, 4.0, 6.0, 9.0, 10.0],
+        ]
+        .iter()
+        .enumerate()
+        {
+            let keys: Vec<Quat> = (0..8u8)
+                .map(|key| Quat::from_rotation_y(f32::from(key * key) * 0.2 + track as f32))
+                .collect();
+            clip.set.push("", times, &keys).unwrap();
+            let places: Vec<Vec3> = keys.iter().map(|q| *q * Vec3::X).collect();
+            clip.set
+                .set_translations(track, times, &places, &[])
+                .unwrap();
+            clip.channels.push(Channels {
+                rotation: sampler,
+                translation: sampler,
+                scale: None,
+            });
+        }
+        clip
+    }
+
+    /// The largest angle and distance between a clip and its part, from a time to a time.
+    fn largest(whole: &Motion, part: &Motion, from: f64, to: f64) -> (f64, f32) {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        let frames = Frames::fps(60).between(from, to);
+        let methods = ChannelMethods {
+            method: None,
+            with: &Interpolation::from,
+        };
+        let [a, b] = [whole, part].map(|clip| methods.sample(&engine, clip, &frames).unwrap());
+        let angle =
+            |(a, b): (&Quat, &Quat)| tumble::reference::angle_between(a.as_dquat(), b.as_dquat());
+        (
+            a.rotations
+                .iter()
+                .zip(&b.rotations)
+                .map(angle)
+                .fold(0.0, f64::max),
+            a.translations
+                .iter()
+                .zip(&b.translations)
+                .map(|(a, b)| a.distance(*b))
+                .fold(0.0, f32::max),
+        )
+    }
+
+    #[test]
+    fn arcs_lines_and_steps_stay_the_same_curve() {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        for sampler in [Sampler::Linear, Sampler::Step] {
+            let whole = clip(Some(sampler));
+            let part = trim(&whole, 1.25, 5.5, &engine).unwrap();
+            assert_eq!(part.set.track(0).times, [1.25, 2.0, 3.0, 4.0, 5.0, 5.5]);
+            assert_eq!(part.set.track(1).times, [1.25, 2.0, 2.5, 4.0, 5.5]);
+            assert_eq!(part.set.track(0).keys[1..5], whole.set.track(0).keys[2..6]);
+            let (angle, distance) = largest(&whole, &part, 1.25, 5.5);
+            assert!(
+                angle < 1e-6 && distance < 1e-6,
+                "{sampler:?}: {angle} {distance}"
+            );
+        }
+    }
+
+    #[test]
+    fn smooth_curves_change_beside_the_cuts_alone() {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        let whole = clip(None);
+        let part = trim(&whole, 0.25, 6.75, &engine).unwrap();
+        let (angle, distance) = largest(&whole, &part, 2.0, 4.0);
+        assert!(angle < 1e-6 && distance < 1e-6, "{angle} {distance}");
+        let ends = largest(&whole, &part, 0.25, 6.75);
+        assert!(ends.0 < 0.5, "{ends:?}");
+    }
+
+    #[test]
+    fn cuts_on_keys_make_none_and_empty_parts_are_refused() {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        let mut whole = clip(Some(Sampler::Linear));
+        whole.set = whole.set.select([0]);
+        whole.channels.truncate(1);
+        let part = trim(&whole, 2.0, 5.0, &engine).unwrap();
+        assert_eq!(part.set.track(0).times, [2.0, 3.0, 4.0, 5.0]);
+        let one = trim(&whole, 2.5, 2.5, &engine).unwrap();
+        assert_eq!(one.set.track(0).times, [2.5]);
+        for (start, end) in [(8.0, 9.0), (-2.0, -1.0), (3.0, 2.0)] {
+            let refused = trim(&whole, start, end, &engine);
+            assert!(matches!(refused, Err(TrimError::Empty { .. })));
+        }
+        whole
+            .set
+            .set_tangents(0, &[[Quat::IDENTITY; 2]; 8])
+            .unwrap();
+        assert!(trim(&whole, 2.0, 5.0, &engine).is_ok());
+        let refused = trim(&whole, 2.0, 5.5, &engine).unwrap_err();
+        assert!(refused.to_string().contains("5.5 s"), "{refused}");
+    }
+}
