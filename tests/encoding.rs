@@ -32,7 +32,7 @@ fn every_device_encodes_like_the_host() {
                 let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
                 for encoding in Encoding::KINDS {
                     let mut expected = vec![0; quats.len() * encoding.bytes()];
-                    encoding.encode(quats, &mut expected);
+                    encoding.encode(quats, &mut expected).unwrap();
                     for (engine, clip) in engines.iter().zip(&clips) {
                         let device = engine.device_name();
                         let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();

@@ -401,7 +401,7 @@ impl Cases {
             self.rows("day", method.name, shortest(method), &film);
             for (name, quantity) in [
                 ("velocity body", Quantity::Velocity(Axes::Body)),
-                ("acceleration world", Quantity::Acceleration(Axes::World)),
+                ("acceleration world", Quantity::Acceleration(Axes::Parent)),
             ] {
                 let interpolation = Interpolation {
                     quantity,
@@ -563,7 +563,7 @@ impl Cases {
         let tomorrow = Frames::fps(60).between(86_400.0, 86_403.0);
         self.rows("uneven", "slerp Loop tomorrow", looped, &tomorrow);
         let velocity = Interpolation {
-            quantity: Quantity::Velocity(Axes::World),
+            quantity: Quantity::Velocity(Axes::Parent),
             ..looped
         };
         self.rows("closed", "slerp velocity Loop", velocity, &frames);
@@ -655,7 +655,7 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let clip = engine.upload(set, *interpolation).unwrap();
             let mut all = Vec::new();
             let take = |chunk: tumble::Chunk<'_>| -> Result<(), tumble::Error> {
-                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(chunk.rotations));
+                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(chunk.rotations().unwrap()));
                 Ok(())
             };
             clip.stream(frames, *layout, 777, take).unwrap();
@@ -708,7 +708,7 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let reference: Vec<Quat> = set.tracks().map(|track| track.keys[0]).collect();
             let added = engine.add(&blended, &mixed, &reference, 0.7).unwrap();
             let world = engine
-                .world(&added, &Skeleton::chain(set.track_count(), 3.0))
+                .world(&added, &Skeleton::chain(set.track_count(), 3.0).unwrap())
                 .unwrap();
             hash_of(&[
                 bytemuck::cast_slice(blended.as_quats()),

@@ -95,7 +95,7 @@ fn outside_is_what_the_words_say() {
                         let curve = Curve::of(&interpolation, track);
                         let steps = method == method::STEP;
                         for s in 0..found.samples() {
-                            let time = timeline.time(t, s);
+                            let time = timeline.time(t, s).unwrap();
                             if (steps || before == WrapMode::Loop || after == WrapMode::Loop)
                                 && near_a_seam(track, time)
                             {
@@ -159,7 +159,7 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                 let mut streamed = Vec::new();
                 let layout = Layout::TrackMajor;
                 cpu.stream(&long, interpolation, &frames, layout, 1000, |chunk| {
-                    streamed.extend_from_slice(chunk.rotations);
+                    streamed.extend_from_slice(chunk.rotations().unwrap());
                     Ok::<(), tumble::Error>(())
                 })
                 .unwrap();

@@ -207,11 +207,11 @@ fn what_does_not_fit_is_refused() {
     assert!(refused(engine.mix(&few, &all[0], 0.5)).contains("differ"));
     assert!(refused(engine.mix(&few, &few, 1.5)).contains("between 0 and 1"));
     assert!(refused(engine.add(&few, &few, &[], 0.5)).contains("one reference"));
-    let world = engine.world(&few, &Skeleton::chain(2, 1.0));
+    let world = engine.world(&few, &Skeleton::chain(2, 1.0).unwrap());
     assert!(matches!(world, Err(Error::Poses(_))));
     let nothing = engine
         .evaluate(&TrackSet::new(), method::SLERP, &Frames::fps(2))
         .unwrap();
-    let world = engine.world(&nothing, &Skeleton::chain(0, 1.0)).unwrap();
+    let world = engine.world(&nothing, &Skeleton::chain(0, 1.0).unwrap()).unwrap();
     assert_eq!((world.tracks(), world.as_slice().len()), (0, 0));
 }

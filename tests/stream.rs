@@ -22,12 +22,12 @@ impl Collected {
     fn take(&mut self, chunk: &tumble::Chunk<'_>) {
         assert_eq!(chunk.start, self.rotations.len());
         assert_eq!(
-            chunk.rotations.len(),
+            chunk.rotations().unwrap().len(),
             chunk.tracks.len() * chunk.samples.len()
         );
-        self.rotations.extend_from_slice(chunk.rotations);
+        self.rotations.extend_from_slice(chunk.rotations().unwrap());
         self.chunks += 1;
-        self.largest = self.largest.max(chunk.rotations.len());
+        self.largest = self.largest.max(chunk.rotations().unwrap().len());
     }
 }
 

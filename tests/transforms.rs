@@ -111,7 +111,7 @@ fn translations_are_the_textbook_s() {
                             ends,
                             ..curve.clone()
                         };
-                        let time = timeline.time(track, sample);
+                        let time = timeline.time(track, sample).unwrap();
                         // On a key rounding may decide on which side of a jump it lies.
                         if curve.times.iter().any(|key| (key - time).abs() < 1e-9) {
                             continue;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
+use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Rotations, Samples, Vectors};
 use crate::shader::{Kernel, PoseDispatch};
@@ -62,13 +63,14 @@ impl Engine {
     ) -> Result<Samples<T>, Error> {
         let (tracks, samples) = (values.tracks(), values.samples());
         let weights = smoothing.step_weights(samples)?;
-        let mut rows: Vec<[f32; 4]> = vec![[0.0; 4]; tracks * samples];
+        let count = tracks * samples; // of which there are as many values
+        let mut rows: Vec<[f32; 4]> = zeroed(count, "samples to smooth")?;
+        let mut next: Vec<[f32; 4]> = zeroed(count, "smoothed samples")?;
         for (place, row) in rows.iter_mut().enumerate() {
             let (track, sample) = (place / samples.max(1), place % samples.max(1));
-            let from = values.layout().index(track, sample, tracks, samples);
-            *row = values.rows()[from];
+            let from = values.layout().place(track, sample, tracks, samples);
+            *row = values.as_arrays()[from];
         }
-        let mut next = rows.clone();
         let passes = if samples > 1 { smoothing.passes } else { 0 };
         for _ in 0..passes {
             self.on_device(|device| {
@@ -90,10 +92,10 @@ impl Engine {
             })?;
             std::mem::swap(&mut rows, &mut next);
         }
-        let mut output = OutputBuffer::new(rows.len());
+        let mut output = OutputBuffer::new(count)?;
         for (place, row) in rows.iter().enumerate() {
             let (track, sample) = (place / samples.max(1), place % samples.max(1));
-            let to = values.layout().index(track, sample, tracks, samples);
+            let to = values.layout().place(track, sample, tracks, samples);
             output[to] = Quat::from_array(*row);
         }
         let layout = values.layout();

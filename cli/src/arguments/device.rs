@@ -165,7 +165,7 @@ impl Opened {
     /// Chooses the device for so many rotations, where cost decides.
     pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
         if self.by_cost {
-            self.engine = Engine::auto(rotations)?;
+            self.engine = Engine::auto_for(rotations)?;
             self.label = self.engine.device_name().to_owned();
             self.automatic = self.is_vulkan();
         }
@@ -194,7 +194,7 @@ impl Opened {
         let result = self
             .engine
             .stream(set, interpolation, frames, layout, chunk, |chunk| {
-                done = chunk.start + chunk.rotations.len();
+                done = chunk.start + chunk.rows.len();
                 sink(chunk)
             });
         match result {
@@ -246,7 +246,7 @@ impl Opened {
     ) -> Result<Vec<Quat>, Error> {
         let mut rotations = Vec::new();
         let collected = self.stream(set, interpolation, frames, layout, &mut |chunk| {
-            rotations.extend_from_slice(chunk.rotations);
+            rotations.extend_from_slice(chunk.rotations().unwrap_or_default());
             Ok(())
         });
         match collected {

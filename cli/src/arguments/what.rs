@@ -104,8 +104,9 @@ enum Major {
 enum AxesArgument {
     /// of what turns
     Body,
-    /// of what it turns in (the parent)
-    World,
+    /// of what it turns in: its parent, or the world for a track without one
+    #[value(alias = "world")]
+    Parent,
 }
 
 /// What whole poses hold.
@@ -140,7 +141,7 @@ impl What {
     /// Which track hangs from which, at the ends of boxes of that length.
     pub(crate) fn skeleton(&self, tracks: usize, length: f64) -> Result<Skeleton, String> {
         let Some(parents) = &self.parents else {
-            return Ok(Skeleton::chain(tracks, length));
+            return Skeleton::chain(tracks, length).map_err(|error| error.to_string());
         };
         if parents.len() != tracks {
             let given = parents.len();
@@ -185,7 +186,7 @@ impl What {
     pub(crate) fn quantity(&self) -> Quantity {
         let axes = match self.axes {
             AxesArgument::Body => Axes::Body,
-            AxesArgument::World => Axes::World,
+            AxesArgument::Parent => Axes::Parent,
         };
         match self.output {
             Output::Velocity => Quantity::Velocity(axes),

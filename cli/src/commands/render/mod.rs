@@ -178,7 +178,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     if kind == Kind::Still {
-        frames = Frames::at(vec![timeline.time(0, 0)]);
+        frames = Frames::at(timeline.times(0).take(1).collect());
         timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
@@ -217,13 +217,12 @@ impl Arguments {
     ) -> Result<WorldPoses, Failure> {
         let interpolation = self.manner.with(method);
         // A picture has no scale: boxes are 1 long, however long they are.
-        let skeleton = Skeleton::chain(set.track_count(), 1.0);
         device
             .choose(set.track_count())
             .and_then(|()| {
                 let engine = &device.engine;
                 let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
-                engine.world(&local, &skeleton)
+                engine.world(&local, &Skeleton::chain(set.track_count(), 1.0)?)
             })
             .map_err(|error| Failure::evaluating(name, &error))
     }
@@ -236,9 +235,7 @@ impl Arguments {
         timeline: &Timeline,
         inputs: &[PathBuf],
     ) -> Result<(), Failure> {
-        let times: Vec<f64> = (0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect();
+        let times: Vec<f64> = timeline.times(0).collect();
         let (width, height) = self.size;
         let mut progress = Progress::new("rendering", times.len() as u64);
         let too_fast = times
