@@ -61,7 +61,9 @@ pub enum PoseError {
         tracks: usize,
     },
     /// An inverse bind matrix is needed for each track.
-    #[error("{given} inverse bind matrices were given for {tracks} tracks; give one for each, or none")]
+    #[error(
+        "{given} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
+    )]
     InverseBind {
         /// Matrices given.
         given: usize,

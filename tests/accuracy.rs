@@ -344,7 +344,9 @@ fn times_of_frames_are_within_rounding_of_frames() {
         let clip = clip(&set, method.into());
         let frames = Frames::fps(60);
         let timeline = clip.timeline(&frames).unwrap();
-        let times = (0..timeline.len()).map(|s| timeline.time(0, s).unwrap()).collect();
+        let times = (0..timeline.len())
+            .map(|s| timeline.time(0, s).unwrap())
+            .collect();
         let by_frame: Rotations = clip.evaluate(&frames).unwrap();
         let by_time = clip.evaluate(&Frames::at(times)).unwrap();
         for (a, b) in by_frame.as_quats().iter().zip(by_time.as_quats()) {

@@ -641,10 +641,15 @@ fn hash_of<T: bytemuck::Pod>(parts: &[&[T]]) -> String {
 fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
     match what {
         What::Set(interpolation, frames, layout) => {
-            let found = engine
-                .evaluate_as(set, *interpolation, frames, *layout)
-                .unwrap();
-            hash_of(&[found.as_quats()])
+            if interpolation.quantity == Quantity::Rotation {
+                let found = engine
+                    .evaluate_as(set, *interpolation, frames, *layout)
+                    .unwrap();
+                hash_of(&[found.as_quats()])
+            } else {
+                let found = engine.rates(set, *interpolation, frames, *layout).unwrap();
+                hash_of(&[found.as_slice()])
+            }
         }
         What::Encoded(interpolation, frames, layout, encoding) => {
             let clip = engine.upload(set, *interpolation).unwrap();
@@ -655,7 +660,9 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let clip = engine.upload(set, *interpolation).unwrap();
             let mut all = Vec::new();
             let take = |chunk: tumble::Chunk<'_>| -> Result<(), tumble::Error> {
-                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(chunk.rotations().unwrap()));
+                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(
+                    chunk.rotations().unwrap(),
+                ));
                 Ok(())
             };
             clip.stream(frames, *layout, 777, take).unwrap();

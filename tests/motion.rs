@@ -136,11 +136,14 @@ fn the_same_bits_on_every_device() {
                     quantity,
                     ..method.into()
                 };
-                let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
-                assert!(expected.as_quats().iter().all(|q| q.is_finite()));
+                let layout = Layout::TrackMajor;
+                let expected = cpu.rates(&set, interpolation, &frames, layout).unwrap();
+                let expected: &[Quat] = bytemuck::cast_slice(expected.as_slice());
+                assert!(expected.iter().all(|q| q.is_finite()));
                 for vulkan in &engines {
-                    let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
-                    let difference = first_difference(expected.as_quats(), found.as_quats());
+                    let found = vulkan.rates(&set, interpolation, &frames, layout).unwrap();
+                    let found: &[Quat] = bytemuck::cast_slice(found.as_slice());
+                    let difference = first_difference(expected, found);
                     assert_eq!(difference, None, "{method}, {quantity:?}, seed {seed}");
                 }
             }

@@ -112,7 +112,8 @@ fn velocities_have_one_length_and_go_on() {
                 ends: Ends::Parabolic,
                 ..constant(method)
             };
-            let found = engine.evaluate(&set, interpolation, &frames).unwrap();
+            let layout = tumble::Layout::TrackMajor;
+            let found = engine.rates(&set, interpolation, &frames, layout).unwrap();
             for (t, track) in set.tracks().enumerate() {
                 let curve = Curve::of(&interpolation, track);
                 let (first, last) = (track.times[0], track.times[track.times.len() - 1]);

@@ -287,7 +287,11 @@ pub(crate) fn frames(bytes: &[u8]) -> u64 {
                 for sample in [0, 1, last / 2, last] {
                     if sample < timeline.len() && tracks > 0 {
                         assert!(timeline.time(0, sample).is_some_and(f64::is_finite));
-                        assert!(timeline.time(tracks - 1, sample).is_some_and(f64::is_finite));
+                        assert!(
+                            timeline
+                                .time(tracks - 1, sample)
+                                .is_some_and(f64::is_finite)
+                        );
                     }
                 }
                 outcomes.push(timeline.len().min(4).to_string());

@@ -88,7 +88,10 @@ mod tests {
                 bytes: 16 * count as u128,
             };
             assert_eq!(zeroed::<[f32; 4]>(count, "a result").unwrap_err(), expected);
-            assert_eq!(reserved::<[f32; 4]>(count, "a result").unwrap_err(), expected);
+            assert_eq!(
+                reserved::<[f32; 4]>(count, "a result").unwrap_err(),
+                expected
+            );
         }
         assert_eq!(zeroed::<f32>(3, "a result").unwrap(), [0.0; 3]);
         assert!(reserved::<f32>(3, "a result").unwrap().capacity() >= 3);

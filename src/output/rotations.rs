@@ -41,13 +41,7 @@ impl Layout {
 
     /// Where a sample that there is lies.
     #[inline]
-    pub(crate) fn place(
-        self,
-        track: usize,
-        sample: usize,
-        tracks: usize,
-        samples: usize,
-    ) -> usize {
+    pub(crate) fn place(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
         match self {
             Self::TrackMajor => track * samples + sample,
             Self::FrameMajor => sample * tracks + track,
@@ -81,7 +75,9 @@ pub type Vectors = Samples<Vec3>;
 #[non_exhaustive]
 pub enum SamplesError {
     /// Every track has the same number of samples.
-    #[error("{values} values do not divide among {tracks} tracks; give every track the same number")]
+    #[error(
+        "{values} values do not divide among {tracks} tracks; give every track the same number"
+    )]
     Uneven {
         /// Number of values.
         values: usize,

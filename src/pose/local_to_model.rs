@@ -69,7 +69,7 @@ impl Engine {
         let links = skeleton.links();
         let bind: Option<Vec<Rows>> =
             inverse_bind.map(|all| all.iter().map(|&matrix| rows(matrix)).collect());
-        let walk = || {
+        let mut walk = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
                 for link in &links {
@@ -84,7 +84,7 @@ impl Engine {
             });
         };
         match &*self.backend {
-            Backend::Cpu(engine) => engine.on_threads(walk),
+            Backend::Cpu(engine) => engine.on_threads(&mut walk),
             Backend::Vulkan(_) => walk(),
         }
         Ok(ModelMatrices {
@@ -125,7 +125,10 @@ impl Transforms {
             true => [tx, ty, tz],
             false => link.offset,
         };
-        let turned = matrix::rows(self.rotations.as_arrays()[place], MatrixOrder::RowMajor as u32);
+        let turned = matrix::rows(
+            self.rotations.as_arrays()[place],
+            MatrixOrder::RowMajor as u32,
+        );
         let row = |i: usize| {
             let [x, y, z]: [f32; 3] = turned[i];
             [x * sx, y * sy, z * sz, hung[i]]

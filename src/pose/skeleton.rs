@@ -174,10 +174,7 @@ mod tests {
         let refused = |parents: &[Option<usize>]| {
             Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
         };
-        assert_eq!(
-            refused(&[None, Some(1)]),
-            SkeletonError::Cycle { track: 1 }
-        );
+        assert_eq!(refused(&[None, Some(1)]), SkeletonError::Cycle { track: 1 });
         assert_eq!(
             refused(&[Some(1), Some(0), None]),
             SkeletonError::Cycle { track: 0 }

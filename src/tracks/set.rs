@@ -129,10 +129,7 @@ impl TrackSet {
     ///
     /// # Errors
     /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
-    pub fn with_shared_times<R: Rotation>(
-        times: &[f64],
-        keys: &[R],
-    ) -> Result<Self, TrackError> {
+    pub fn with_shared_times<R: Rotation>(times: &[f64], keys: &[R]) -> Result<Self, TrackError> {
         let keys = keys.iter().map(|rotation| rotation.quat());
         Self::from_shared_times(times.to_vec(), keys.collect())
     }
@@ -294,10 +291,7 @@ impl TrackSet {
     /// track.
     pub fn track_name(&self, index: usize) -> String {
         let name = self.get(index).and_then(|track| track.name);
-        name.map_or_else(
-            || format!("box{}", index.saturating_add(1)),
-            str::to_owned,
-        )
+        name.map_or_else(|| format!("box{}", index.saturating_add(1)), str::to_owned)
     }
 
     /// First and last key time over all tracks, seconds; `None` when empty.

@@ -242,9 +242,12 @@ impl Source<'_> {
         for &interpolation in self.interpolations {
             let rotations = self.evaluate(device, index, interpolation)?;
             let reference = Reference::of(&interpolation, self.set.track(index));
-            let errors = rotations.iter().zip(self.timeline.times(0)).map(|(rotation, time)| {
-                angle_between(rotation.as_dquat(), reference.rotation(time))
-            });
+            let errors = rotations
+                .iter()
+                .zip(self.timeline.times(0))
+                .map(|(rotation, time)| {
+                    angle_between(rotation.as_dquat(), reference.rotation(time))
+                });
             let points = self.points(errors);
             let pieces = points
                 .split(|point| point.1 < EXACT)
