@@ -319,8 +319,11 @@ fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout
     let samples = values.len() / group.len();
     for (place, &track) in group.iter().enumerate() {
         for sample in 0..samples {
-            all[layout.index(track, sample, tracks, samples)] =
-                values[layout.index(place, sample, group.len(), samples)];
+            let to = layout.index(track, sample, tracks, samples);
+            let from = layout.index(place, sample, group.len(), samples);
+            if let (Some(to), Some(from)) = (to, from) {
+                all[to] = values[from];
+            }
         }
     }
 }

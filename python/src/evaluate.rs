@@ -158,8 +158,12 @@ impl Result {
             job.write(bytemuck::cast_slice_mut(&mut found))?;
             for (place, &track) in group.iter().enumerate() {
                 for sample in 0..count {
-                    let from = self.layout.index(place, sample, group.len(), count) * own;
-                    let to = self.layout.index(track, sample, tracks, count) * own;
+                    let from = self.layout.index(place, sample, group.len(), count);
+                    let to = self.layout.index(track, sample, tracks, count);
+                    let (Some(from), Some(to)) = (from, to) else {
+                        continue;
+                    };
+                    let (from, to) = (from * own, to * own);
                     numbers[to..to + own].copy_from_slice(&found[from..from + own]);
                 }
             }
