@@ -72,10 +72,8 @@ fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
             .fold(0.0, f32::max);
         let nudge = Quat::from_xyzw(0.3, -0.7, 0.5, 0.4) * (largest * f32::EPSILON);
         keys[key] += nudge;
-        let nudged = Track {
-            keys: &keys,
-            ..track
-        };
+        let mut nudged: Track<'_> = track;
+        nudged.keys = &keys;
         angle_between(own, Curve::of(interpolation, nudged).rotation(time)) < 1e-3
     })
 }

@@ -177,7 +177,8 @@ fn parts_are_those_of_the_whole() {
                         for (sample, s) in part.clone().enumerate() {
                             let size = encoding.bytes();
                             let from = layout.index(t, s, 5, samples).unwrap() * size;
-                            let to = layout.index(own, sample, tracks.len(), part.len()).unwrap() * size;
+                            let to =
+                                layout.index(own, sample, tracks.len(), part.len()).unwrap() * size;
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
                     }
