@@ -117,6 +117,9 @@ pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::{Track, TrackSet};
 pub use crate::tracks::vectors::{Channel, VectorKeys};
 
+pub use ash;
+pub use glam;
+
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
