@@ -73,5 +73,9 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
     let mut output = vec![0; rotations.len() * encoding.bytes()];
     bencher
         .counter(ItemsCount::new(rotations.len()))
-        .bench_local(|| encoding.encode(divan::black_box(&rotations), &mut output));
+        .bench_local(|| {
+            encoding
+                .encode(divan::black_box(&rotations), &mut output)
+                .unwrap()
+        });
 }

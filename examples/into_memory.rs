@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let set = TrackSet::with_shared_times(&times, &keys)?;
     let engine = Engine::new(Device::Cpu)?;
     let frames_asked = Frames::rate(FrameRate::new(u64::from(frames - 1), 20)?);
-    let mut output = OutputBuffer::new((tracks * frames) as usize);
+    let mut output = OutputBuffer::new((tracks * frames) as usize)?;
     let mut shortest = f64::INFINITY;
     for _ in 0..21 {
         let started = Instant::now();

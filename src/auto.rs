@@ -61,17 +61,34 @@ impl Probe {
 }
 
 impl Engine {
-    /// The device that evaluates calls of `rotations` rotations each fastest, into the host's
-    /// memory. The rule:
+    /// The device that evaluates large results fastest: the default where nothing speaks for a
+    /// certain device. It is [`Engine::auto_for`] with more rotations than any result has.
     ///
-    /// * fewer than 2^20: the CPU. It has done them before a device is even open.
-    /// * Software devices never: they compute on the CPU too, and slower.
-    /// * Else every device that is exact, and the CPU, evaluate a probe; what counts is
-    ///   the shortest of three times.
+    /// ```
+    /// let engine = tumble::Engine::auto()?;
+    /// println!("evaluating on {}", engine.device_name());
+    /// # Ok::<(), tumble::Error>(())
+    /// ```
     ///
     /// # Errors
     /// When the system refuses what the CPU needs.
-    pub fn auto(rotations: usize) -> Result<Self, Error> {
+    pub fn auto() -> Result<Self, Error> {
+        Self::auto_for(usize::MAX)
+    }
+
+    /// The device that evaluates calls of `rotations` rotations each fastest, into the host's
+    /// memory. All devices give the same bits, so the choice shows in nothing but the time. The
+    /// rule:
+    ///
+    /// * fewer than 2^20 rotations: the CPU. It has done them before a device is even open.
+    /// * Software devices (drivers such as Mesa's lavapipe and SwiftShader) never: they compute on
+    ///   the CPU too, and slower.
+    /// * Else every device that is exact, and the CPU, evaluate a probe of 2^19 rotations; what
+    ///   counts is the shortest of three times.
+    ///
+    /// # Errors
+    /// When the system refuses what the CPU needs.
+    pub fn auto_for(rotations: usize) -> Result<Self, Error> {
         let cpu = Self::new(Device::Cpu)?;
         if rotations < FEW_FOR_A_DEVICE {
             return Ok(cpu);
@@ -107,9 +124,9 @@ mod tests {
     /// device that is one.
     #[test]
     fn nothing_slower_than_the_cpu_is_chosen() {
-        let small = Engine::auto(2000).unwrap();
+        let small = Engine::auto_for(2000).unwrap();
         assert!(small.device_info().is_none());
-        let large = Engine::auto(usize::MAX).unwrap();
+        let large = Engine::auto().unwrap();
         let software = |info: &crate::gpu::physical::DeviceInfo| {
             info.kind == crate::gpu::physical::DeviceKind::Cpu
         };

@@ -3,11 +3,13 @@
 use glam::Quat;
 
 use crate::curve::options::Quantity;
-use crate::engine::Engine;
+use crate::engine::{Engine, check_rows, in_quats};
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
+use crate::memory::zeroed;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::row::Row;
 use crate::output::window::Window;
 use crate::time::frames::{Frames, FramesError, Timeline};
 
@@ -47,7 +49,8 @@ impl Clip {
     /// The rotation of every track at every sample, `[track][frame]`.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not
+    /// the memory for the result, or the device fails.
     pub fn evaluate(&self, frames: &Frames) -> Result<Rotations, Error> {
         self.evaluate_as(frames, Layout::TrackMajor)
     }
@@ -55,8 +58,9 @@ impl Clip {
     /// As [`Clip::evaluate`], in the given layout.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// As [`Clip::evaluate`].
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
+        check_rows::<Quat>(self.uploaded.data.interpolation.quantity)?;
         self.samples(frames, layout)
     }
 
@@ -80,26 +84,32 @@ impl Clip {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Clip::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch of
-    /// fresh memory costs more than evaluating.
+    /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory: [`Quat`] takes
+    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
+    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
+    /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
+    /// without a copy.
     ///
     /// # Errors
-    /// Also when `output` is not exactly as long as the result.
-    pub fn evaluate_into(
+    /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
+    /// type.
+    pub fn evaluate_into<R: Row>(
         &self,
         frames: &Frames,
         layout: Layout,
-        output: &mut [Quat],
+        output: &mut [R],
     ) -> Result<(), Error> {
+        check_rows::<R>(self.uploaded.data.interpolation.quantity)?;
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let (given, needed) = (output.len(), whole.len());
         if given != needed {
             return Err(Error::OutputLength { given, needed });
         }
-        let timeline = self.uploaded.data.folded(&timeline);
-        self.evaluate_window_into(&timeline, &whole, output)
+        let timeline = self.uploaded.data.folded(&timeline)?;
+        in_quats(output, |quats| {
+            self.evaluate_window_into(&timeline, &whole, quats)
+        })
     }
 
     /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
@@ -146,8 +156,9 @@ impl Clip {
     ) -> Result<Vec<u8>, Error> {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let mut output = bytemuck::zeroed_vec(whole.len() * encoding.bytes());
-        let timeline = self.uploaded.data.folded(&timeline);
+        let bytes = whole.len().saturating_mul(encoding.bytes());
+        let mut output = zeroed(bytes, "a result")?;
+        let timeline = self.uploaded.data.folded(&timeline)?;
         self.evaluate_bytes_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
     }
@@ -165,11 +176,12 @@ impl Clip {
     ) -> Result<(), Error> {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let (given, needed) = (output.len(), whole.len() * encoding.bytes());
+        let needed = whole.len().saturating_mul(encoding.bytes());
+        let given = output.len();
         if given != needed {
             return Err(Error::OutputBytes { given, needed });
         }
-        let timeline = self.uploaded.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline)?;
         self.evaluate_bytes_into(&timeline, &whole, encoding, output)
     }
 }
@@ -189,7 +201,7 @@ impl Encoding {
     pub(crate) fn check(self, quantity: Quantity) -> Result<(), Error> {
         match self.row().takes_vectors || quantity == Quantity::Rotation {
             true => Ok(()),
-            false => Err(Error::NotRotations { encoding: self }),
+            false => Err(Error::EncodesRotations { encoding: self }),
         }
     }
 }

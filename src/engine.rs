@@ -17,12 +17,17 @@ use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
 use crate::gpu::self_test::SelfTestReport;
 use crate::method::interpolation::Interpolation;
+use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::row::Row;
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
+
+/// The most worker threads that can be asked for.
+const MOST_THREADS: usize = 1024;
 
 /// Evaluates sets on one device.
 ///
@@ -58,19 +63,15 @@ impl Engine {
         Self::with_options(device, &EngineOptions::default())
     }
 
-    /// The first Vulkan device that opens and passes the self-test, else the CPU.
-    ///
-    /// # Errors
-    /// When the system refuses what the CPU needs.
-    pub fn first() -> Result<Self, Error> {
-        let exact = Device::list()
-            .unwrap_or_default()
-            .into_iter()
-            .find_map(|device| Self::new(device).ok());
-        exact.map_or_else(|| Self::new(Device::Cpu), Ok)
-    }
-
     /// Opens a device.
+    ///
+    /// ```
+    /// use tumble::{Device, Engine, EngineOptions};
+    /// let mut options = EngineOptions::default();
+    /// options.threads = Some(2);
+    /// let engine = Engine::with_options(Device::Cpu, &options)?;
+    /// # Ok::<(), tumble::Error>(())
+    /// ```
     ///
     /// # Errors
     /// When the device cannot be opened, or fails the self-test and
@@ -80,6 +81,10 @@ impl Engine {
         match device {
             Device::Cpu => {
                 let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
+                if let Some(given) = options.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
+                    let most = MOST_THREADS;
+                    return Err(Error::ThreadCount { given, most });
+                }
                 let engine =
                     CpuEngine::new(width, options.threads).map_err(|error| Error::Threads {
                         reason: error.to_string(),
@@ -173,7 +178,8 @@ impl Engine {
     /// some tracks at a time.
     ///
     /// # Errors
-    /// As [`Engine::upload`] and [`Clip::evaluate`].
+    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when the quantity is a velocity or an
+    /// acceleration.
     pub fn evaluate(
         &self,
         set: &TrackSet,
@@ -186,7 +192,7 @@ impl Engine {
     /// As [`Engine::evaluate`], in the given layout.
     ///
     /// # Errors
-    /// As [`Engine::upload`] and [`Clip::evaluate`].
+    /// As [`Engine::evaluate`].
     pub fn evaluate_as(
         &self,
         set: &TrackSet,
@@ -194,7 +200,9 @@ impl Engine {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Rotations, Error> {
-        self.samples(set, interpolation.into(), frames, layout)
+        let interpolation = interpolation.into();
+        check_rows::<Quat>(interpolation.quantity)?;
+        self.samples(set, interpolation, frames, layout)
     }
 
     /// The angular velocity or acceleration of every track at every sample, as
@@ -229,31 +237,36 @@ impl Engine {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Engine::evaluate_as`], into the caller's memory, which is faster when it
-    /// is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch of
-    /// fresh memory costs more than evaluating.
+    /// As [`Engine::evaluate_as`], or as [`Engine::rates`], into the caller's memory: [`Quat`] takes
+    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
+    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
+    /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
+    /// without a copy.
     ///
     /// # Errors
-    /// Also when `output` is not exactly as long as the result.
-    pub fn evaluate_into(
+    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when `output` is not exactly as long as the
+    /// result, or of another type.
+    pub fn evaluate_into<R: Row>(
         &self,
         set: &TrackSet,
         interpolation: impl Into<Interpolation>,
         frames: &Frames,
         layout: Layout,
-        output: &mut [Quat],
+        output: &mut [R],
     ) -> Result<(), Error> {
+        let interpolation = interpolation.into();
+        check_rows::<R>(interpolation.quantity)?;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
         let tracks = set.track_count();
-        let needed = tracks * timeline.len();
+        let needed = tracks * timeline.len(); // which `resolve` found to fit
         if output.len() != needed {
             let given = output.len();
             return Err(Error::OutputLength { given, needed });
         }
-        let interpolation = interpolation.into();
         let request = Request::whole(set, &interpolation, &timeline);
-        (self.backend).evaluate_tracks(&request, layout, output)?;
-        Ok(())
+        in_quats(output, |quats| {
+            Ok((self.backend).evaluate_tracks(&request, layout, quats)?)
+        })
     }
 
     /// Describes in words how a set would be evaluated: whether it is prepared, and in what
@@ -274,6 +287,30 @@ impl Engine {
         let route = (self.backend).route(&request, layout);
         Ok(route.to_string())
     }
+}
+
+/// Refuses memory of a type that does not hold what is asked for.
+pub(crate) fn check_rows<R: Row>(quantity: Quantity) -> Result<(), Error> {
+    match (R::holds(quantity), quantity) {
+        (true, _) => Ok(()),
+        (false, Quantity::Rotation) => Err(Error::NotRates),
+        (false, _) => Err(Error::NotRotations),
+    }
+}
+
+/// Fills the caller's memory as quaternions. Where it is not aligned as they are, memory that is gets
+/// the result first.
+pub(crate) fn in_quats<R: Row>(
+    output: &mut [R],
+    fill: impl FnOnce(&mut [Quat]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    if let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output) {
+        return fill(quats);
+    }
+    let mut quats = OutputBuffer::new(output.len())?;
+    fill(&mut quats)?;
+    output.copy_from_slice(bytemuck::cast_slice(&quats));
+    Ok(())
 }
 
 impl std::fmt::Debug for Engine {

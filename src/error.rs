@@ -5,12 +5,16 @@ use std::ops::Range;
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::OfDevice;
+use crate::memory::OutOfMemory;
 use crate::output::encoding::Encoding;
 use crate::path::options::FollowError;
+use crate::pose::skeleton::SkeletonError;
+use crate::pose_error::PoseError;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
 use crate::smooth::kernel::SmoothingError;
 use crate::time::frames::FramesError;
+use crate::tracks::error::TrackError;
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
@@ -58,21 +62,50 @@ pub enum Error {
         /// How many tracks and samples there are.
         whole: (usize, usize),
     },
+    /// There is not the memory.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
+    /// There is no such track.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    /// A skeleton cannot be made.
+    #[error(transparent)]
+    Skeleton(#[from] SkeletonError),
     /// Poses cannot be put together as asked.
-    #[error("{0}")]
-    Poses(&'static str),
+    #[error(transparent)]
+    Pose(#[from] PoseError),
     /// Velocities and accelerations are no rotations, and cannot be stored as such.
-    #[error("{encoding:?} stores rotations, not velocities or accelerations; use F32 or Vector")]
-    NotRotations {
+    #[error(
+        "{} stores rotations, not velocities or accelerations; use f32 or vector", encoding.name()
+    )]
+    EncodesRotations {
         /// What was asked for.
         encoding: Encoding,
     },
+    /// Rotations are asked for, and the quantity is a velocity or an acceleration.
+    #[error(
+        "the quantity is a velocity or an acceleration; `rates` evaluates it, and `evaluate_into` to `Vec4` or `[f32; 4]`"
+    )]
+    NotRotations,
     /// Rates of change are asked for, and the quantity is the rotation.
     #[error("the quantity is the rotation; ask for its velocity or its acceleration")]
     NotRates,
+    /// A buffer on a Vulkan device is given to an engine that is the CPU.
+    #[error(
+        "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with Engine::from_vulkan"
+    )]
+    BufferOnCpu,
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownWidth),
+    /// That many worker threads cannot be asked for.
+    #[error("{given} worker threads were asked for; give 1 to {most}, or none for the shared ones")]
+    ThreadCount {
+        /// What was given.
+        given: usize,
+        /// The most that can be asked for.
+        most: usize,
+    },
     /// The system refused worker threads.
     #[error("worker threads could not be started: {reason}")]
     Threads {
@@ -86,6 +119,7 @@ impl From<SetError> for Error {
         match error {
             SetError::Frames(error) => Self::Frames(error),
             SetError::Interpolation(error) => Self::Interpolation(error),
+            SetError::OutOfMemory(error) => Self::OutOfMemory(error),
         }
     }
 }

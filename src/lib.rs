@@ -12,8 +12,8 @@
 //! let keys = [0.0, 0.7, 2.0, 1.1].map(Quat::from_rotation_z);
 //! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;
 //!
-//! // 2. Where to evaluate: the first Vulkan device that is exact, else the CPU.
-//! let engine = Engine::first()?;
+//! // 2. Where to evaluate: the fastest device that is there.
+//! let engine = Engine::auto()?;
 //!
 //! // 3. A clip stays on the device; evaluate it as often as needed.
 //! let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
@@ -56,11 +56,13 @@ mod fit;
 mod from_keys;
 mod gpu;
 mod math;
+mod memory;
 pub mod method;
 mod output;
 mod own_device;
 mod path;
 mod pose;
+mod pose_error;
 mod prepare;
 pub mod reference;
 mod shader;
@@ -82,22 +84,26 @@ pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
 pub use crate::gpu::options::{EngineOptions, Reads, Timings, Transfer};
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
 pub use crate::gpu::self_test::SelfTestReport;
+pub use crate::memory::OutOfMemory;
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
 pub use crate::method::{Continuity, Cost, Keys, METHODS, Method};
 pub use crate::output::buffer::OutputBuffer;
 pub use crate::output::component_type::ComponentType;
-pub use crate::output::encoding::{Encoding, EncodingOptions, MatrixOrder};
+pub use crate::output::encoding::{Encoding, EncodingLength, EncodingOptions, MatrixOrder};
 pub use crate::output::euler::{EulerSequence, UnknownSequence};
-pub use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
+pub use crate::output::row::Row;
 pub use crate::path::options::{
     BodyAxis, Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
 };
 pub use crate::pose::follow::Followed;
+pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
 pub use crate::pose::skeleton::{Skeleton, SkeletonError};
 pub use crate::pose::transforms::Transforms;
-pub use crate::shader::{Form, kernels, spirv};
+pub use crate::pose_error::PoseError;
+pub use crate::shader::{Form, kernels};
 pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};
 pub use crate::stream::Chunk;
@@ -107,8 +113,12 @@ pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 pub use crate::tracks::error::TrackError;
 pub use crate::tracks::key_data::Tcb;
+pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::{Track, TrackSet};
 pub use crate::tracks::vectors::{Channel, VectorKeys};
+
+pub use ash;
+pub use glam;
 
 /// The README's example is compiled and run as a test.
 #[cfg(doctest)]

@@ -57,14 +57,14 @@ impl Clip {
         encoding: Encoding,
         buffer: VulkanBuffer,
     ) -> Result<(), Error> {
+        let Backend::Vulkan(opened) = &*self.engine().backend else {
+            return Err(Error::BufferOnCpu);
+        };
         self.check_encoding(encoding)?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline)?;
         let rotation = encoding.bytes() as u64;
-        let needed = (self.track_count() * timeline.len()) as u64 * rotation;
-        let Backend::Vulkan(opened) = &*self.engine().backend else {
-            return Err(VulkanError::NoDevice.into());
-        };
+        let needed = ((self.track_count() * timeline.len()) as u64).saturating_mul(rotation);
         if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {
             return Err(Error::Vulkan(VulkanError::OwnBuffer {
                 offset: buffer.offset,

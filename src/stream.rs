@@ -5,9 +5,10 @@ use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use glam::Quat;
+use glam::{Quat, Vec4};
 
 use crate::clip::Clip;
+use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
@@ -33,9 +34,37 @@ pub struct Chunk<'a> {
     pub tracks: Range<usize>,
     /// Its samples.
     pub samples: Range<usize>,
-    /// The rotations of these tracks and samples, `[track][sample]` or `[sample][track]` as the
-    /// layout says.
-    pub rotations: &'a [Quat],
+    /// The values of these tracks and samples, `[track][sample]` or `[sample][track]` as the layout
+    /// says: `x y z w` of rotations, `x y z 0` of velocities and accelerations. They are aligned to
+    /// 16 bytes.
+    pub rows: &'a [[f32; 4]],
+    quantity: Quantity,
+}
+
+impl<'a> Chunk<'a> {
+    fn new(window: Window, quats: &'a [Quat], quantity: Quantity) -> Self {
+        Self {
+            start: window.start,
+            tracks: window.tracks,
+            samples: window.samples,
+            rows: bytemuck::cast_slice(quats),
+            quantity,
+        }
+    }
+
+    /// The rotations; `None` if these are velocities or accelerations.
+    #[must_use]
+    pub fn rotations(&self) -> Option<&'a [Quat]> {
+        let quats = bytemuck::try_cast_slice(self.rows).ok();
+        quats.filter(|_| self.quantity == Quantity::Rotation)
+    }
+
+    /// The velocities or accelerations, each followed by 0; `None` if these are rotations.
+    #[must_use]
+    pub fn rates(&self) -> Option<&'a [Vec4]> {
+        let vectors = bytemuck::try_cast_slice(self.rows).ok();
+        vectors.filter(|_| self.quantity != Quantity::Rotation)
+    }
 }
 
 /// Buffers that are used in turn: one is filled, one is read, one waits.
@@ -50,14 +79,14 @@ impl Clip {
     /// of [`Clip::evaluate_as`]; memory is that of three chunks.
     ///
     /// ```
-    /// # use glam::Quat;
+    /// # use glam::{Quat, Vec4};
     /// # use tumble::{Device, Engine, Error, Frames, Layout, TrackSet, method};
     /// # let mut set = TrackSet::new();
     /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
     /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
     /// let mut largest: f32 = 0.0;
     /// clip.stream(&Frames::fps(60), Layout::FrameMajor, 1 << 20, |chunk| {
-    ///     largest = chunk.rotations.iter().map(|q| q.x).fold(largest, f32::max);
+    ///     largest = chunk.rows.iter().map(|[x, ..]| *x).fold(largest, f32::max);
     ///     Ok::<(), Error>(())
     /// })?;
     /// # assert_eq!(largest, (0.5f32).sin());
@@ -76,11 +105,12 @@ impl Clip {
     ) -> Result<(), E> {
         let timeline = self.timeline(frames).map_err(Error::from)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let timeline = self.uploaded.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             self.evaluate_window_into(&timeline, window, output)
         };
-        run(whole.cut(chunk), fill, sink)
+        let quantity = self.uploaded.data.interpolation.quantity;
+        run(whole.cut(chunk), quantity, fill, sink)
     }
 }
 
@@ -121,7 +151,7 @@ impl Engine {
             };
             Ok((self.backend).evaluate_tracks(&request, layout, output)?)
         };
-        run(whole.cut(chunk), fill, sink)
+        run(whole.cut(chunk), interpolation.quantity, fill, sink)
     }
 }
 
@@ -133,7 +163,7 @@ impl Engine {
     /// memory that is aligned to 16 bytes is filled without a copy.
     ///
     /// ```
-    /// # use glam::Quat;
+    /// # use glam::{Quat, Vec4};
     /// # use tumble::{Device, Encoding, Engine, Error, Frames, TrackSet, method};
     /// # let mut set = TrackSet::new();
     /// # let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
@@ -190,7 +220,7 @@ impl Engine {
         };
         let uploaded = Uploaded::new(&self.backend, set, interpolation, wanted, None)?;
         let whole = Window::whole(tracks.len(), timeline.len(), Layout::TrackMajor);
-        let timeline = uploaded.data.folded(&timeline);
+        let timeline = uploaded.data.folded(&timeline)?;
         uploaded.evaluate_encoded(&self.backend, &timeline, &whole, encoding, output)?;
         Ok(())
     }
@@ -223,7 +253,7 @@ impl Clip {
         if output.is_empty() {
             return Ok(());
         }
-        let timeline = self.uploaded.data.folded(&timeline);
+        let timeline = self.uploaded.data.folded(&timeline)?;
         if encoding == Encoding::F32
             && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
         {
@@ -251,7 +281,7 @@ impl Window {
                 whole: (tracks, samples),
             });
         }
-        match (output.len(), self.len() * encoding.bytes()) {
+        match (output.len(), self.len().saturating_mul(encoding.bytes())) {
             (given, needed) if given == needed => Ok(()),
             (given, needed) => Err(Error::OutputBytes { given, needed }),
         }
@@ -260,27 +290,34 @@ impl Window {
 
 /// Fills windows on a thread of their own; hands them to `sink` on this one.
 fn run<E: From<Error>>(
-    windows: Vec<Window>,
+    mut windows: impl Iterator<Item = Window> + Send,
+    quantity: Quantity,
     fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error> + Send,
     mut sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
+    let first = [windows.next(), windows.next()];
     // One chunk has nothing to overlap with.
-    if let [window] = &*windows {
-        let mut rotations = OutputBuffer::new(window.len());
-        fill(window, &mut rotations)?;
-        return sink(Chunk::new(window.clone(), &rotations));
+    if let [Some(window), None] = first {
+        let mut rotations = OutputBuffer::new(window.len()).map_err(Error::from)?;
+        fill(&window, &mut rotations)?;
+        return sink(Chunk::new(window, &rotations, quantity));
     }
+    let windows = first.into_iter().flatten().chain(windows);
     thread::scope(|scope| {
         let (give_back, empty) = sync_channel(BUFFERS);
         let (hand_over, filled) = sync_channel(BUFFERS);
         for _ in 0..BUFFERS {
-            let _ = give_back.send(OutputBuffer::new(0)); // it has room
+            let _ = give_back.send(OutputBuffer::new(0).map_err(Error::from)?); // it has room
         }
-        scope.spawn(move || fill_all(windows, fill, &empty, &hand_over));
+        thread::Builder::new()
+            .spawn_scoped(scope, move || fill_all(windows, fill, &empty, &hand_over))
+            .map_err(|error| Error::Threads {
+                reason: error.to_string(),
+            })?;
         for result in filled {
             let (window, rotations) = result?;
             let own = window.len();
-            sink(Chunk::new(window, &rotations[..own]))?;
+            sink(Chunk::new(window, &rotations[..own], quantity))?;
             let _ = give_back.send(rotations); // nobody needs it after the last
         }
         Ok(())
@@ -289,34 +326,27 @@ fn run<E: From<Error>>(
 
 /// Fills the windows in order; stops after an error, or when the receiver is gone.
 fn fill_all(
-    windows: Vec<Window>,
+    windows: impl Iterator<Item = Window>,
     fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error>,
     empty: &Receiver<OutputBuffer>,
     hand_over: &SyncSender<Filled>,
 ) {
     for window in windows {
-        let Ok(mut rotations) = empty.recv() else {
+        let Ok(used) = empty.recv() else {
             return;
         };
-        if rotations.len() < window.len() {
-            rotations = OutputBuffer::new(window.len());
-        }
-        let result = fill(&window, &mut rotations[..window.len()]);
+        let large_enough = match used.len() < window.len() {
+            true => OutputBuffer::new(window.len()),
+            false => Ok(used),
+        };
+        let result = large_enough.map_err(Error::from).and_then(|mut rotations| {
+            fill(&window, &mut rotations[..window.len()])?;
+            Ok((window, rotations))
+        });
         let failed = result.is_err();
-        let taken = hand_over.send(result.map(|()| (window, rotations)));
+        let taken = hand_over.send(result);
         if failed || taken.is_err() {
             return;
-        }
-    }
-}
-
-impl<'a> Chunk<'a> {
-    fn new(window: Window, rotations: &'a [Quat]) -> Self {
-        Self {
-            start: window.start,
-            tracks: window.tracks,
-            samples: window.samples,
-            rotations,
         }
     }
 }

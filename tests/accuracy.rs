@@ -33,7 +33,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
         let curve = Curve::of(&interpolation, track);
         for s in 0..rotations.samples() {
             let found = rotations.get(t, s).unwrap().as_dquat();
-            let time = timeline.time(t, s);
+            let time = timeline.time(t, s).unwrap();
             let error = angle_between(found, curve.rotation(time));
             // Only where controls are the bisectors themselves have they been opposite.
             let may_be_none = method == tumble::method::SHOEMAKE;
@@ -72,10 +72,8 @@ fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
             .fold(0.0, f32::max);
         let nudge = Quat::from_xyzw(0.3, -0.7, 0.5, 0.4) * (largest * f32::EPSILON);
         keys[key] += nudge;
-        let nudged = Track {
-            keys: &keys,
-            ..track
-        };
+        let mut nudged: Track<'_> = track;
+        nudged.keys = &keys;
         angle_between(own, Curve::of(interpolation, nudged).rotation(time)) < 1e-3
     })
 }
@@ -344,7 +342,9 @@ fn times_of_frames_are_within_rounding_of_frames() {
         let clip = clip(&set, method.into());
         let frames = Frames::fps(60);
         let timeline = clip.timeline(&frames).unwrap();
-        let times = (0..timeline.len()).map(|s| timeline.time(0, s)).collect();
+        let times = (0..timeline.len())
+            .map(|s| timeline.time(0, s).unwrap())
+            .collect();
         let by_frame: Rotations = clip.evaluate(&frames).unwrap();
         let by_time = clip.evaluate(&Frames::at(times)).unwrap();
         for (a, b) in by_frame.as_quats().iter().zip(by_time.as_quats()) {

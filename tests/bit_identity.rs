@@ -147,7 +147,9 @@ fn long_results_have_the_bits_of_short_ones() {
             let what = format!("{method}, {width:?}, kept");
             assert_same_bits(long.as_quats(), kept.as_quats(), &what);
             for (i, found) in long.as_quats().chunks(10 * samples).enumerate() {
-                let few = set.select(10 * i..(10 * i + 10).min(set.track_count()));
+                let few = set
+                    .select(10 * i..(10 * i + 10).min(set.track_count()))
+                    .unwrap();
                 let short = engine.evaluate(&few, method, &frames).unwrap();
                 let what = format!("{method}, {width:?}, from track {}", 10 * i);
                 assert_same_bits(short.as_quats(), found, &what);
@@ -848,7 +850,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
             // At half a turn exactly either way round is as short.
             for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
                 let curve = Curve::of(&interpolation, set.track(track));
-                let reference = curve.rotation(timeline.time(track, 0));
+                let reference = curve.rotation(timeline.time(track, 0).unwrap());
                 let found = expected.get(track, 0).unwrap().as_dquat();
                 let error = angle_between(found, reference);
                 assert!(

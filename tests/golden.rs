@@ -401,7 +401,7 @@ impl Cases {
             self.rows("day", method.name, shortest(method), &film);
             for (name, quantity) in [
                 ("velocity body", Quantity::Velocity(Axes::Body)),
-                ("acceleration world", Quantity::Acceleration(Axes::World)),
+                ("acceleration world", Quantity::Acceleration(Axes::Parent)),
             ] {
                 let interpolation = Interpolation {
                     quantity,
@@ -563,7 +563,7 @@ impl Cases {
         let tomorrow = Frames::fps(60).between(86_400.0, 86_403.0);
         self.rows("uneven", "slerp Loop tomorrow", looped, &tomorrow);
         let velocity = Interpolation {
-            quantity: Quantity::Velocity(Axes::World),
+            quantity: Quantity::Velocity(Axes::Parent),
             ..looped
         };
         self.rows("closed", "slerp velocity Loop", velocity, &frames);
@@ -641,10 +641,15 @@ fn hash_of<T: bytemuck::Pod>(parts: &[&[T]]) -> String {
 fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
     match what {
         What::Set(interpolation, frames, layout) => {
-            let found = engine
-                .evaluate_as(set, *interpolation, frames, *layout)
-                .unwrap();
-            hash_of(&[found.as_quats()])
+            if interpolation.quantity == Quantity::Rotation {
+                let found = engine
+                    .evaluate_as(set, *interpolation, frames, *layout)
+                    .unwrap();
+                hash_of(&[found.as_quats()])
+            } else {
+                let found = engine.rates(set, *interpolation, frames, *layout).unwrap();
+                hash_of(&[found.as_slice()])
+            }
         }
         What::Encoded(interpolation, frames, layout, encoding) => {
             let clip = engine.upload(set, *interpolation).unwrap();
@@ -655,7 +660,9 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let clip = engine.upload(set, *interpolation).unwrap();
             let mut all = Vec::new();
             let take = |chunk: tumble::Chunk<'_>| -> Result<(), tumble::Error> {
-                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(chunk.rotations));
+                all.extend_from_slice(bytemuck::cast_slice::<Quat, u32>(
+                    chunk.rotations().unwrap(),
+                ));
                 Ok(())
             };
             clip.stream(frames, *layout, 777, take).unwrap();
@@ -708,7 +715,7 @@ fn evaluated(engine: &Engine, set: &TrackSet, what: &What) -> String {
             let reference: Vec<Quat> = set.tracks().map(|track| track.keys[0]).collect();
             let added = engine.add(&blended, &mixed, &reference, 0.7).unwrap();
             let world = engine
-                .world(&added, &Skeleton::chain(set.track_count(), 3.0))
+                .world(&added, &Skeleton::chain(set.track_count(), 3.0).unwrap())
                 .unwrap();
             hash_of(&[
                 bytemuck::cast_slice(blended.as_quats()),

@@ -95,7 +95,7 @@ fn outside_is_what_the_words_say() {
                         let curve = Curve::of(&interpolation, track);
                         let steps = method == method::STEP;
                         for s in 0..found.samples() {
-                            let time = timeline.time(t, s);
+                            let time = timeline.time(t, s).unwrap();
                             if (steps || before == WrapMode::Loop || after == WrapMode::Loop)
                                 && near_a_seam(track, time)
                             {
@@ -159,7 +159,7 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                 let mut streamed = Vec::new();
                 let layout = Layout::TrackMajor;
                 cpu.stream(&long, interpolation, &frames, layout, 1000, |chunk| {
-                    streamed.extend_from_slice(chunk.rotations);
+                    streamed.extend_from_slice(chunk.rotations().unwrap());
                     Ok::<(), tumble::Error>(())
                 })
                 .unwrap();
@@ -198,8 +198,12 @@ fn two_keys_go_on_turning() {
             ..method::C2.into()
         };
         let frames = Frames::at(at.to_vec());
-        let found = engine.evaluate(&set, interpolation, &frames).unwrap();
-        for (q, time) in found.as_quats().iter().zip(at) {
+        let mut found = [[0.0; 4]; 3];
+        let layout = Layout::TrackMajor;
+        engine
+            .evaluate_into(&set, interpolation, &frames, layout, &mut found)
+            .unwrap();
+        for (q, time) in found.map(Quat::from_array).into_iter().zip(at) {
             let turn = end.to_scaled_axis() / 10.0;
             let off = match quantity {
                 Quantity::Rotation => {
@@ -216,7 +220,7 @@ fn two_keys_go_on_turning() {
         ..method::C2.into()
     };
     let refused = engine
-        .evaluate(&set, mirrored, &Frames::fps(1))
+        .rates(&set, mirrored, &Frames::fps(1), Layout::TrackMajor)
         .unwrap_err();
     assert_eq!(
         refused.to_string(),

@@ -5,7 +5,7 @@ use crate::support::{Random, hostile_set, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::{angle_between, slerp};
 use tumble::{
-    Device, Engine, EngineOptions, Error, Frames, Layout, Rotations, Skeleton, TrackSet,
+    Device, Engine, EngineOptions, Error, Frames, Layout, PoseError, Rotations, Skeleton, TrackSet,
     WorldPoses, method,
 };
 
@@ -199,19 +199,42 @@ fn what_does_not_fit_is_refused() {
         .evaluate(&set, method::SLERP, &Frames::fps(2))
         .unwrap();
     let refused = |result: Result<Rotations, Error>| match result {
-        Err(Error::Poses(message)) => message,
+        Err(Error::Pose(error)) => error,
         other => panic!("{other:?}"),
     };
-    assert!(refused(engine.blend(&[])).contains("no layer"));
-    assert!(refused(engine.blend(&[(&few, f32::NAN)])).contains("not finite"));
-    assert!(refused(engine.mix(&few, &all[0], 0.5)).contains("differ"));
-    assert!(refused(engine.mix(&few, &few, 1.5)).contains("between 0 and 1"));
-    assert!(refused(engine.add(&few, &few, &[], 0.5)).contains("one reference"));
-    let world = engine.world(&few, &Skeleton::chain(2, 1.0));
-    assert!(matches!(world, Err(Error::Poses(_))));
+    assert_eq!(refused(engine.blend(&[])), PoseError::NoLayer);
+    assert!(matches!(
+        refused(engine.blend(&[(&few, f32::NAN)])),
+        PoseError::WeightNotFinite { layer: 0, .. }
+    ));
+    assert!(matches!(
+        refused(engine.mix(&few, &all[0], 0.5)),
+        PoseError::Shape { layer: 1, .. }
+    ));
+    assert_eq!(
+        refused(engine.mix(&few, &few, 1.5)),
+        PoseError::WeightOutOfRange { weight: 1.5 }
+    );
+    assert_eq!(
+        refused(engine.add(&few, &few, &[], 0.5)),
+        PoseError::References {
+            given: 0,
+            tracks: 3
+        }
+    );
+    let world = engine.world(&few, &Skeleton::chain(2, 1.0).unwrap());
+    assert!(matches!(
+        world,
+        Err(Error::Pose(PoseError::Skeleton {
+            given: 2,
+            tracks: 3
+        }))
+    ));
     let nothing = engine
         .evaluate(&TrackSet::new(), method::SLERP, &Frames::fps(2))
         .unwrap();
-    let world = engine.world(&nothing, &Skeleton::chain(0, 1.0)).unwrap();
+    let world = engine
+        .world(&nothing, &Skeleton::chain(0, 1.0).unwrap())
+        .unwrap();
     assert_eq!((world.tracks(), world.as_slice().len()), (0, 0));
 }

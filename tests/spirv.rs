@@ -7,7 +7,11 @@ use std::process::{Command, Stdio};
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
-use tumble::spirv::{
+#[allow(dead_code, unreachable_pub)] // the pass that the build and the engine have
+#[path = "../src/shader/spirv.rs"]
+mod pass;
+
+use pass::{
     FloatControls, SpirvError, float_controls, no_contraction, texel_buffers, without_decorations,
 };
 

@@ -22,12 +22,12 @@ impl Collected {
     fn take(&mut self, chunk: &tumble::Chunk<'_>) {
         assert_eq!(chunk.start, self.rotations.len());
         assert_eq!(
-            chunk.rotations.len(),
+            chunk.rotations().unwrap().len(),
             chunk.tracks.len() * chunk.samples.len()
         );
-        self.rotations.extend_from_slice(chunk.rotations);
+        self.rotations.extend_from_slice(chunk.rotations().unwrap());
         self.chunks += 1;
-        self.largest = self.largest.max(chunk.rotations.len());
+        self.largest = self.largest.max(chunk.rotations().unwrap().len());
     }
 }
 
@@ -176,8 +176,9 @@ fn parts_are_those_of_the_whole() {
                     for (own, t) in tracks.clone().enumerate() {
                         for (sample, s) in part.clone().enumerate() {
                             let size = encoding.bytes();
-                            let from = layout.index(t, s, 5, samples) * size;
-                            let to = layout.index(own, sample, tracks.len(), part.len()) * size;
+                            let from = layout.index(t, s, 5, samples).unwrap() * size;
+                            let to =
+                                layout.index(own, sample, tracks.len(), part.len()).unwrap() * size;
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
                     }

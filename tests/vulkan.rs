@@ -67,7 +67,9 @@ fn the_validation_layer_has_nothing_to_say() {
                         engine.blend(&[(&poses, 0.5), (&poses, 1.0)]).unwrap();
                         engine.mix(&poses, &poses, 0.5).unwrap();
                         engine.add(&poses, &poses, &reference, 0.5).unwrap();
-                        engine.world(&poses, &Skeleton::chain(64, 1.0)).unwrap();
+                        engine
+                            .world(&poses, &Skeleton::chain(64, 1.0).unwrap())
+                            .unwrap();
                         for encoding in Encoding::KINDS {
                             clip.evaluate_encoded(frames, layout, encoding).unwrap();
                         }

@@ -96,7 +96,7 @@ pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
     if probe::drivers().is_err() {
         return Ok(None);
     }
-    let engine = Engine::auto(rotations).map_err(|error| Refused {
+    let engine = Engine::auto_for(rotations).map_err(|error| Refused {
         message: error.to_string(),
         is_usage: false,
     })?;

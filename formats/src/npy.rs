@@ -158,7 +158,8 @@ impl<W: Write> NpyWriter<W> {
                 false => q.to_array(),
             }));
             bytes.resize(block.len() * self.encoding.bytes(), 0);
-            self.encoding.encode(&ordered, &mut bytes);
+            let encoded = self.encoding.encode(&ordered, &mut bytes);
+            encoded.map_err(io::Error::other)?;
             if !little {
                 let component = self.encoding.component_type().bytes();
                 bytes.chunks_exact_mut(component).for_each(<[u8]>::reverse);

@@ -63,10 +63,10 @@ impl Poses<'_> {
         }
         csv.write_record(&row)?;
         let each = tracks * self.components.len();
-        for frame in 0..self.timeline.len() {
+        for (frame, time) in self.timeline.times(0).enumerate() {
             row.clear();
             row.push(frame.to_string());
-            row.push(self.timeline.time(0, frame).to_string());
+            row.push(time.to_string());
             let numbers = &self.numbers[frame * each..(frame + 1) * each];
             row.extend(numbers.iter().map(f32::to_string));
             csv.write_record(&row)?;

@@ -90,7 +90,7 @@ impl ChannelMethods<'_> {
         let tracks = clip.set.track_count();
         let frames = over(clip, frames);
         let timeline = frames.resolve(tracks, None)?;
-        let times: Vec<f64> = (0..timeline.len()).map(|i| timeline.time(0, i)).collect();
+        let times: Vec<f64> = timeline.times(0).collect();
         let layout = Layout::FrameMajor;
         let mut samples = Samples {
             rotations: self.rotations(engine, clip, &frames, layout)?,
@@ -159,7 +159,7 @@ impl ChannelMethods<'_> {
         let mut all = Vec::new();
         for (method, group) in self.groups_of(clip) {
             let interpolation = (self.with)(method);
-            let set = clip.tracks(&group);
+            let set = clip.tracks(&group)?;
             let found = evaluate(&set, interpolation)?;
             all.resize(tracks * found.samples(), T::default());
             scatter(values(&found), &group, tracks, layout, &mut all);
@@ -191,7 +191,7 @@ impl ChannelMethods<'_> {
             if !is_keyed(group[0]) {
                 continue;
             }
-            let set = clip.tracks(&group);
+            let set = clip.tracks(&group)?;
             let interpolation = (self.with)(method::SLERP);
             let method = method(group[0]);
             let layout = Layout::FrameMajor;
@@ -257,11 +257,11 @@ impl Motion {
     }
 
     /// Some tracks as a set of their own, without a copy where they are all tracks in their order.
-    fn tracks(&self, group: &[usize]) -> Cow<'_, TrackSet> {
+    fn tracks(&self, group: &[usize]) -> Result<Cow<'_, TrackSet>, Error> {
         if group.len() == self.set.track_count() {
-            return Cow::Borrowed(&self.set);
+            return Ok(Cow::Borrowed(&self.set));
         }
-        Cow::Owned(self.set.select(group.iter().copied()))
+        Ok(Cow::Owned(self.set.select(group.iter().copied())?))
     }
 
     /// Whether any track has keys of translations or scales.
@@ -319,8 +319,11 @@ fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout
     let samples = values.len() / group.len();
     for (place, &track) in group.iter().enumerate() {
         for sample in 0..samples {
-            all[layout.index(track, sample, tracks, samples)] =
-                values[layout.index(place, sample, group.len(), samples)];
+            let to = layout.index(track, sample, tracks, samples);
+            let from = layout.index(place, sample, group.len(), samples);
+            if let (Some(to), Some(from)) = (to, from) {
+                all[to] = values[from];
+            }
         }
     }
 }

@@ -5,7 +5,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use clap::Parser;
 use glam::Quat;
-use tumble::spirv::{FloatControls, float_controls, no_contraction, without_decorations};
+#[allow(dead_code, unreachable_pub)] // the pass that the build and the engine have
+#[path = "../../src/shader/spirv.rs"]
+mod pass;
+
+use pass::{FloatControls, float_controls, no_contraction, without_decorations};
 use tumble::{
     Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS, Path,
     Speed, TrackSet, WrapMode,
@@ -289,8 +293,12 @@ pub(crate) fn frames(bytes: &[u8]) -> u64 {
                 let last = timeline.len().saturating_sub(1);
                 for sample in [0, 1, last / 2, last] {
                     if sample < timeline.len() && tracks > 0 {
-                        assert!(timeline.time(0, sample).is_finite());
-                        assert!(timeline.time(tracks - 1, sample).is_finite());
+                        assert!(timeline.time(0, sample).is_some_and(f64::is_finite));
+                        assert!(
+                            timeline
+                                .time(tracks - 1, sample)
+                                .is_some_and(f64::is_finite)
+                        );
                     }
                 }
                 outcomes.push(timeline.len().min(4).to_string());

@@ -66,9 +66,10 @@ pub(crate) fn layout_named(name: &str) -> PyResult<Layout> {
 pub(crate) fn axes_named(name: &str) -> PyResult<Axes> {
     match name {
         "body" => Ok(Axes::Body),
-        "world" => Ok(Axes::World),
+        // A track that has no parent turns in the world.
+        "parent" | "world" => Ok(Axes::Parent),
         _ => Err(input(format!(
-            "axes: there is no `{name}`; there are body, world"
+            "axes: there is no `{name}`; there are body, parent"
         ))),
     }
 }
@@ -172,7 +173,8 @@ impl Engine {
     }
 
     /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,
-    /// about the axes of the "body" or of the "world" (in a skeleton, the parent's). Other keywords
+    /// about the axes of the "body" or of its "parent" (of a track without one the world, and "world" is
+    /// taken too). Other keywords
     /// are those of `evaluate`.
     ///
     /// >>> import tumble

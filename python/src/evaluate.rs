@@ -146,7 +146,7 @@ impl Result {
                 continue;
             };
             // Tracks of other methods lie between these.
-            let set = clip.set.select(group.iter().copied());
+            let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
             let frames = samples.frames(&clip.set, Some(&group))?;
             let mut found = vec![0.0_f32; group.len() * count * own];
             let job = Job {
@@ -158,8 +158,12 @@ impl Result {
             job.write(bytemuck::cast_slice_mut(&mut found))?;
             for (place, &track) in group.iter().enumerate() {
                 for sample in 0..count {
-                    let from = self.layout.index(place, sample, group.len(), count) * own;
-                    let to = self.layout.index(track, sample, tracks, count) * own;
+                    let from = self.layout.index(place, sample, group.len(), count);
+                    let to = self.layout.index(track, sample, tracks, count);
+                    let (Some(from), Some(to)) = (from, to) else {
+                        continue;
+                    };
+                    let (from, to) = (from * own, to * own);
                     numbers[to..to + own].copy_from_slice(&found[from..from + own]);
                 }
             }
@@ -205,7 +209,7 @@ impl Result {
                     }
                     let (numbers_of_track, rest) = numbers.split_at_mut(list.len() * own);
                     numbers = rest;
-                    let one = track_of(clip, track);
+                    let one = track_of(clip, track)?;
                     let samples = Samples::Shared {
                         times: list.as_slice().into(),
                         is_one: false,
@@ -265,13 +269,17 @@ impl Result {
 }
 
 /// One track of a clip, with its channels.
-fn track_of(clip: &Motion, track: usize) -> Motion {
-    Motion {
-        set: clip.set.select([track]),
+fn track_of(clip: &Motion, track: usize) -> PyResult<Motion> {
+    Ok(Motion {
+        set: clip.set.select([track]).map_err(of_tracks)?,
         channels: clip.channels.get(track).copied().into_iter().collect(),
         skeleton: Vec::new(),
         ..Motion::default()
-    }
+    })
+}
+
+fn of_tracks(error: tumble::TrackError) -> PyErr {
+    of_engine(&error.into())
 }
 
 /// The one set and method of a clip whose tracks are all interpolated alike.
@@ -286,14 +294,14 @@ pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
 pub(crate) fn sets(
     clip: &Motion,
     request: &Request,
-) -> Vec<(Method, TrackSet, Option<Vec<usize>>)> {
+) -> PyResult<Vec<(Method, TrackSet, Option<Vec<usize>>)>> {
     groups(clip, request.method)
         .into_iter()
         .map(|(method, group)| match group {
-            None => (method, clip.set.clone(), None),
+            None => Ok((method, clip.set.clone(), None)),
             Some(tracks) => {
-                let set = clip.set.select(tracks.iter().copied());
-                (method, set, Some(tracks))
+                let set = clip.set.select(tracks.iter().copied()).map_err(of_tracks)?;
+                Ok((method, set, Some(tracks)))
             }
         })
         .collect()

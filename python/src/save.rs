@@ -363,7 +363,8 @@ fn stream(
         Layout::TrackMajor => 1,
         Layout::FrameMajor => clip.set.track_count(),
     };
-    let sink = |chunk: tumble::Chunk<'_>| sink(chunk.rotations).map_err(Ended::Sink);
+    let sink =
+        |chunk: tumble::Chunk<'_>| sink(chunk.rotations().unwrap_or_default()).map_err(Ended::Sink);
     let streamed = engine.stream(
         &clip.set,
         interpolation,

@@ -49,7 +49,7 @@ impl Verification {
             passes: true,
         };
         let with = request.with(Quantity::Rotation);
-        let sets = sets(clip, request);
+        let sets = sets(clip, request)?;
         let is_one = sets.len() == 1;
         for (method, set, tracks) in sets {
             check_signals()?;

@@ -68,7 +68,7 @@ impl CpuEngine {
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
             rotations.resize(window.len(), [0.0; 4]);
             self.window(clip, timeline, window, 0, rotations)?;
-            encoding.encode(rotations, output);
+            encoding.encode_all(rotations, output);
             Ok(())
         };
         if window.len() <= TASK {
@@ -248,5 +248,5 @@ fn tasks<'a, T>(
             TASK.max(share.min(TASK_FRAMES / 4) * window.tracks.len())
         }
     };
-    window.cut(limit).into_iter().map(with_output).collect()
+    window.cut(limit).map(with_output).collect()
 }

@@ -104,7 +104,7 @@ impl<'a> Row<'a> {
             if *rotation != UNRESOLVED {
                 continue;
             }
-            let time = self.request.timeline.time(self.index, sample);
+            let time = self.request.timeline.time_at(self.index, sample);
             let after = times.partition_point(|&key| key <= time);
             let mut interval = after.saturating_sub(1).clamp(self.key, last - 1);
             // A sample within rounding of a key is that key.

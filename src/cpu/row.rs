@@ -184,7 +184,7 @@ impl<S: Evaluate> Row<'_, S> {
                 for (chunk, output) in output.chunks_mut(CHUNK).enumerate() {
                     let count = output.len();
                     for (j, own) in (chunk * CHUNK..).zip(&mut from_middle[..count]) {
-                        let time = || self.timeline.time(part.track as usize, run.sample + j);
+                        let time = || self.timeline.time_at(part.track as usize, run.sample + j);
                         *own = distance.of(j, time);
                     }
                     distances::<L, S>(segment, affine, &from_middle, count, output);

@@ -42,8 +42,9 @@ pub enum Speed {
 pub enum Axes {
     /// Those of the body that turns.
     Body,
-    /// Those of the frame in which it turns; in a chain, the parent's.
-    World,
+    /// Those of the frame in which it turns: its parent's in a skeleton, the world's for a track that
+    /// has no parent.
+    Parent,
 }
 
 /// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.

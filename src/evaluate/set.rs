@@ -48,7 +48,7 @@ impl Backend {
             let clip = Uploaded::new(self, request.set, *request.interpolation, wanted, None)?;
             return clip.evaluate(self, request.timeline, layout);
         }
-        let mut quats = OutputBuffer::new(request.tracks.len() * request.timeline.len());
+        let mut quats = OutputBuffer::new(request.tracks.len() * request.timeline.len())?;
         self.evaluate_tracks(request, layout, &mut quats)?;
         Ok(Box::new(quats))
     }
@@ -145,7 +145,7 @@ impl Backend {
                 }
                 clip => clip?,
             };
-            let folded = clip.data.folded(&timeline);
+            let folded = clip.data.folded(&timeline)?;
             let window = Window {
                 samples: batch.samples(set, &timeline, PART_INTERVALS),
                 ..Window::whole(own.len(), timeline.len(), layout)

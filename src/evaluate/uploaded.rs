@@ -70,7 +70,7 @@ impl Uploaded {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let timeline = self.data.folded(timeline);
+        let timeline = self.data.folded(timeline)?;
         match backend {
             Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
                 let buffers = self.buffers_on(engine)?;
@@ -78,7 +78,7 @@ impl Uploaded {
             }),
             Backend::Cpu(_) => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
-                let mut quats = OutputBuffer::new(whole.len());
+                let mut quats = OutputBuffer::new(whole.len())?;
                 self.evaluate_window(backend, &timeline, &whole, &mut quats)?;
                 Ok(Box::new(quats))
             }

@@ -300,7 +300,7 @@ impl VulkanEngine {
             false => None,
         };
         let Some(mut buffer) = buffer else {
-            let mut quats = OutputBuffer::new(whole.len());
+            let mut quats = OutputBuffer::new(whole.len())?;
             self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
         };

@@ -3,6 +3,7 @@
 use ash::vk;
 
 use crate::curve::options::InterpolationError;
+use crate::memory::OutOfMemory;
 use crate::prepare::error::SetError;
 use crate::time::frames::FramesError;
 
@@ -157,6 +158,12 @@ pub(crate) enum EvaluateError {
 
 impl From<FramesError> for EvaluateError {
     fn from(error: FramesError) -> Self {
+        Self::Set(error.into())
+    }
+}
+
+impl From<OutOfMemory> for EvaluateError {
+    fn from(error: OutOfMemory) -> Self {
         Self::Set(error.into())
     }
 }

@@ -178,7 +178,7 @@ impl Flight for InFlight {
         };
         for (place, value) in done.patches {
             let place = place * rotation;
-            encoding.encode(&[value], &mut output[place..place + rotation]);
+            encoding.encode_all(&[value], &mut output[place..place + rotation]);
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())

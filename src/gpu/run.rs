@@ -25,8 +25,8 @@ impl VulkanEngine {
         let mut in_flight = lock(&self.in_flight);
         // `self.window()` counts rotations of 16 bytes; of larger ones a window holds fewer.
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
-        let cut = |window: &Window| window.cut((self.window() / each).max(1));
-        let mut windows = VecDeque::from(cut(window));
+        let most = || (self.window() / each).max(1);
+        let mut windows: VecDeque<Window> = window.cut(most()).collect();
         while in_flight.len() < IN_FLIGHT.min(windows.len()) {
             in_flight.push(InFlight::new(&self.device)?);
         }
@@ -36,7 +36,7 @@ impl VulkanEngine {
         while let Some(window) = windows.pop_front() {
             if stopwatch.is_slow() && self.halve_windows() {
                 let rest = std::iter::once(window).chain(windows);
-                windows = rest.flat_map(|window| window.within(cut)).collect();
+                windows = rest.flat_map(|window| window.within(most())).collect();
                 continue;
             }
             next = (next + 1) % in_flight.len();
@@ -177,7 +177,7 @@ impl VulkanEngine {
                 evaluation.submission.barrier(Access::Kernel, Access::Copy);
                 let mut bytes = vec![0; encoding.bytes()];
                 for (place, value) in patches.drain(..) {
-                    encoding.encode(&[value], &mut bytes);
+                    encoding.encode_all(&[value], &mut bytes);
                     let offset = start + place as u64 * rotation;
                     evaluation.submission.update(buffer.raw, offset, &bytes);
                 }

@@ -264,7 +264,7 @@ impl SampleChunk<'_> {
             RunSource::Constant(constant) => own.fill(held(constant)),
             RunSource::Segment(source, distance, Affine { scale, offset }) => {
                 for (j, single) in own.iter_mut().enumerate() {
-                    let time = || timeline.time(track, first_sample + j);
+                    let time = || timeline.time_at(track, first_sample + j);
                     let parameter = distance.of(skipped + j, time) * scale + offset;
                     *single = ListedSample { source, parameter };
                 }

@@ -195,7 +195,7 @@ impl Emit for RunItems<'_> {
                 Distance::Frames { first } => first,
                 Distance::Seconds { middle } => {
                     let own = chunk.distances.len() as i32;
-                    let time = |sample| self.timeline.time(self.track, sample);
+                    let time = |sample| self.timeline.time_at(self.track, sample);
                     let from_middle = |sample| round_f32(time(sample) - middle);
                     chunk.distances.extend(samples.clone().map(from_middle));
                     own

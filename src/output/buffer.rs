@@ -5,12 +5,16 @@ use std::ops::{Deref, DerefMut};
 
 use glam::Quat;
 
+use crate::memory::{OutOfMemory, refuse_more_than_there_is, zeroed};
 use crate::output::rotations::Storage;
 
 /// For this many bytes or more, allocators take fresh pages from the system each time and give them
 /// back afterwards.
 #[cfg(target_os = "linux")]
 const LONG: usize = 32 << 20;
+
+/// What [`OutOfMemory`] calls it.
+const WHAT: &str = "a result";
 
 /// Memory for a result, zero at first, for functions that write to the caller's memory, such as
 /// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into). On Linux, buffers of 32 MiB or
@@ -23,7 +27,7 @@ const LONG: usize = 32 << 20;
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
 /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
 /// let frames = Frames::fps(60);
-/// let mut rotations = OutputBuffer::new(clip.track_count() * clip.timeline(&frames)?.len());
+/// let mut rotations = OutputBuffer::new(clip.track_count() * clip.timeline(&frames)?.len())?;
 /// clip.evaluate_into(&frames, Layout::TrackMajor, &mut rotations)?;
 /// # assert_eq!(rotations[0], Quat::IDENTITY);
 /// # Ok::<(), Error>(())
@@ -38,8 +42,11 @@ enum Memory {
 
 impl OutputBuffer {
     /// A buffer for this number of rotations.
-    #[must_use]
-    pub fn new(rotations: usize) -> Self {
+    ///
+    /// # Errors
+    /// When there is not so much memory.
+    pub fn new(rotations: usize) -> Result<Self, OutOfMemory> {
+        refuse_more_than_there_is::<Quat>(rotations, WHAT)?;
         #[cfg(target_os = "linux")]
         if let Some(bytes) = rotations.checked_mul(size_of::<Quat>())
             && bytes >= LONG
@@ -47,9 +54,9 @@ impl OutputBuffer {
         {
             // If the system does not take the advice, pages are of the ordinary size.
             let _ = memory.advise(memmap2::Advice::HugePage);
-            return Self(Memory::HugePages(memory));
+            return Ok(Self(Memory::HugePages(memory)));
         }
-        Self(Memory::Heap(bytemuck::zeroed_vec(rotations)))
+        Ok(Self(Memory::Heap(zeroed(rotations, WHAT)?)))
     }
 }
 
@@ -95,7 +102,7 @@ mod tests {
     #[test]
     fn all_that_was_asked_for_is_there() {
         for rotations in [0, 1, 1000, (32 << 20) / 16 - 1, (32 << 20) / 16 + 1] {
-            let mut buffer = OutputBuffer::new(rotations);
+            let mut buffer = OutputBuffer::new(rotations).unwrap();
             assert_eq!(buffer.len(), rotations);
             assert!(buffer.iter().all(|q| q.to_array() == [0.0; 4]));
             buffer.fill(Quat::IDENTITY);
@@ -103,6 +110,14 @@ mod tests {
                 buffer.last().copied(),
                 (rotations > 0).then_some(Quat::IDENTITY)
             );
+        }
+    }
+
+    #[test]
+    fn more_than_there_is_is_refused() {
+        for rotations in [1 << 44, usize::MAX / 16, usize::MAX] {
+            let refused = OutputBuffer::new(rotations).unwrap_err();
+            assert_eq!(refused.bytes, 16 * rotations as u128);
         }
     }
 }

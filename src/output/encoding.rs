@@ -262,6 +262,19 @@ pub struct EncodingOptions {
     pub sequence: EulerSequence,
 }
 
+/// Memory is not as long as the rotations that are to be stored in it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{rotations} rotations take {needed} bytes, and {given} were given")]
+#[non_exhaustive]
+pub struct EncodingLength {
+    /// Number of rotations.
+    pub rotations: usize,
+    /// Bytes given.
+    pub given: usize,
+    /// Bytes that they take.
+    pub needed: usize,
+}
+
 /// How a matrix lies in memory. The kernels' stores take these numbers as their parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixOrder {
@@ -317,21 +330,51 @@ impl Encoding {
 
     /// Stores rotations, `x y z w` each, in the machine's byte order.
     ///
-    /// # Panics
+    /// ```
+    /// use tumble::Encoding;
+    /// let mut bytes = [0; 8];
+    /// Encoding::Snorm16.encode(&[[0.0, 0.0, 0.0, 1.0]], &mut bytes)?;
+    /// assert_eq!(bytes, [0, 0, 0, 0, 0, 0, 0xff, 0x7f]);
+    /// # Ok::<(), tumble::EncodingLength>(())
+    /// ```
+    ///
+    /// # Errors
     /// When `output` has not [`Encoding::bytes`] for each rotation.
-    pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) {
-        assert_eq!(output.len(), rotations.len() * self.bytes());
+    pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) -> Result<(), EncodingLength> {
+        self.check_length(rotations.len(), output.len())?;
+        self.encode_all(rotations, output);
+        Ok(())
+    }
+
+    /// As [`Encoding::encode`], into as many bytes as it takes.
+    pub(crate) fn encode_all(self, rotations: &[[f32; 4]], output: &mut [u8]) {
         let row = self.row();
         (row.encode)(rotations, row.detail, output);
     }
 
     /// Reads what is stored: the rotation, up to rounding and sign, or the vector.
     ///
-    /// # Panics
+    /// # Errors
     /// When `bytes` are not those of one rotation.
-    #[must_use]
-    pub fn decode(self, bytes: &[u8]) -> [f32; 4] {
-        assert_eq!(bytes.len(), self.bytes());
+    pub fn decode(self, bytes: &[u8]) -> Result<[f32; 4], EncodingLength> {
+        self.check_length(1, bytes.len())?;
+        Ok(self.decode_one(bytes))
+    }
+
+    fn check_length(self, rotations: usize, given: usize) -> Result<(), EncodingLength> {
+        let needed = rotations.saturating_mul(self.bytes());
+        match given == needed {
+            true => Ok(()),
+            false => Err(EncodingLength {
+                rotations,
+                given,
+                needed,
+            }),
+        }
+    }
+
+    /// As [`Encoding::decode`], from as many bytes as one rotation takes.
+    pub(crate) fn decode_one(self, bytes: &[u8]) -> [f32; 4] {
         let row = self.row();
         let size = row.component_type.bytes();
         let number = |place: usize| (row.component_type).decode(&bytes[place * size..][..size]);
@@ -363,8 +406,8 @@ mod tests {
             (Encoding::Snorm16, 1.6e-5),
         ] {
             let mut bytes = vec![0; encoding.bytes()];
-            encoding.encode(&[rotation], &mut bytes);
-            let decoded = encoding.decode(&bytes);
+            encoding.encode(&[rotation], &mut bytes).unwrap();
+            let decoded = encoding.decode(&bytes).unwrap();
             for (a, b) in rotation.iter().zip(decoded) {
                 assert!((a - b).abs() <= bound, "{encoding:?}: {a} {b}");
             }

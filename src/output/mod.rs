@@ -6,4 +6,5 @@ pub(crate) mod component_type;
 pub(crate) mod encoding;
 pub(crate) mod euler;
 pub(crate) mod rotations;
+pub(crate) mod row;
 pub(crate) mod window;

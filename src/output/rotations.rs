@@ -5,7 +5,9 @@ use std::marker::PhantomData;
 
 use glam::{Quat, Vec3, Vec4};
 
+use crate::memory::OutOfMemory;
 use crate::output::buffer::OutputBuffer;
+use crate::tracks::rotation::Rotation;
 
 /// The order of a result in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -24,9 +26,22 @@ impl Layout {
         if samples == 1 { Self::TrackMajor } else { self }
     }
 
-    /// Where a sample of a track lies among `tracks × samples` rotations.
+    /// Where a sample of a track lies among `tracks × samples` rotations; `None` out of range.
     #[must_use]
-    pub fn index(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
+    pub fn index(
+        self,
+        track: usize,
+        sample: usize,
+        tracks: usize,
+        samples: usize,
+    ) -> Option<usize> {
+        let inside = track < tracks && sample < samples && tracks.checked_mul(samples).is_some();
+        inside.then(|| self.place(track, sample, tracks, samples))
+    }
+
+    /// Where a sample that there is lies.
+    #[inline]
+    pub(crate) fn place(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
         match self {
             Self::TrackMajor => track * samples + sample,
             Self::FrameMajor => sample * tracks + track,
@@ -55,6 +70,25 @@ pub type Rotations = Samples<Quat>;
 /// Vectors, `x y z 0` in memory: velocities, accelerations, translations or scales.
 pub type Vectors = Samples<Vec3>;
 
+/// Why values from elsewhere make no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SamplesError {
+    /// Every track has the same number of samples.
+    #[error(
+        "{values} values do not divide among {tracks} tracks; give every track the same number"
+    )]
+    Uneven {
+        /// Number of values.
+        values: usize,
+        /// Number of tracks.
+        tracks: usize,
+    },
+    /// There is not the memory.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
+}
+
 impl<T> Samples<T> {
     pub(crate) fn new(
         storage: Box<dyn Storage>,
@@ -76,18 +110,19 @@ impl<T> Samples<T> {
         rows: impl ExactSizeIterator<Item = Quat>,
         tracks: usize,
         layout: Layout,
-    ) -> Option<Self> {
-        let samples = rows.len().checked_div(tracks).unwrap_or(0);
-        if samples * tracks != rows.len() {
-            return None;
+    ) -> Result<Self, SamplesError> {
+        let (values, samples) = (rows.len(), rows.len().checked_div(tracks).unwrap_or(0));
+        if samples * tracks != values {
+            return Err(SamplesError::Uneven { values, tracks });
         }
-        let mut storage = OutputBuffer::new(rows.len());
+        let mut storage = OutputBuffer::new(values)?;
         storage.iter_mut().zip(rows).for_each(|(to, row)| *to = row);
-        Some(Self::new(Box::new(storage), tracks, samples, layout))
+        Ok(Self::new(Box::new(storage), tracks, samples, layout))
     }
 
-    /// All values, four numbers each.
-    pub(crate) fn rows(&self) -> &[[f32; 4]] {
+    /// All values without a copy, four numbers each: `x y z w` of rotations, `x y z 0` of vectors.
+    #[must_use]
+    pub fn as_arrays(&self) -> &[[f32; 4]] {
         bytemuck::cast_slice(self.storage.quats())
     }
 
@@ -109,19 +144,30 @@ impl<T> Samples<T> {
         self.layout
     }
 
+    /// Tracks, samples and layout.
+    pub(crate) fn shape(&self) -> (usize, usize, Layout) {
+        (self.tracks, self.samples, self.layout)
+    }
+
     /// Where the value of one track at one sample lies; `None` out of range.
     fn place(&self, track: usize, sample: usize) -> Option<usize> {
         let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| (self.layout).index(track, sample, self.tracks, self.samples))
+        inside.then(|| (self.layout).place(track, sample, self.tracks, self.samples))
     }
 }
 
 impl Rotations {
-    /// Rotations from elsewhere, of so many tracks, in this order; `None` if their number is not a
-    /// multiple of the tracks'.
-    #[must_use]
-    pub fn of(rotations: &[Quat], tracks: usize, layout: Layout) -> Option<Self> {
-        Self::of_rows(rotations.iter().copied(), tracks, layout)
+    /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order.
+    ///
+    /// # Errors
+    /// When their number is not a multiple of the tracks', or there is not the memory.
+    pub fn of<R: Rotation>(
+        rotations: &[R],
+        tracks: usize,
+        layout: Layout,
+    ) -> Result<Self, SamplesError> {
+        let quats = rotations.iter().map(|rotation| rotation.quat());
+        Self::of_rows(quats, tracks, layout)
     }
 
     /// All rotations, without a copy: where a device maps its memory, these are the
@@ -139,10 +185,16 @@ impl Rotations {
 }
 
 impl Vectors {
-    /// Vectors from elsewhere; otherwise as [`Rotations::of`].
-    #[must_use]
-    pub fn of(vectors: &[Vec3], tracks: usize, layout: Layout) -> Option<Self> {
-        let rows = vectors.iter().map(|v| Quat::from_vec4(v.extend(0.0)));
+    /// Vectors from elsewhere, [`Vec3`] or `[f32; 3]`; otherwise as [`Rotations::of`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of<V: Copy + Into<Vec3>>(
+        vectors: &[V],
+        tracks: usize,
+        layout: Layout,
+    ) -> Result<Self, SamplesError> {
+        let rows = (vectors.iter()).map(|&vector| Quat::from_vec4(vector.into().extend(0.0)));
         Self::of_rows(rows, tracks, layout)
     }
 

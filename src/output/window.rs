@@ -42,55 +42,53 @@ impl Window {
     pub(crate) fn place(&self, track: usize, sample: usize) -> usize {
         let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
         self.layout
-            .index(track, sample, self.tracks.len(), self.samples.len())
+            .place(track, sample, self.tracks.len(), self.samples.len())
     }
 
     /// Cuts it into windows of at most `limit` rotations, in the order in which they lie in memory.
-    pub(crate) fn cut(&self, limit: usize) -> Vec<Self> {
-        let (rows, columns) = match self.layout {
-            Layout::TrackMajor => (&self.tracks, &self.samples),
-            Layout::FrameMajor => (&self.samples, &self.tracks),
+    pub(crate) fn cut(&self, limit: usize) -> impl Iterator<Item = Self> + Send + use<> {
+        let layout = self.layout;
+        let (rows, columns) = match layout {
+            Layout::TrackMajor => (self.tracks.clone(), self.samples.clone()),
+            Layout::FrameMajor => (self.samples.clone(), self.tracks.clone()),
         };
-        if rows.is_empty() || columns.is_empty() {
-            return Vec::new();
-        }
         // As many whole rows as fit, or parts of a row if a single one does not fit.
-        let rows_each = (limit / columns.len()).max(1);
-        let columns_each = columns.len().min(limit.max(1));
-        let pieces = |of: &Range<usize>, each: usize| -> Vec<Range<usize>> {
-            let piece = |from: usize| from..(from + each).min(of.end);
-            of.clone().step_by(each).map(piece).collect()
+        let rows_each = (limit / columns.len().max(1)).max(1);
+        let columns_each = columns.len().min(limit).max(1);
+        let pieces = |of: Range<usize>, each: usize| {
+            let end = of.end;
+            of.step_by(each)
+                .map(move |from| from..from.saturating_add(each).min(end))
         };
-        let mut windows = Vec::new();
+        let places = pieces(rows, rows_each).flat_map(move |row| {
+            pieces(columns.clone(), columns_each).map(move |column| (row.clone(), column))
+        });
         let mut start = 0;
-        for row in pieces(rows, rows_each) {
-            for column in pieces(columns, columns_each) {
-                let (tracks, samples) = match self.layout {
-                    Layout::TrackMajor => (row.clone(), column),
-                    Layout::FrameMajor => (column, row.clone()),
-                };
-                let window = Self {
-                    start,
-                    tracks,
-                    samples,
-                    layout: self.layout,
-                };
-                start += window.len();
-                windows.push(window);
-            }
-        }
-        windows
+        places.map(move |(row, column)| {
+            let (tracks, samples) = match layout {
+                Layout::TrackMajor => (row, column),
+                Layout::FrameMajor => (column, row),
+            };
+            let window = Self {
+                start,
+                tracks,
+                samples,
+                layout,
+            };
+            start += window.len();
+            window
+        })
     }
 }
 
 impl Window {
     /// Cuts it further; the new windows start in the result that this one was cut from.
-    pub(crate) fn within(&self, cut: impl Fn(&Self) -> Vec<Self>) -> Vec<Self> {
-        let mut windows = cut(self);
-        for window in &mut windows {
-            window.start += self.start;
-        }
-        windows
+    pub(crate) fn within(&self, limit: usize) -> impl Iterator<Item = Self> + use<> {
+        let first = self.start;
+        self.cut(limit).map(move |window| Self {
+            start: first + window.start,
+            ..window
+        })
     }
 }
 
@@ -107,13 +105,13 @@ mod tests {
                     let mut next = 0;
                     for window in whole.cut(outer) {
                         assert_eq!(window.start, next);
-                        for part in window.within(|window| window.cut(inner)) {
+                        for part in window.within(inner) {
                             assert!(part.len() <= inner);
                             assert_eq!(part.start, next);
                             for track in part.tracks.clone() {
                                 for sample in part.samples.clone() {
                                     let place = next + part.place(track, sample);
-                                    let expected = layout.index(track, sample, tracks, samples);
+                                    let expected = layout.place(track, sample, tracks, samples);
                                     assert_eq!(place, expected);
                                 }
                             }

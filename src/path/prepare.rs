@@ -52,7 +52,7 @@ impl PreparedPaths {
             ..BESSEL_OVERHAUSER.into()
         };
         let positions = Interpolation {
-            quantity: Quantity::Velocity(Axes::World),
+            quantity: Quantity::Velocity(Axes::Parent),
             ..rotations
         };
         let firsts: Vec<usize> = (0..set.track_count()).step_by(BATCH).collect();

@@ -2,6 +2,7 @@
 //! world, and transforms of rotations, translations and scales.
 
 pub(crate) mod follow;
+pub(crate) mod local_to_model;
 pub(crate) mod on_cpu;
 pub(crate) mod poses;
 pub(crate) mod skeleton;

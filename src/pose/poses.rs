@@ -8,9 +8,11 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::gpu::engine::VulkanEngine;
+use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
+use crate::pose_error::PoseError;
 use crate::shader::{Kernel, PoseDispatch};
 
 impl Engine {
@@ -22,10 +24,10 @@ impl Engine {
     /// fails.
     pub fn blend(&self, layers: &[(&Rotations, f32)]) -> Result<Rotations, Error> {
         let Some((&(first, _), others)) = layers.split_first() else {
-            return Err(Error::Poses("there is no layer to blend"));
+            return Err(PoseError::NoLayer.into());
         };
-        for &(layer, _) in others {
-            same_shape(first, layer)?;
+        for (place, &(layer, _)) in (1..).zip(others) {
+            same_shape(first, layer, place)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
         finite(&weights)?;
@@ -51,7 +53,7 @@ impl Engine {
     /// # Errors
     /// When their shapes differ, the weight lies outside, or the device fails.
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
-        same_shape(from, to)?;
+        same_shape(from, to, 1)?;
         fraction(weight)?;
         self.each_rotation(from, 1, |device, start, output| {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
@@ -78,12 +80,11 @@ impl Engine {
         reference: &[Quat],
         weight: f32,
     ) -> Result<Rotations, Error> {
-        same_shape(base, layer)?;
+        same_shape(base, layer, 1)?;
         fraction(weight)?;
         if reference.len() != base.tracks() {
-            return Err(Error::Poses(
-                "give one reference rotation for each track of the layer",
-            ));
+            let (given, tracks) = (reference.len(), base.tracks());
+            return Err(PoseError::References { given, tracks }.into());
         }
         let mut own: Vec<[f32; 4]> = Vec::new();
         self.each_rotation(base, 1, |device, start, output| {
@@ -106,7 +107,8 @@ impl Engine {
         })
     }
 
-    /// Turns rotations in their parents' frames into rotations and positions in the world.
+    /// Turns rotations in their parents' frames into rotations and positions in the world, at the
+    /// skeleton's offsets. With translations and scales [`Engine::local_to_model`] does so.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
@@ -128,13 +130,13 @@ impl Engine {
     pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
         let (tracks, samples) = (local.tracks(), local.samples());
         if skeleton.len() != tracks {
-            return Err(Error::Poses(
-                "the skeleton has not one link for each track of the rotations",
-            ));
+            let given = skeleton.len();
+            return Err(PoseError::Skeleton { given, tracks }.into());
         }
         let links = skeleton.links();
         self.on_device(|device| {
-            let mut values = vec![[0.0; 4]; 2 * tracks * samples];
+            let count = tracks.saturating_mul(samples).saturating_mul(2);
+            let mut values: Vec<[f32; 4]> = zeroed(count, "poses in the world")?;
             let frames = (limit(device) / (2 * tracks).max(1)).max(1);
             let mut frame_major: Vec<[f32; 4]> = Vec::new();
             let windows = values.chunks_mut((2 * tracks * frames).max(1));
@@ -143,7 +145,7 @@ impl Engine {
                 frame_major.clear();
                 for frame in first..first + count {
                     let own = (0..tracks)
-                        .map(|track| local.layout().index(track, frame, tracks, samples));
+                        .map(|track| local.layout().place(track, frame, tracks, samples));
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
@@ -173,7 +175,7 @@ impl Engine {
         mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), Error>,
     ) -> Result<Rotations, Error> {
         self.on_device(|device| {
-            let mut made = OutputBuffer::new(like.as_quats().len());
+            let mut made = OutputBuffer::new(like.as_quats().len())?;
             let most = (limit(device) / layers).clamp(1, 1 << 40);
             for (start, output) in (0..).step_by(most).zip(made.chunks_mut(most)) {
                 work(device, start, bytemuck::cast_slice_mut(output))?;
@@ -200,9 +202,12 @@ impl Engine {
     }
 }
 
+/// Values that one pass takes on the CPU: enough for all threads, and gathered in 16 MiB.
+const CPU_PASS: usize = 1 << 20;
+
 /// The most values of 16 bytes that one pass takes.
 fn limit(device: Option<&VulkanEngine>) -> usize {
-    device.map_or(usize::MAX, VulkanEngine::pass_limit)
+    device.map_or(CPU_PASS, VulkanEngine::pass_limit)
 }
 
 /// Rotations and positions in the world, `[frame][track]`.
@@ -253,30 +258,33 @@ impl WorldPoses {
     }
 }
 
-fn same_shape(a: &Rotations, b: &Rotations) -> Result<(), Error> {
-    let shape = |layer: &Rotations| (layer.tracks(), layer.samples(), layer.layout());
-    if shape(a) == shape(b) {
-        Ok(())
-    } else {
-        Err(Error::Poses(
-            "layers differ in tracks, samples or layout; evaluate them at the same frames",
-        ))
+/// Refuses a layer of another shape than the first.
+fn same_shape(first: &Rotations, own: &Rotations, layer: usize) -> Result<(), PoseError> {
+    let (first, given) = (first.shape(), own.shape());
+    match first == given {
+        true => Ok(()),
+        false => Err(PoseError::Shape {
+            layer,
+            given,
+            first,
+        }),
     }
 }
 
-fn finite(weights: &[f32]) -> Result<(), Error> {
-    if weights.iter().all(|weight| weight.is_finite()) {
-        Ok(())
-    } else {
-        Err(Error::Poses("a weight is not finite"))
+fn finite(weights: &[f32]) -> Result<(), PoseError> {
+    match weights.iter().position(|weight| !weight.is_finite()) {
+        None => Ok(()),
+        Some(layer) => Err(PoseError::WeightNotFinite {
+            layer,
+            weight: weights[layer],
+        }),
     }
 }
 
-fn fraction(weight: f32) -> Result<(), Error> {
-    if (0.0..=1.0).contains(&weight) {
-        Ok(())
-    } else {
-        Err(Error::Poses("a weight of slerp lies between 0 and 1"))
+fn fraction(weight: f32) -> Result<(), PoseError> {
+    match (0.0..=1.0).contains(&weight) {
+        true => Ok(()),
+        false => Err(PoseError::WeightOutOfRange { weight }),
     }
 }
 

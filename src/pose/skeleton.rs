@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::math::canonical::canonical;
+use crate::memory::{OutOfMemory, reserved};
 use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
@@ -38,7 +39,7 @@ pub enum SkeletonError {
     },
     /// A track that is its own ancestor.
     #[error("track {track} hangs from itself")]
-    TrackCopy {
+    Cycle {
         /// One track of the circle.
         track: usize,
     },
@@ -50,7 +51,19 @@ pub enum SkeletonError {
         /// Its offset.
         offset: Vec3,
     },
+    /// Tracks are counted in 32 bits on a device.
+    #[error("a skeleton of {tracks} tracks; there can be {} at most", MOST_TRACKS)]
+    TooMany {
+        /// Tracks given.
+        tracks: usize,
+    },
+    /// There is not the memory.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
 }
+
+/// The most tracks of a skeleton.
+const MOST_TRACKS: usize = ROOT as usize;
 
 impl Skeleton {
     /// A skeleton of these parents (`None` for a root) and offsets, in any unit of length. An
@@ -60,6 +73,9 @@ impl Skeleton {
     /// A [`SkeletonError`] that names the track.
     pub fn new(parents: Vec<Option<usize>>, offsets: Vec<Vec3>) -> Result<Self, SkeletonError> {
         let tracks = parents.len();
+        if tracks > MOST_TRACKS {
+            return Err(SkeletonError::TooMany { tracks });
+        }
         if offsets.len() != tracks {
             return Err(SkeletonError::Lengths {
                 parents: tracks,
@@ -70,8 +86,9 @@ impl Skeleton {
             let offset = offsets[track];
             return Err(SkeletonError::OffsetNotFinite { track, offset });
         }
-        let mut children = vec![Vec::new(); tracks];
-        let mut order = Vec::with_capacity(tracks);
+        let mut children = reserved(tracks, "a skeleton")?;
+        children.resize(tracks, Vec::new());
+        let mut order = reserved(tracks, "a skeleton")?;
         for (track, &parent) in parents.iter().enumerate() {
             match parent {
                 None => order.push(track),
@@ -93,7 +110,7 @@ impl Skeleton {
         }
         // Tracks that no root leads to form a circle, or hang from one.
         if let Some(track) = children.iter().position(|left| !left.is_empty()) {
-            return Err(SkeletonError::TrackCopy { track });
+            return Err(SkeletonError::Cycle { track });
         }
         Ok(Self {
             parents,
@@ -104,17 +121,21 @@ impl Skeleton {
 
     /// A chain of boxes: the first hangs at the origin, each other at the lower end of
     /// the one before it, `(0, -length, 0)`.
-    #[must_use]
-    pub fn chain(boxes: usize, length: f64) -> Self {
-        let offset = |track: usize| match track {
+    ///
+    /// # Errors
+    /// When the length is not finite, or there are too many.
+    pub fn chain(boxes: usize, length: f64) -> Result<Self, SkeletonError> {
+        if boxes > MOST_TRACKS {
+            return Err(SkeletonError::TooMany { tracks: boxes });
+        }
+        let what = "a chain";
+        let (mut parents, mut offsets) = (reserved(boxes, what)?, reserved(boxes, what)?);
+        parents.extend((0..boxes).map(|track| track.checked_sub(1)));
+        offsets.extend((0..boxes).map(|track| match track {
             0 => Vec3::ZERO,
             _ => Vec3::new(0.0, -length as f32, 0.0),
-        };
-        Self {
-            parents: (0..boxes).map(|track| track.checked_sub(1)).collect(),
-            offsets: (0..boxes).map(offset).collect(),
-            order: (0..boxes).collect(),
-        }
+        }));
+        Self::new(parents, offsets)
     }
 
     /// Number of tracks.
@@ -153,13 +174,10 @@ mod tests {
         let refused = |parents: &[Option<usize>]| {
             Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
         };
-        assert_eq!(
-            refused(&[None, Some(1)]),
-            SkeletonError::TrackCopy { track: 1 }
-        );
+        assert_eq!(refused(&[None, Some(1)]), SkeletonError::Cycle { track: 1 });
         assert_eq!(
             refused(&[Some(1), Some(0), None]),
-            SkeletonError::TrackCopy { track: 0 }
+            SkeletonError::Cycle { track: 0 }
         );
         assert!(matches!(
             refused(&[Some(7)]),
@@ -174,7 +192,7 @@ mod tests {
             nowhere,
             Err(SkeletonError::OffsetNotFinite { track: 0, .. })
         ));
-        let chain = Skeleton::chain(3, 2.0);
+        let chain = Skeleton::chain(3, 2.0).unwrap();
         assert_eq!(chain.parents, [None, Some(0), Some(1)]);
     }
 }

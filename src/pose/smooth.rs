@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
+use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::shader::{Kernel, PoseDispatch};
@@ -64,11 +65,11 @@ impl Engine {
             weights: &weights,
             are_rotations,
         };
-        let count = values.rows().len();
-        let mut output = OutputBuffer::new(count);
-        let mut other = OutputBuffer::new(if passes > 1 { count } else { 0 });
+        let count = values.as_arrays().len();
+        let mut output = OutputBuffer::new(count)?;
+        let mut other = OutputBuffer::new(if passes > 1 { count } else { 0 })?;
         if passes == 0 {
-            output.copy_from_slice(bytemuck::cast_slice(values.rows()));
+            output.copy_from_slice(bytemuck::cast_slice(values.as_arrays()));
         }
         for done in 0..passes {
             let (from, to) = match (passes - done) % 2 {
@@ -77,7 +78,7 @@ impl Engine {
             };
             let set = Set {
                 values: if done == 0 {
-                    values.rows()
+                    values.as_arrays()
                 } else {
                     bytemuck::cast_slice(from)
                 },
@@ -95,7 +96,7 @@ impl Engine {
             })?;
             for track in 0..tracks {
                 pass.set_ends(set.row(track), |sample, value| {
-                    to[layout.index(track, sample, tracks, samples)] = value;
+                    to[layout.place(track, sample, tracks, samples)] = value;
                 });
             }
         }
@@ -117,7 +118,7 @@ struct Set<'a> {
 
 impl Set<'_> {
     fn row(&self, track: usize) -> Row<'_> {
-        let at = |sample| self.layout.index(track, sample, self.tracks, self.samples);
+        let at = |sample| self.layout.place(track, sample, self.tracks, self.samples);
         Row {
             values: self.values,
             first: at(0),

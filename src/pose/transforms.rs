@@ -21,6 +21,9 @@ pub struct Transforms {
     pub rotations: Rotations,
     /// Scales; 1 for tracks that have no keys of them.
     pub scales: Vectors,
+    /// Whether each track has keys of a translation;
+    /// [`local_to_model`](Engine::local_to_model) leaves others at their skeleton's offsets.
+    pub has_translation: Vec<bool>,
 }
 
 impl Engine {
@@ -58,6 +61,9 @@ impl Engine {
             translations: evaluate(Channel::Translation)?,
             rotations: self.evaluate_as(set, interpolation, frames, layout)?,
             scales: evaluate(Channel::Scale)?,
+            has_translation: (0..set.track_count())
+                .map(|track| set.vectors(Channel::Translation, track).is_some())
+                .collect(),
         })
     }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
 use crate::curve::segment::segment_size;
+use crate::memory::OutOfMemory;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
@@ -149,7 +150,7 @@ impl ClipData {
         };
         // As a velocity, a vector is refused where an output is for rotations only.
         let interpolation = Interpolation {
-            quantity: Quantity::Velocity(Axes::World),
+            quantity: Quantity::Velocity(Axes::Parent),
             ..*interpolation
         };
         let batches: Vec<usize> = (0..set.track_count()).step_by(VECTOR_BATCH).collect();
@@ -220,8 +221,8 @@ impl ClipData {
         let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
         let own = match timeline.ticks {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
-                let first = timeline.time(track, samples.start);
-                let last = timeline.time(track, samples.end - 1);
+                let first = timeline.time_at(track, samples.start);
+                let last = timeline.time_at(track, samples.end - 1);
                 // One more part on either side: a time within rounding of a boundary may lie on
                 // the other side of it.
                 let from = all.partition_point(|&place| self.part(place).part.end < first);
@@ -283,16 +284,19 @@ impl ClipData {
 
     /// The timeline with explicit times folded into the time range of their track's keys, if the
     /// wrap mode repeats tracks.
-    pub(crate) fn folded<'t>(&self, timeline: &'t Timeline) -> Cow<'t, Timeline> {
+    pub(crate) fn folded<'t>(
+        &self,
+        timeline: &'t Timeline,
+    ) -> Result<Cow<'t, Timeline>, OutOfMemory> {
         let wrap = self.interpolation.wrap();
         if !wrap.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
-            return Cow::Borrowed(timeline);
+            return Ok(Cow::Borrowed(timeline));
         }
         let folded = |track: usize, time: f64| {
             self.track_span(track)
                 .map_or(time, |span| wrap.folded(span, time))
         };
-        Cow::Owned(timeline.map_times(self.track_count(), folded))
+        Ok(Cow::Owned(timeline.map_times(self.track_count(), folded)?))
     }
 
     fn part(&self, (group, part): (u32, u32)) -> PartRef<'_> {

@@ -1,6 +1,7 @@
 //! Why a set cannot be evaluated as asked, on any device.
 
 use crate::curve::options::InterpolationError;
+use crate::memory::OutOfMemory;
 use crate::time::frames::FramesError;
 
 /// Why a set cannot be evaluated as asked, on any device.
@@ -10,4 +11,6 @@ pub(crate) enum SetError {
     Frames(#[from] FramesError),
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
 }

@@ -108,7 +108,7 @@ impl Prepared {
             Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
             Parameter::Seconds { start, seconds } => {
                 // At times beyond those allowed for keys, a curve's powers would overflow.
-                let time = timeline.time(track, sample).clamp(-LATEST, LATEST);
+                let time = timeline.time_at(track, sample).clamp(-LATEST, LATEST);
                 (time - start) / seconds
             }
         };

@@ -1,7 +1,9 @@
 //! What the shaders and Rust share, as the build reads it from `shaders/`: constants, the structs
 //! that buffers hold, and the kernels by name, as SPIR-V.
 
-pub mod spirv;
+// The build has its own copy of the pass, and uses more of it.
+#[allow(dead_code, unreachable_pub)]
+pub(crate) mod spirv;
 
 mod generated {
     // The shaders write pi in two parts, and use constants that Rust has no use for.

@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use crate::memory::{OutOfMemory, reserved};
 use crate::time::frame_rate::FrameRate;
 
 /// More samples of one track than this are refused.
@@ -38,8 +39,10 @@ enum Request {
         start: Option<f64>,
         end: Option<f64>,
     },
-    Shared(Arc<[f64]>),
-    PerTrack(Arc<[f64]>),
+    Shared(Arc<Vec<f64>>),
+    PerTrack(Arc<Vec<f64>>),
+    /// Explicit times, and a range beside them.
+    TimesInRange,
 }
 
 /// Why samples were refused.
@@ -62,6 +65,11 @@ pub enum FramesError {
         /// End, seconds.
         end: f64,
     },
+    /// A range was given beside explicit times.
+    #[error(
+        "explicit times have no range; give a rate with a start and an end, or those of the times that are wanted"
+    )]
+    TimesInRange,
     /// A time is NaN or infinite.
     #[error("time {index} is {time}; times are finite numbers of seconds")]
     TimeNotFinite {
@@ -124,18 +132,20 @@ impl Frames {
         }
     }
 
-    /// The same rate from `start` to `end`, seconds; no effect on explicit times.
+    /// The same rate from `start` to `end`, seconds. Explicit times have no range: they are refused
+    /// ([`FramesError::TimesInRange`]) when they are resolved against a set.
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
-        if let Request::Rate { start, end, .. } = &mut self.request {
-            (*start, *end) = (Some(from), Some(to));
+        match &mut self.request {
+            Request::Rate { start, end, .. } => (*start, *end) = (Some(from), Some(to)),
+            request => *request = Request::TimesInRange,
         }
         self
     }
 
     /// The same frames for sets whose keys span another time: a start or an end that
     /// [`Frames::between`] did not give is taken from here, instead of from the set's first and last
-    /// key.
+    /// key. Explicit times depend on no keys and stay.
     #[must_use]
     pub fn spanning(mut self, (first, last): (f64, f64)) -> Self {
         if let Request::Rate { start, end, .. } = &mut self.request {
@@ -149,7 +159,7 @@ impl Frames {
     #[must_use]
     pub fn at(times: Vec<f64>) -> Self {
         Self {
-            request: Request::Shared(times.into()),
+            request: Request::Shared(Arc::new(times)),
         }
     }
 
@@ -158,7 +168,7 @@ impl Frames {
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self {
-            request: Request::PerTrack(times.into()),
+            request: Request::PerTrack(Arc::new(times)),
         }
     }
 
@@ -212,6 +222,7 @@ impl Frames {
                 let (times, stride) = (Arc::clone(times), times.len() / tracks);
                 (Ticks::Times { times, stride }, stride)
             }
+            Request::TimesInRange => return Err(FramesError::TimesInRange),
         };
         Ok(Timeline { ticks, count })
     }
@@ -243,7 +254,7 @@ pub(crate) enum Ticks {
     Frames { rate: FrameRate, start: f64 },
     /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
     /// one list for all tracks.
-    Times { times: Arc<[f64]>, stride: usize },
+    Times { times: Arc<Vec<f64>>, stride: usize },
 }
 
 impl Timeline {
@@ -263,32 +274,54 @@ impl Timeline {
     pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
         let mut own = self.clone();
         if let Ticks::Times { times, stride: 1.. } = &mut own.ticks {
-            *times = times[tracks.start * self.count..tracks.end * self.count].into();
+            let own = tracks.start * self.count..tracks.end * self.count;
+            *times = Arc::new(times[own].to_vec());
         }
         own
     }
 
     /// A list of explicit times for every track, each time replaced by `map(track, time)`.
-    pub(crate) fn map_times(&self, tracks: usize, map: impl Fn(usize, f64) -> f64) -> Self {
-        let times =
-            (0..tracks).flat_map(|track| (0..self.count).map(move |sample| (track, sample)));
-        let mapped = times.map(|(track, sample)| map(track, self.time(track, sample)));
-        Self {
+    pub(crate) fn map_times(
+        &self,
+        tracks: usize,
+        map: impl Fn(usize, f64) -> f64,
+    ) -> Result<Self, OutOfMemory> {
+        let count = tracks.saturating_mul(self.count);
+        let mut times = reserved(count, "the times of every track")?;
+        for track in 0..tracks {
+            let own = (0..self.count).map(|sample| map(track, self.time_at(track, sample)));
+            times.extend(own);
+        }
+        Ok(Self {
             ticks: Ticks::Times {
-                times: mapped.collect(),
+                times: Arc::new(times),
                 stride: self.count,
             },
             count: self.count,
-        }
+        })
     }
 
-    /// The time of a sample in seconds.
-    ///
-    /// # Panics
-    /// When `sample` is not below [`Timeline::len`].
+    /// The time of a sample in seconds; `None` from [`Timeline::len`] on, and for a track that has
+    /// no times of its own where every track has.
     #[must_use]
-    pub fn time(&self, track: usize, sample: usize) -> f64 {
-        assert!(sample < self.count, "sample {sample} of {}", self.count);
+    pub fn time(&self, track: usize, sample: usize) -> Option<f64> {
+        let has_times = match &self.ticks {
+            Ticks::Times { times, stride: 1.. } => track < times.len() / self.count.max(1),
+            _ => true,
+        };
+        (has_times && sample < self.count).then(|| self.time_at(track, sample))
+    }
+
+    /// The times of all samples of a track, seconds; none for a track that has no times of its own
+    /// where every track has.
+    pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {
+        let count = self.time(track, 0).map_or(0, |_| self.count);
+        (0..count).map(move |sample| self.time_at(track, sample))
+    }
+
+    /// The time of a sample that there is, in seconds.
+    #[inline]
+    pub(crate) fn time_at(&self, track: usize, sample: usize) -> f64 {
         match &self.ticks {
             Ticks::Frames { rate, start } => start + rate.time_of(sample as u64),
             Ticks::Times { times, stride } => times[track * stride + sample],
@@ -311,6 +344,17 @@ mod tests {
     }
 
     #[test]
+    fn times_are_told_of_samples_that_there_are() {
+        let each = Frames::at_each(vec![1.0, 2.0, 3.0, 4.0]);
+        let each = each.resolve(2, None).unwrap();
+        let found = [(0, 1), (1, 0), (1, 2), (2, 0), (usize::MAX, 0)];
+        let found = found.map(|(track, sample)| each.time(track, sample));
+        assert_eq!(found, [Some(2.0), Some(3.0), None, None, None]);
+        let frames = Frames::fps(2).resolve(1, Some((1.0, 2.0))).unwrap();
+        assert_eq!((frames.time(0, 2), frames.time(0, 3)), (Some(2.0), None));
+    }
+
+    #[test]
     fn impossible_requests_are_refused_before_any_work() {
         let span = Some((0.0, 1e9));
         let error = Frames::fps(1_000_000).resolve(4, span).unwrap_err();
@@ -329,6 +373,8 @@ mod tests {
                 end: 1.0
             }
         );
+        let ranged = Frames::at(vec![0.0, 1.0]).between(0.0, 1.0);
+        assert_eq!(ranged.resolve(1, span), Err(FramesError::TimesInRange));
         let nan = Frames::at(vec![0.0, f64::NAN])
             .resolve(1, span)
             .unwrap_err();

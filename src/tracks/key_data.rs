@@ -165,7 +165,7 @@ mod tests {
         set.set_tcb(1, &[tcb(1.0); 3]).unwrap();
         set.set_tcb(1, &own).unwrap();
         assert_eq!(set.track(1).tcb, own);
-        assert_eq!(set.select(1..2).track(0).tcb, own);
+        assert_eq!(set.select(1..2).unwrap().track(0).tcb, own);
         assert!(set.track(0).tcb.is_empty());
     }
 }

@@ -12,6 +12,7 @@ use glam::{DVec3, Quat};
 use crate::tracks::check::{check_times, unit_key};
 use crate::tracks::error::TrackError;
 use crate::tracks::key_data::{KeyData, Tcb};
+use crate::tracks::rotation::Rotation;
 use crate::tracks::signs::{SignBits, Signs};
 use crate::tracks::vectors::VectorTracks;
 
@@ -57,6 +58,7 @@ struct TrackRange {
 
 /// One track, borrowed from its [`TrackSet`].
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Track<'a> {
     /// The track's name, when it was given one.
     pub name: Option<&'a str>,
@@ -82,22 +84,22 @@ impl TrackSet {
     }
 
     /// Appends a track. `times` are seconds, strictly increasing; `keys` are
-    /// rotations, one for each time. Keys that are unit to within f32 rounding are
+    /// rotations, [`Quat`] or `[f32; 4]` (`x y z w`), one for each time. Keys that are unit to within f32 rounding are
     /// kept bit for bit, others (norm within 0.1 of 1) are normalised.
     ///
     /// # Errors
     /// A [`TrackError`] that names the key; the set is then unchanged.
-    pub fn push(
+    pub fn push<R: Rotation>(
         &mut self,
         name: impl Into<String>,
         times: &[f64],
-        keys: &[Quat],
+        keys: &[R],
     ) -> Result<(), TrackError> {
         let track = self.tracks.len();
         check_times(track, times, keys.len())?;
         let first_key = self.keys.len();
-        for (key, &quat) in keys.iter().enumerate() {
-            match unit_key(track, key, quat) {
+        for (key, rotation) in keys.iter().enumerate() {
+            match unit_key(track, key, rotation.quat()) {
                 Ok(unit) => self.keys.push(unit),
                 Err(error) => {
                     self.keys.truncate(first_key);
@@ -127,8 +129,9 @@ impl TrackSet {
     ///
     /// # Errors
     /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
-    pub fn with_shared_times(times: &[f64], keys: &[Quat]) -> Result<Self, TrackError> {
-        Self::from_shared_times(times.to_vec(), keys.to_vec())
+    pub fn with_shared_times<R: Rotation>(times: &[f64], keys: &[R]) -> Result<Self, TrackError> {
+        let keys = keys.iter().map(|rotation| rotation.quat());
+        Self::from_shared_times(times.to_vec(), keys.collect())
     }
 
     /// As [`TrackSet::with_shared_times`], without a copy.
@@ -210,10 +213,17 @@ impl TrackSet {
         self.tracks.is_empty()
     }
 
-    /// The track at `index`.
+    /// The track at `index`; `None` out of range.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<Track<'_>> {
+        (index < self.track_count()).then(|| self.track(index))
+    }
+
+    /// The track at `index`, as `[]` has it of a slice; [`TrackSet::get`] never panics.
     ///
     /// # Panics
     /// When `index` is not below [`TrackSet::track_count`].
+    #[track_caller]
     pub fn track(&self, index: usize) -> Track<'_> {
         let (times, keys) = self.times_and_keys(index);
         Track {
@@ -277,11 +287,11 @@ impl TrackSet {
         (0..self.tracks.len()).map(|index| self.track(index))
     }
 
-    /// The track's name, or `box1`, `box2` … by its place when it has none.
+    /// The track's name, or `box1`, `box2` … by its place if it has none, or if there is no such
+    /// track.
     pub fn track_name(&self, index: usize) -> String {
-        self.track(index)
-            .name
-            .map_or_else(|| format!("box{}", index + 1), str::to_owned)
+        let name = self.get(index).and_then(|track| track.name);
+        name.map_or_else(|| format!("box{}", index.saturating_add(1)), str::to_owned)
     }
 
     /// First and last key time over all tracks, seconds; `None` when empty.
@@ -292,13 +302,18 @@ impl TrackSet {
 
     /// Some tracks as a set of their own, such as `0..10` or a list, in that order.
     ///
-    /// # Panics
-    /// When one of them passes [`TrackSet::track_count`].
-    #[must_use]
-    pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Self {
+    /// # Errors
+    /// When there is no such track.
+    pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Result<Self, TrackError> {
         let mut set = Self::default();
         for index in tracks {
-            let track = self.track(index);
+            let Some(track) = self.get(index) else {
+                let tracks = self.track_count();
+                return Err(TrackError::NoSuchTrack {
+                    track: index,
+                    tracks,
+                });
+            };
             let first_time = set.share_or_append(track.times);
             let first_key = set.keys.len();
             set.keys.extend_from_slice(track.keys);
@@ -322,7 +337,7 @@ impl TrackSet {
             });
             set.longest = set.longest.max(track.keys.len());
         }
-        set
+        Ok(set)
     }
 
     /// Where a track's times start. They are shared with the track before if they are equal,

@@ -46,18 +46,18 @@ pub struct VectorKeys<'a> {
 }
 
 impl TrackSet {
-    /// Gives a track translation keys. Their `times` are seconds, strictly increasing, and may
+    /// Gives a track translation keys, [`Vec3`] or `[f32; 3]`. Their `times` are seconds, strictly increasing, and may
     /// differ from the rotations' times. `tangents` (arriving, leaving; units per second) are used
     /// by [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic) and
     /// may be empty.
     ///
     /// # Errors
     /// When there is no such track, the lengths differ, or a number is not finite.
-    pub fn set_translations(
+    pub fn set_translations<V: Copy + Into<Vec3>>(
         &mut self,
         track: usize,
         times: &[f64],
-        keys: &[Vec3],
+        keys: &[V],
         tangents: &[[Vec3; 2]],
     ) -> Result<(), TrackError> {
         self.set_vectors(Channel::Translation, track, times, keys, tangents)
@@ -71,15 +71,16 @@ impl TrackSet {
     /// # Errors
     /// When there is no point, the lengths differ, a number is not finite, or an upward direction
     /// has no length.
-    pub fn push_path(
+    pub fn push_path<V: Copy + Into<Vec3>>(
         &mut self,
         name: &str,
         times: &[f64],
-        points: &[Vec3],
+        points: &[V],
         ups: &[Option<Vec3>],
     ) -> Result<usize, TrackError> {
         let track = self.track_count();
         check_times(track, times, points.len())?;
+        let points: Vec<Vec3> = points.iter().map(|&point| point.into()).collect();
         if !ups.is_empty() && ups.len() != points.len() {
             return Err(TrackError::DataLength {
                 track,
@@ -102,7 +103,7 @@ impl TrackSet {
             });
         }
         self.push(name, &times[..1], &[Quat::IDENTITY])?;
-        self.set_translations(track, times, points, &[])?;
+        self.set_translations(track, times, &points, &[])?;
         if let Some(Some(path)) = self.translations.get_mut(track) {
             Arc::make_mut(path).ups = ups.to_vec();
         }
@@ -113,22 +114,22 @@ impl TrackSet {
     ///
     /// # Errors
     /// As there.
-    pub fn set_scales(
+    pub fn set_scales<V: Copy + Into<Vec3>>(
         &mut self,
         track: usize,
         times: &[f64],
-        keys: &[Vec3],
+        keys: &[V],
         tangents: &[[Vec3; 2]],
     ) -> Result<(), TrackError> {
         self.set_vectors(Channel::Scale, track, times, keys, tangents)
     }
 
-    fn set_vectors(
+    fn set_vectors<V: Copy + Into<Vec3>>(
         &mut self,
         channel: Channel,
         track: usize,
         times: &[f64],
-        keys: &[Vec3],
+        keys: &[V],
         tangents: &[[Vec3; 2]],
     ) -> Result<(), TrackError> {
         let tracks = self.track_count();
@@ -136,6 +137,7 @@ impl TrackSet {
             return Err(TrackError::NoSuchTrack { track, tracks });
         }
         check_times(track, times, keys.len())?;
+        let keys: Vec<Vec3> = keys.iter().map(|&key| key.into()).collect();
         let not_finite = |key| TrackError::DataNotFinite {
             track,
             key,
@@ -166,7 +168,7 @@ impl TrackSet {
         }
         vectors[track] = Some(Arc::new(VectorTrack {
             times: times.to_vec(),
-            keys: keys.to_vec(),
+            keys,
             tangents: tangents.to_vec(),
             ups: Vec::new(),
         }));

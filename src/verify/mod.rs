@@ -96,7 +96,7 @@ impl Verification {
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
-/// let engine = Engine::first()?;
+/// let engine = Engine::auto()?;
 /// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
 /// assert!(found.passes());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -130,7 +130,7 @@ pub fn verify(
         Place {
             track,
             frame,
-            time: timeline.time(track, frame),
+            time: timeline.time_at(track, frame),
         }
     };
     let worst = tracks
@@ -221,7 +221,7 @@ impl TrackErrors {
         for (sample, &quat) in row.iter().enumerate() {
             let quat: DQuat = quat.as_dquat();
             let norm = (quat.length() - 1.0).abs();
-            let errors_at = moments(track.times, timeline.time(index, sample))
+            let errors_at = moments(track.times, timeline.time_at(index, sample))
                 .map(|time| angle_between(quat, curve.rotation(time)));
             let angle = errors_at[0].min(errors_at[1]);
             // NaN is as wrong as can be, and must not slip through comparisons.
@@ -294,7 +294,7 @@ mod tests {
             Quat::NAN,
             Quat::from_rotation_x(0.5),
         ] {
-            let mut quats = OutputBuffer::new(52);
+            let mut quats = OutputBuffer::new(52).unwrap();
             quats.copy_from_slice(good.as_quats());
             quats[26 + 7] = wrong;
             let bad = Rotations::new(Box::new(quats), 2, 26, good.layout());

@@ -47,9 +47,9 @@ impl OutputVerification {
 
 const QUANTITIES: [(&str, Quantity); 4] = [
     ("velocity", Quantity::Velocity(Axes::Body)),
-    ("velocity, world", Quantity::Velocity(Axes::World)),
+    ("velocity, parent", Quantity::Velocity(Axes::Parent)),
     ("acceleration", Quantity::Acceleration(Axes::Body)),
-    ("acceleration, world", Quantity::Acceleration(Axes::World)),
+    ("acceleration, parent", Quantity::Acceleration(Axes::Parent)),
 ];
 
 /// Samples of a method's derivatives that are compared with the reference, which is slow.
@@ -100,10 +100,10 @@ pub(crate) fn verify(
         let found = clip.evaluate_encoded(frames, layout, encoding)?;
         let bytes = encoding.bytes();
         expected.resize(rotations.len() * bytes, 0);
-        encoding.encode(rotations, &mut expected);
+        encoding.encode_all(rotations, &mut expected);
         let pairs = found.chunks(bytes).zip(expected.chunks(bytes));
         let error = |(stored, &rotation): (&[u8], &[f32; 4])| {
-            let [decoded, rotation] = [encoding.decode(stored), rotation].map(exact);
+            let [decoded, rotation] = [encoding.decode_one(stored), rotation].map(exact);
             worse(angle_between(decoded, rotation))
         };
         outputs.push(OutputVerification {
@@ -127,7 +127,7 @@ fn world(
     local: &Rotations,
 ) -> Result<OutputVerification, Error> {
     let (tracks, samples) = (set.track_count(), local.samples());
-    let chain = Skeleton::chain(tracks, 1.0);
+    let chain = Skeleton::chain(tracks, 1.0)?;
     let found = engine.world(local, &chain)?;
     let expected = cpu.world(local, &chain)?;
     let pairs = found.as_slice().iter().zip(expected.as_slice());
@@ -182,12 +182,12 @@ fn rate_error(
             };
             match axes {
                 Axes::Body => body,
-                Axes::World => curve.rotation(time) * body,
+                Axes::Parent => curve.rotation(time) * body,
             }
         };
         let (mut error, mut largest) = (0.0f64, rate_floor(track.times, interpolation.quantity));
         for sample in (0..samples).step_by(each) {
-            let time = timeline.time(index, sample);
+            let time = timeline.time_at(index, sample);
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
             let errors_at =
                 moments(track.times, time).map(|time| (found - expected(time)).length());

@@ -531,7 +531,7 @@ fn a_body_looks_at_another() {
 fn what_cannot_be_followed_is_refused() {
     let mut set = TrackSet::new();
     let none: Vec<f64> = Vec::new();
-    assert!(set.push_path("", &none, &[], &[]).is_err());
+    assert!(set.push_path("", &none, &[Vec3::ZERO; 0], &[]).is_err());
     let nan = set.push_path("", &[0.0], &[Vec3::NAN], &[]).unwrap_err();
     assert!(matches!(nan, TrackError::DataNotFinite { key: 0, .. }));
     let order = set

@@ -45,7 +45,7 @@ fn store(kernel: &'static str, kind: &'static str) -> Twin {
         trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
         trial.output("rotations");
         let mut bytes = vec![0; encoding.bytes()];
-        encoding.encode(&[rotation], &mut bytes);
+        encoding.encode(&[rotation], &mut bytes).unwrap();
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
         let cells: Vec<u64> = match kind {
             "f32_wide" => bytemuck::pod_collect_to_vec(&bytes),

@@ -105,7 +105,7 @@ fn naive(track: tumble::Track<'_>, times: &[f32], row: &mut [Quat]) {
 
 /// Medians, every contestant in turn, after a round that does not count.
 fn race(mut contestants: Vec<Contestant<'_>>) -> Vec<(&'static str, Duration)> {
-    let mut output = OutputBuffer::new(TRACKS * FRAMES);
+    let mut output = OutputBuffer::new(TRACKS * FRAMES).unwrap();
     output.fill(Quat::IDENTITY);
     let mut times = vec![Vec::new(); contestants.len()];
     for round in 0..=ROUNDS {

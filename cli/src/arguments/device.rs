@@ -276,7 +276,7 @@ impl Opened {
         let result = self
             .engine
             .stream(set, interpolation, frames, layout, chunk, |chunk| {
-                done = chunk.start + chunk.rotations.len();
+                done = chunk.start + chunk.rows.len();
                 sink(chunk)
             });
         match result {
@@ -329,7 +329,7 @@ impl Opened {
     ) -> Result<Vec<Quat>, Error> {
         let mut rotations = Vec::new();
         let collected = self.stream(set, interpolation, frames, layout, &mut |chunk| {
-            rotations.extend_from_slice(chunk.rotations);
+            rotations.extend_from_slice(chunk.rotations().unwrap_or_default());
             Ok(())
         });
         match collected {

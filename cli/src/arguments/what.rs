@@ -110,8 +110,9 @@ enum Major {
 enum AxesArgument {
     /// of what turns
     Body,
-    /// of what it turns in (the parent)
-    World,
+    /// of what it turns in: its parent, or the world for a track without one
+    #[value(alias = "world")]
+    Parent,
 }
 
 /// The order of a quaternion's components.
@@ -173,7 +174,8 @@ impl What {
         };
         let Some(parents) = &self.parents else {
             let offsets = (0..tracks).map(|track| hung(&track.checked_sub(1)));
-            return Ok((Skeleton::chain(tracks, length), offsets.collect()));
+            let chain = Skeleton::chain(tracks, length).map_err(|error| error.to_string())?;
+            return Ok((chain, offsets.collect()));
         };
         if parents.len() != tracks {
             let given = parents.len();
@@ -270,7 +272,7 @@ impl What {
     pub(crate) fn quantity(&self) -> Quantity {
         let axes = match self.axes {
             AxesArgument::Body => Axes::Body,
-            AxesArgument::World => Axes::World,
+            AxesArgument::Parent => Axes::Parent,
         };
         match self.output {
             Output::Velocity => Quantity::Velocity(axes),

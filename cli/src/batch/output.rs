@@ -353,8 +353,11 @@ impl Target {
                 result: *result,
                 state: State::Waiting(out),
             };
-            let evaluated =
-                evaluate(&mut |chunk| writer.write(chunk.rotations).map_err(Ended::Writing));
+            let evaluated = evaluate(&mut |chunk| {
+                writer
+                    .write(bytemuck::cast_slice(chunk.rows))
+                    .map_err(Ended::Writing)
+            });
             match evaluated {
                 Ok(()) => writer.finish(),
                 Err(Ended::Writing(error)) => Err(error),

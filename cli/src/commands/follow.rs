@@ -212,9 +212,7 @@ fn write(
     let mut rotations: Vec<Quat> = found.rotations.as_quats().to_vec();
     continue_signs(&mut rotations, set.track_count());
     let samples = Baked {
-        times: (0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect(),
+        times: timeline.times(0).collect(),
         rotations,
         translations: places
             .iter()

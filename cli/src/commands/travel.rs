@@ -203,7 +203,7 @@ impl Source {
             ..Motion::default()
         };
         let set = match tracks.of(&paths, &input::name(path))? {
-            Some(wanted) => paths.set.select(wanted),
+            Some(wanted) => paths.set.select(wanted)?,
             None => paths.set,
         };
         Ok(Self::Paths(set, Box::new(arguments.clone())))

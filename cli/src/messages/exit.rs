@@ -91,7 +91,7 @@ impl Failure {
     /// An evaluation failed: the request, the input or the device is to blame.
     pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
         let code = match error {
-            Error::Frames(_) => USAGE,
+            Error::Frames(_) | Error::OutOfMemory(_) => USAGE,
             Error::Vulkan(VulkanError::NoLoader { .. } | VulkanError::NoDevice) => NO_VULKAN,
             Error::Vulkan(_) => DEVICE,
             Error::Interpolation(_) => ALL_INPUTS,

@@ -108,8 +108,8 @@ fn stream_all(
                 Layout::TrackMajor,
                 1 << 20,
                 |chunk: Chunk<'_>| {
-                    hash.add(chunk.rotations);
-                    count += chunk.rotations.len();
+                    hash.add(chunk.rotations().unwrap());
+                    count += chunk.rotations().unwrap().len();
                     Ok::<(), Error>(())
                 },
             )
@@ -188,7 +188,7 @@ fn indices_beyond_32_bits() {
             1 << 20,
             |chunk: Chunk<'_>| {
                 assert_eq!(chunk.start, next);
-                next += chunk.rotations.len();
+                next += chunk.rotations().unwrap().len();
                 if chunk.start % (1 << 26) < 1 << 20 || chunk.start > 1 << 32 {
                     // As asked for alone.
                     let (track, sample) = (chunk.tracks.start, chunk.samples.start);
@@ -196,7 +196,7 @@ fn indices_beyond_32_bits() {
                     let own = set.select(track..track + 1);
                     let alone = Frames::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
                     let alone = engine.evaluate(&own, interpolation, &alone.between(time, time))?;
-                    let angle = alone.as_quats()[0].angle_between(chunk.rotations[0]);
+                    let angle = alone.as_quats()[0].angle_between(chunk.rotations().unwrap()[0]);
                     assert!(angle < 1e-3, "track {track}, sample {sample}: {angle}");
                 }
                 Ok::<(), Error>(())
@@ -218,9 +218,9 @@ fn indices_beyond_32_bits() {
         let (mut last, mut total) = (Hash::default(), 0usize);
         let started = Instant::now();
         let stopped = clip.stream(&frames, Layout::FrameMajor, 1 << 20, |chunk: Chunk<'_>| {
-            total = chunk.start + chunk.rotations.len();
+            total = chunk.start + chunk.rotations().unwrap().len();
             if total > 1 << 32 {
-                last.add(chunk.rotations);
+                last.add(chunk.rotations().unwrap());
             }
             Ok::<(), Error>(())
         });

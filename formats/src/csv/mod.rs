@@ -153,7 +153,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
 
     fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
         self.csv.write_field(self.frame.to_string())?;
-        let time = self.timeline.time(0, self.frame);
+        let time = self.timeline.time(0, self.frame).unwrap_or(f64::NAN);
         self.csv.write_field(time.to_string())?;
         let mut bytes = vec![0; self.encoding.bytes()];
         for q in frame {
@@ -163,7 +163,8 @@ impl<'a, W: Write> CsvWriter<'a, W> {
             }
             // Quaternions are never rounded.
             if !self.encoding.is_quaternion() {
-                self.encoding.encode(&[q.to_array()], &mut bytes);
+                let encoded = self.encoding.encode(&[q.to_array()], &mut bytes);
+                encoded.map_err(std::io::Error::other)?;
                 numbers = bytemuck::pod_collect_to_vec(&bytes);
             }
             for component in numbers {

@@ -267,9 +267,7 @@ impl Document for NpzDocument {
         let timeline = frames.map_err(|error| {
             Diagnostic::new(&self.archive.file, Code::Layout, error.to_string())
         })?;
-        Ok((0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect())
+        Ok(timeline.times(0).collect())
     }
 
     fn writes(&self, format: &Format) -> bool {

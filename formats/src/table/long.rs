@@ -87,13 +87,14 @@ impl<S: Sink> ResultWriter for Rotations<'_, S> {
                 ),
                 Layout::FrameMajor => (self.written % self.tracks, self.written / self.tracks),
             };
-            self.batch
-                .row(frame, self.timeline.time(track, frame), track);
+            let time = self.timeline.time(track, frame).unwrap_or(f64::NAN);
+            self.batch.row(frame, time, track);
             let mut numbers = q.to_array();
             if self.turned {
                 numbers.rotate_right(1);
             }
-            self.encoding.encode(&[numbers], &mut encoded);
+            let stored = self.encoding.encode(&[numbers], &mut encoded);
+            stored.map_err(io::Error::other)?;
             for (list, number) in self.batch.numbers.iter_mut().zip(encoded.chunks(bytes)) {
                 list.push(number);
             }
@@ -137,7 +138,8 @@ pub(crate) fn write_poses<S: Sink>(
         .enumerate()
     {
         let (frame, track) = (place / tracks, place % tracks);
-        batch.row(frame, poses.timeline.time(track, frame), track);
+        let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
+        batch.row(frame, time, track);
         push_all(&mut batch.numbers, pose);
         if batch.is_full() {
             batch.flush(&mut sink)?;

@@ -46,7 +46,7 @@ _Rate: TypeAlias = float | str | Fraction | np.integer[Any] | np.floating[Any]
 _Path: TypeAlias = str | os.PathLike[str]
 _Order: TypeAlias = Literal["xyzw", "wxyz"]
 _Layout: TypeAlias = Literal["track", "frame"]
-_Axes: TypeAlias = Literal["body", "world"]
+_Axes: TypeAlias = Literal["body", "parent", "world"]
 _Wrap: TypeAlias = Literal["hold", "loop", "mirror", "extrapolate"]
 _Single: TypeAlias = NDArray[np.float32]
 

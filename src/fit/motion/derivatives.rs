@@ -26,7 +26,7 @@ pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quate
     let [x, y, z] = match axes {
         Axes::Body => body,
         // This holds for accelerations too: ω × ω = 0.
-        Axes::World => rotated(at, body),
+        Axes::Parent => rotated(at, body),
     };
     [x, y, z, 0.0]
 }

@@ -139,7 +139,7 @@ fn measure(
     let engine = Engine::new(Device::Cpu)?;
     let clip = engine.upload(&workload.set, method)?;
     let count = clip.track_count() * clip.timeline(&workload.frames)?.len();
-    let mut output = OutputBuffer::new(count);
+    let mut output = OutputBuffer::new(count)?;
     output.fill(Quat::IDENTITY);
 
     let fill = |fill: fn(&mut [Quat], Quat)| {

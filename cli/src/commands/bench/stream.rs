@@ -62,7 +62,7 @@ pub(crate) fn measure(
     };
     let stream = |take: &mut dyn FnMut(&[Quat]) -> Result<(), Ended>| {
         engine.stream(set, method, frames, Layout::TrackMajor, CHUNK, |chunk| {
-            take(chunk.rotations)
+            take(chunk.rotations().unwrap_or_default())
         })
     };
     let (mut alone, mut with) = (sink()?, sink()?);

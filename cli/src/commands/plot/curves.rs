@@ -215,8 +215,9 @@ impl Source<'_> {
                 quantity: Quantity::Velocity(OwnAxes::Body),
                 ..interpolation
             };
-            let velocities = self.evaluate(device, index, velocity)?;
-            let speeds = velocities.iter().map(|v| f64::from(v.xyz().length()));
+            let velocities = self.rates(device, index, velocity)?;
+            let velocities = velocities.as_slice().iter();
+            let speeds = velocities.map(|v| f64::from(v.truncate().length()));
             curves.push(Curve {
                 colour: colours::of_method(interpolation.method),
                 width: self.width(order).min(2.5),
@@ -241,10 +242,12 @@ impl Source<'_> {
         for &interpolation in self.interpolations {
             let rotations = self.evaluate(device, index, interpolation)?;
             let reference = Reference::of(&interpolation, self.set.track(index));
-            let errors = rotations.iter().enumerate().map(|(place, rotation)| {
-                let time = self.timeline.time(0, place);
-                angle_between(rotation.as_dquat(), reference.rotation(time))
-            });
+            let errors = rotations
+                .iter()
+                .zip(self.timeline.times(0))
+                .map(|(rotation, time)| {
+                    angle_between(rotation.as_dquat(), reference.rotation(time))
+                });
             let points = self.points(errors);
             let pieces = points
                 .split(|point| point.1 < EXACT)

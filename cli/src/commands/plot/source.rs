@@ -1,7 +1,7 @@
 //! One input, sampled: what curves are made of.
 
 use glam::Quat;
-use tumble::{Frames, Interpolation, Layout, Timeline, TrackSet};
+use tumble::{Frames, Interpolation, Layout, Timeline, TrackSet, Vectors};
 
 use crate::arguments::device::Opened;
 use crate::arguments::time::Samples;
@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
                 "{name}: there are no samples to plot"
             )));
         }
-        let start = timeline.time(0, 0);
+        let start = timeline.time(0, 0).unwrap_or_default();
         let count = words::count(timeline.len(), "frame");
         let (label, x_of, about): (_, Box<dyn Fn(f64) -> f64>, _) = match samples {
             Samples::Rate { rate, .. } => {
@@ -64,7 +64,7 @@ impl<'a> Source<'a> {
                 words::count(timeline.len(), "time"),
             ),
         };
-        let range = range_of((0..timeline.len()).map(|sample| x_of(timeline.time(0, sample))));
+        let range = range_of(timeline.times(0).map(&x_of));
         let x = Axis {
             label,
             range,
@@ -105,26 +105,47 @@ impl<'a> Source<'a> {
         index: usize,
         interpolation: Interpolation,
     ) -> Result<Vec<Quat>, Failure> {
-        let one = self.set.select(index..index + 1);
-        // The rotations, the points of a curve and what is drawn of them.
-        room::in_memory(&self.name, &one, &self.frames, 4)?;
+        let one = self.one(index)?;
         device
             .collect(&one, interpolation, &self.frames, Layout::TrackMajor)
             .map_err(|error| Failure::evaluating(&self.name, &error))
     }
 
+    /// The velocities or accelerations of one box.
+    pub(crate) fn rates(
+        &self,
+        device: &mut Opened,
+        index: usize,
+        interpolation: Interpolation,
+    ) -> Result<Vectors, Failure> {
+        let (one, layout) = (self.one(index)?, Layout::TrackMajor);
+        device
+            .choose(self.timeline.len())
+            .and_then(|()| {
+                device.work(|engine| engine.rates(&one, interpolation, &self.frames, layout))
+            })
+            .map_err(|error| Failure::evaluating(&self.name, &error))
+    }
+
+    /// The track of one box, of which there is room for the samples, the points of a curve and what is
+    /// drawn of them.
+    fn one(&self, index: usize) -> Result<TrackSet, Failure> {
+        let one = (self.set.select([index]))
+            .map_err(|error| Failure::evaluating(&self.name, &error.into()))?;
+        room::in_memory(&self.name, &one, &self.frames, 4)?;
+        Ok(one)
+    }
+
     /// Points over the samples.
     pub(crate) fn points(&self, values: impl IntoIterator<Item = f64>) -> Vec<(f64, f64)> {
-        let x = (0..self.timeline.len()).map(|place| (self.x_of)(self.timeline.time(0, place)));
+        let x = self.timeline.times(0).map(&self.x_of);
         x.zip(values).collect()
     }
 
     /// Keys among the samples: where they lie, with the sign of the curve there.
     pub(crate) fn keys(&self, index: usize, rotations: &[Quat]) -> Vec<(f64, Quat)> {
         let track = self.set.track(index);
-        let times: Vec<f64> = (0..self.timeline.len())
-            .map(|place| self.timeline.time(0, place))
-            .collect();
+        let times: Vec<f64> = self.timeline.times(0).collect();
         let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
             return Vec::new();
         };

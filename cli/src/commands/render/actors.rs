@@ -25,13 +25,15 @@ pub(super) fn chain(
     frames: &Frames,
 ) -> Result<Actor, Failure> {
     // A picture has no scale: boxes are 1 long, however long they are.
-    let skeleton = Skeleton::chain(set.track_count(), 1.0);
+    let timeline = frames
+        .resolve(set.track_count(), set.time_span())
+        .map_err(|error| Failure::evaluating(name, &error.into()))?;
     let poses = device
-        .choose(set.track_count())
+        .choose(set.track_count() * timeline.len())
         .and_then(|()| {
             let engine = &device.engine;
             let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
-            engine.world(&local, &skeleton)
+            engine.world(&local, &Skeleton::chain(set.track_count(), 1.0)?)
         })
         .map_err(|error| Failure::evaluating(name, &error))?;
     let (tracks, samples) = (poses.tracks(), poses.samples());

@@ -193,7 +193,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     if kind == Kind::Still {
-        frames = Frames::at(vec![timeline.time(0, 0)]);
+        frames = Frames::at(timeline.times(0).take(1).collect());
         timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
@@ -275,9 +275,7 @@ impl Arguments {
         timeline: &Timeline,
         inputs: &[PathBuf],
     ) -> Result<(), Failure> {
-        let times: Vec<f64> = (0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect();
+        let times: Vec<f64> = timeline.times(0).collect();
         let (width, height) = self.size;
         let mut progress = Progress::new("rendering", times.len() as u64);
         let too_fast = times

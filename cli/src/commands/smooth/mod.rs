@@ -231,11 +231,11 @@ fn smoothed(
         let before = methods.sample(engine, clip, &frames)?;
         let mut samples = before.clone();
         let layout = Layout::FrameMajor;
-        if let Some(own) = Rotations::of(&samples.rotations, tracks, layout) {
+        if let Ok(own) = Rotations::of(&samples.rotations, tracks, layout) {
             samples.rotations = engine.smooth(&own, smoothing)?.as_quats().to_vec();
         }
         continue_signs(&mut samples.rotations, tracks);
-        if let Some(own) = Vectors::of(&samples.translations, tracks, layout) {
+        if let Ok(own) = Vectors::of(&samples.translations, tracks, layout) {
             let moved = engine.smooth_vectors(&own, smoothing)?;
             samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
         }

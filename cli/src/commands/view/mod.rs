@@ -232,9 +232,7 @@ impl Arguments {
                 words::count(timeline.len(), "frame")
             )));
         }
-        let mut times: Vec<f64> = (0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect();
+        let mut times: Vec<f64> = timeline.times(0).collect();
         let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
             return Err(Failure::usage(format!(
                 "{name}: there are no frames to show"

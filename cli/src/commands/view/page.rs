@@ -180,7 +180,9 @@ impl StoredResult {
 fn short(rotations: &[Quat]) -> Vec<u16> {
     let rotations: Vec<[f32; 4]> = rotations.iter().map(Quat::to_array).collect();
     let mut bytes = vec![0; rotations.len() * Encoding::Snorm16.bytes()];
-    Encoding::Snorm16.encode(&rotations, &mut bytes);
+    Encoding::Snorm16
+        .encode(&rotations, &mut bytes)
+        .expect("8 bytes a rotation");
     let pairs = bytes.chunks_exact(2);
     pairs
         .map(|pair| u16::from_le_bytes([pair[0], pair[1]]))

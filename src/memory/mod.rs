@@ -1,0 +1,107 @@
+//! Allocations whose size follows from what a caller asks for: they may fail, and then they say so.
+
+/// Where less than this is asked for, the system alone is asked.
+#[cfg(target_os = "linux")]
+const LARGE: u128 = 1 << 30;
+
+/// There is not the memory that a result needs.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no memory for {what}: {bytes} bytes; ask for less at once, as `stream` and `evaluate_part_into` do"
+)]
+#[non_exhaustive]
+pub struct OutOfMemory {
+    /// What it was to hold.
+    pub what: &'static str,
+    /// Bytes that were asked for.
+    pub bytes: u128,
+}
+
+impl OutOfMemory {
+    pub(crate) fn new<T>(what: &'static str, count: usize) -> Self {
+        let bytes = count as u128 * size_of::<T>() as u128;
+        Self { what, bytes }
+    }
+}
+
+/// Room for `count` values. The system may promise memory that it does not have and end the process
+/// that uses it, so large amounts are refused if less is available.
+pub(crate) fn reserved<T>(count: usize, what: &'static str) -> Result<Vec<T>, OutOfMemory> {
+    refuse_more_than_there_is::<T>(count, what)?;
+    let mut values = Vec::new();
+    match values.try_reserve_exact(count) {
+        Ok(()) => Ok(values),
+        Err(_) => Err(OutOfMemory::new::<T>(what, count)),
+    }
+}
+
+/// Zeros.
+pub(crate) fn zeroed<T: bytemuck::Zeroable>(
+    count: usize,
+    what: &'static str,
+) -> Result<Vec<T>, OutOfMemory> {
+    refuse_more_than_there_is::<T>(count, what)?;
+    bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemory::new::<T>(what, count))
+}
+
+/// Refuses a large amount if the system has less left.
+pub(crate) fn refuse_more_than_there_is<T>(
+    count: usize,
+    what: &'static str,
+) -> Result<(), OutOfMemory> {
+    let asked = OutOfMemory::new::<T>(what, count);
+    #[cfg(target_os = "linux")]
+    if asked.bytes >= LARGE
+        && let Ok(text) = std::fs::read_to_string("/proc/meminfo")
+        && asked.bytes > available(&text)
+    {
+        return Err(asked);
+    }
+    match isize::try_from(asked.bytes) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(asked),
+    }
+}
+
+/// Bytes of memory and of swap space that are free or can be made so, by Linux's table.
+#[cfg(target_os = "linux")]
+fn available(meminfo: &str) -> u128 {
+    let kibibytes = |name: &str| {
+        let line = meminfo.lines().find_map(|line| line.strip_prefix(name))?;
+        line.split_whitespace().next()?.parse::<u128>().ok()
+    };
+    match kibibytes("MemAvailable:") {
+        Some(memory) => (memory + kibibytes("SwapFree:").unwrap_or(0)) * 1024,
+        None => u128::MAX,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused_and_named() {
+        for count in [1 << 46, usize::MAX / 16, usize::MAX] {
+            let expected = OutOfMemory {
+                what: "a result",
+                bytes: 16 * count as u128,
+            };
+            assert_eq!(zeroed::<[f32; 4]>(count, "a result").unwrap_err(), expected);
+            assert_eq!(
+                reserved::<[f32; 4]>(count, "a result").unwrap_err(),
+                expected
+            );
+        }
+        assert_eq!(zeroed::<f32>(3, "a result").unwrap(), [0.0; 3]);
+        assert!(reserved::<f32>(3, "a result").unwrap().capacity() >= 3);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_systems_table_is_read() {
+        let table = "MemTotal:  16 kB\nMemAvailable:      5 kB\nSwapFree:   2 kB\n";
+        assert_eq!(available(table), 7 * 1024);
+        assert_eq!(available("MemTotal: 16 kB\n"), u128::MAX);
+    }
+}

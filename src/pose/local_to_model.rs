@@ -1,0 +1,210 @@
+//! Local to model: the transforms of a skeleton's joints in their parents' frames become matrices in
+//! the model's frame.
+
+use glam::{Affine3A, Vec3};
+use rayon::prelude::*;
+
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::backend::Backend;
+use crate::math::canonical::canonical;
+use crate::memory::zeroed;
+use crate::output::encoding::MatrixOrder;
+use crate::pose::skeleton::Skeleton;
+use crate::pose::transforms::Transforms;
+use crate::pose_error::PoseError;
+use crate::shader::{Link, ROOT};
+use crate::twin::matrix;
+
+/// The three rows of an affine matrix for column vectors.
+type Rows = [[f32; 4]; 3];
+
+impl Engine {
+    /// Walks a skeleton from its roots down: `M = M_parent T R S` for every joint, with its
+    /// translation, rotation and scale, and `M B` where inverse bind matrices `B` are given, one for
+    /// each track, as a renderer skins vertices with. The translation of a track that has keys of it
+    /// takes the place of the skeleton's offset, as in glTF and BVH; other tracks stay at their
+    /// offsets. The host computes them in f32 for every device, so the bits are the same.
+    ///
+    /// ```
+    /// # use glam::{Quat, Vec3};
+    /// # use tumble::{Device, Engine, Frames, Layout, Skeleton, TrackSet, VectorMethod, method};
+    /// let mut set = TrackSet::new();
+    /// set.push("hip", &[0.0], &[Quat::IDENTITY])?;
+    /// set.push("knee", &[0.0], &[Quat::IDENTITY])?;
+    /// set.set_translations(0, &[0.0, 1.0], &[[0.0, 1.0, 0.0], [0.0, 1.0, 1.0]], &[])?;
+    /// let offsets = vec![Vec3::ZERO, Vec3::new(0.0, -0.5, 0.0)];
+    /// let skeleton = Skeleton::new(vec![None, Some(0)], offsets)?;
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let (frames, layout) = (Frames::at(vec![0.75]), Layout::FrameMajor);
+    /// let local = engine.transforms(&set, method::SLERP, VectorMethod::Linear, &frames, layout)?;
+    /// let model = engine.local_to_model(&local, &skeleton, None)?;
+    /// assert_eq!(model.position(0, 0), Some(Vec3::new(0.0, 1.0, 0.75)));
+    /// assert_eq!(model.position(1, 0), Some(Vec3::new(0.0, 0.5, 0.75)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the three are not of the same tracks and samples, the skeleton or the inverse bind
+    /// matrices are of other tracks, or there is not the memory.
+    pub fn local_to_model(
+        &self,
+        local: &Transforms,
+        skeleton: &Skeleton,
+        inverse_bind: Option<&[Affine3A]>,
+    ) -> Result<ModelMatrices, Error> {
+        let (tracks, samples) = (local.rotations.tracks(), local.rotations.samples());
+        local.check()?;
+        if skeleton.len() != tracks {
+            let given = skeleton.len();
+            return Err(PoseError::Skeleton { given, tracks }.into());
+        }
+        if let Some(given) = inverse_bind.map(<[_]>::len)
+            && given != tracks
+        {
+            return Err(PoseError::InverseBind { given, tracks }.into());
+        }
+        let count = tracks.saturating_mul(samples);
+        let mut matrices: Vec<Rows> = zeroed(count, "model matrices")?;
+        let links = skeleton.links();
+        let bind: Option<Vec<Rows>> =
+            inverse_bind.map(|all| all.iter().map(|&matrix| rows(matrix)).collect());
+        let mut walk = || {
+            let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
+            frames.for_each(|(sample, model)| {
+                for link in &links {
+                    local.walk(link, sample, model);
+                }
+                for (matrix, bind) in model.iter_mut().zip(bind.iter().flatten()) {
+                    *matrix = product(matrix, bind);
+                }
+                for number in model.as_flattened_mut().as_flattened_mut() {
+                    *number = canonical(*number);
+                }
+            });
+        };
+        match &*self.backend {
+            Backend::Cpu(engine) => engine.on_threads(&mut walk),
+            Backend::Vulkan(_) => walk(),
+        }
+        Ok(ModelMatrices {
+            matrices,
+            tracks,
+            samples,
+        })
+    }
+}
+
+impl Transforms {
+    /// Refuses translations, rotations and scales of different shapes.
+    fn check(&self) -> Result<(), PoseError> {
+        let first = self.rotations.shape();
+        let others = [self.translations.shape(), self.scales.shape()];
+        if let Some(place) = others.iter().position(|shape| *shape != first) {
+            return Err(PoseError::Shape {
+                layer: place + 1,
+                given: others[place],
+                first,
+            });
+        }
+        let (given, tracks) = (self.has_translation.len(), self.rotations.tracks());
+        match given == tracks {
+            true => Ok(()),
+            false => Err(PoseError::HasTranslation { given, tracks }),
+        }
+    }
+
+    /// Finds the matrix of one joint, after that of its parent.
+    fn walk(&self, link: &Link, sample: usize, model: &mut [Rows]) {
+        let (track, layout) = (link.track as usize, self.rotations.layout());
+        let (tracks, samples) = (self.rotations.tracks(), self.rotations.samples());
+        let place = layout.place(track, sample, tracks, samples);
+        let [sx, sy, sz, _] = self.scales.as_arrays()[place];
+        let [tx, ty, tz, _] = self.translations.as_arrays()[place];
+        let hung = match self.has_translation[track] {
+            true => [tx, ty, tz],
+            false => link.offset,
+        };
+        let turned = matrix::rows(
+            self.rotations.as_arrays()[place],
+            MatrixOrder::RowMajor as u32,
+        );
+        let row = |i: usize| {
+            let [x, y, z]: [f32; 3] = turned[i];
+            [x * sx, y * sy, z * sz, hung[i]]
+        };
+        let own = [row(0), row(1), row(2)];
+        model[track] = match link.parent {
+            ROOT => own,
+            parent => product(&model[parent as usize], &own),
+        };
+    }
+}
+
+/// The product of two affine matrices.
+fn product(a: &Rows, b: &Rows) -> Rows {
+    a.map(|[x, y, z, moved]| {
+        let [mut row, second, third] = *b;
+        for ((own, second), third) in row.iter_mut().zip(second).zip(third) {
+            *own = (x * *own + y * second) + z * third;
+        }
+        row[3] += moved;
+        row
+    })
+}
+
+fn rows(matrix: Affine3A) -> Rows {
+    let [x, y, z, moved] = matrix.to_cols_array_2d();
+    std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]])
+}
+
+/// The matrix of every joint at every sample, `[sample][track]`: three rows of four numbers, for column
+/// vectors, the last column the translation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelMatrices {
+    matrices: Vec<Rows>,
+    tracks: usize,
+    samples: usize,
+}
+
+impl ModelMatrices {
+    /// Number of tracks.
+    #[must_use]
+    pub fn tracks(&self) -> usize {
+        self.tracks
+    }
+
+    /// Samples of each track.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// All matrices, `[sample][track][row][column]`, as a shader of row-major 3 × 4 matrices reads
+    /// them.
+    #[must_use]
+    pub fn as_arrays(&self) -> &[[[f32; 4]; 3]] {
+        &self.matrices
+    }
+
+    /// The matrix of a track at a sample; `None` out of range.
+    #[must_use]
+    pub fn get(&self, track: usize, sample: usize) -> Option<Affine3A> {
+        let [x, y, z] = *self.rows_of(track, sample)?;
+        let column = |i: usize| [x[i], y[i], z[i]];
+        let columns = [column(0), column(1), column(2), column(3)];
+        Some(Affine3A::from_cols_array_2d(&columns))
+    }
+
+    /// Where a track's origin is at a sample; `None` out of range.
+    #[must_use]
+    pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
+        let rows = self.rows_of(track, sample)?;
+        Some(Vec3::from_array(rows.map(|[.., moved]| moved)))
+    }
+
+    fn rows_of(&self, track: usize, sample: usize) -> Option<&Rows> {
+        let inside = track < self.tracks && sample < self.samples;
+        inside.then(|| &self.matrices[sample * self.tracks + track])
+    }
+}

@@ -1,0 +1,73 @@
+//! Why poses cannot be put together as asked.
+
+use crate::output::rotations::Layout;
+
+/// Why poses cannot be put together as asked. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// Nothing to blend.
+    #[error("there is no layer to blend; give at least one")]
+    NoLayer,
+    /// Layers must be of the same tracks and samples, in the same order in memory.
+    #[error(
+        "layer {layer} has {} tracks with {} samples, {:?}, and the first {} with {}, {:?}; evaluate them at the same frames",
+        given.0, given.1, given.2, first.0, first.1, first.2
+    )]
+    Shape {
+        /// The layer's place.
+        layer: usize,
+        /// Its tracks, samples and layout.
+        given: (usize, usize, Layout),
+        /// Those of the first layer.
+        first: (usize, usize, Layout),
+    },
+    /// A weight is NaN or infinite.
+    #[error("the weight of layer {layer} is {weight}; weights are finite numbers")]
+    WeightNotFinite {
+        /// The layer's place.
+        layer: usize,
+        /// Its weight.
+        weight: f32,
+    },
+    /// Slerp goes from 0 to 1.
+    #[error("the weight is {weight}; between two rotations it is 0 to 1")]
+    WeightOutOfRange {
+        /// What was given.
+        weight: f32,
+    },
+    /// An additive layer needs a reference rotation for each track.
+    #[error("{given} reference rotations were given for {tracks} tracks; give one for each")]
+    References {
+        /// Rotations given.
+        given: usize,
+        /// Tracks of the layer.
+        tracks: usize,
+    },
+    /// A skeleton of other tracks.
+    #[error("the skeleton has {given} tracks, the poses have {tracks}; give one that has as many")]
+    Skeleton {
+        /// Tracks of the skeleton.
+        given: usize,
+        /// Tracks of the poses.
+        tracks: usize,
+    },
+    /// It must be known of each track whether it has translations.
+    #[error("`has_translation` has {given} entries for {tracks} tracks; give one for each")]
+    HasTranslation {
+        /// Entries given.
+        given: usize,
+        /// Tracks of the poses.
+        tracks: usize,
+    },
+    /// An inverse bind matrix is needed for each track.
+    #[error(
+        "{given} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
+    )]
+    InverseBind {
+        /// Matrices given.
+        given: usize,
+        /// Tracks of the poses.
+        tracks: usize,
+    },
+}
