@@ -1,14 +1,16 @@
 //! Some tracks of a clip as a clip of their own.
 
+use tumble::TrackError;
+
 use crate::motion::Motion;
 
 impl Motion {
     /// The clip of these tracks, in that order. A joint whose parent is not among them is a root.
     ///
-    /// # Panics
-    /// When one of them passes the number of tracks.
-    #[must_use]
-    pub fn select(&self, tracks: &[usize]) -> Self {
+    /// # Errors
+    /// When there is no such track.
+    pub fn select(&self, tracks: &[usize]) -> Result<Self, TrackError> {
+        let set = self.set.select(tracks.iter().copied())?;
         let mut place = vec![None; self.set.track_count()];
         for (own, &track) in tracks.iter().enumerate() {
             place[track] = Some(own);
@@ -25,14 +27,14 @@ impl Motion {
         let channels = tracks
             .iter()
             .filter_map(|&track| self.channels.get(track).copied());
-        Self {
+        Ok(Self {
             name: self.name.clone(),
-            set: self.set.select(tracks.iter().copied()),
+            set,
             skeleton: skeleton.collect(),
             channels: channels.collect(),
             no_world: self.no_world.clone(),
             ..*self
-        }
+        })
     }
 
     /// These tracks and all that they hang on, in the order of the clip.
@@ -83,7 +85,7 @@ mod tests {
             });
         }
         assert_eq!(clip.with_ancestors(&[0]), [0, 1, 3]);
-        let own = clip.select(&[0, 1, 3]);
+        let own = clip.select(&[0, 1, 3]).unwrap();
         let parents: Vec<_> = own.skeleton.iter().map(|joint| joint.parent).collect();
         assert_eq!(parents, [Some(1), Some(2), None]);
         assert_eq!(own.set.track_name(2), "hip");
@@ -92,7 +94,7 @@ mod tests {
             (moved.times, moved.keys),
             (&[0.5][..], &[Vec3::X * 3.0][..])
         );
-        assert_eq!(clip.select(&[0]).skeleton[0].parent, None);
+        assert_eq!(clip.select(&[0]).unwrap().skeleton[0].parent, None);
         clip.skeleton[3].parent = Some(0);
         assert_eq!(clip.with_ancestors(&[1]), [0, 1, 3]);
     }

@@ -298,7 +298,7 @@ mod tests {
     fn cuts_on_keys_make_none_and_empty_parts_are_refused() {
         let engine = Engine::new(Device::Cpu).unwrap();
         let mut whole = clip(Some(Sampler::Linear));
-        whole.set = whole.set.select([0]);
+        whole.set = whole.set.select([0]).unwrap();
         whole.channels.truncate(1);
         let part = trim(&whole, 2.0, 5.0, &engine).unwrap();
         assert_eq!(part.set.track(0).times, [2.0, 3.0, 4.0, 5.0]);

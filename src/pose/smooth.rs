@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
-use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::shader::{Kernel, PoseDispatch};

@@ -103,7 +103,7 @@ impl ByCost {
         if probe::drivers().is_err() {
             return Ok(self.cpu.clone());
         }
-        let found = Engine::auto(usize::MAX)?;
+        let found = Engine::auto()?;
         let Some(info) = found.device_info() else {
             return Ok(self.cpu.clone());
         };

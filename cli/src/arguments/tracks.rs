@@ -135,7 +135,7 @@ impl Tracks {
         name: &str,
     ) -> Result<Cow<'a, Motion>, Failure> {
         Ok(match self.of(clip, name)? {
-            Some(tracks) => Cow::Owned(clip.select(&tracks)),
+            Some(tracks) => Cow::Owned(selected(clip, &tracks, name)?),
             None => Cow::Borrowed(clip),
         })
     }
@@ -162,7 +162,7 @@ impl Tracks {
                 more.join(", ")
             ));
         }
-        Ok(Cow::Owned(clip.select(&all)))
+        Ok(Cow::Owned(selected(clip, &all, name)?))
     }
 
     /// The boxes of a chain that are asked for and all before them, on which they hang; nothing
@@ -173,6 +173,12 @@ impl Tracks {
             .and_then(|tracks| tracks.last().copied());
         Ok(last.map(|last| (0..=last).collect()))
     }
+}
+
+/// The clip of these tracks.
+pub(crate) fn selected(clip: &Motion, tracks: &[usize], name: &str) -> Result<Motion, Failure> {
+    let selected = clip.select(tracks);
+    selected.map_err(|error| Failure::evaluating(name, &error.into()))
 }
 
 #[cfg(test)]

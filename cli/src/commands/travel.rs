@@ -202,11 +202,8 @@ impl Source {
             set: arguments.read(path)?,
             ..Motion::default()
         };
-        let set = match tracks.of(&paths, &input::name(path))? {
-            Some(wanted) => paths.set.select(wanted)?,
-            None => paths.set,
-        };
-        Ok(Self::Paths(set, Box::new(arguments.clone())))
+        let paths = tracks.select(&paths, &input::name(path))?.into_owned();
+        Ok(Self::Paths(paths.set, Box::new(arguments.clone())))
     }
 
     pub(crate) fn set(&self) -> &TrackSet {
@@ -248,9 +245,7 @@ impl Source {
         let timeline = frames
             .resolve(tracks, set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let times = (0..timeline.len())
-            .map(|frame| timeline.time(0, frame))
-            .collect();
+        let times = timeline.times(0).collect();
         match (self, maker) {
             (Self::Paths(set, arguments), Maker::Frame(frame)) => {
                 let follow = arguments.follow(set, name, frame)?;

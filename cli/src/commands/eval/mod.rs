@@ -305,7 +305,8 @@ impl Job<'_> {
         let groups = methods.groups_of(clip);
         let whole = groups.len() == 1;
         for (method, tracks) in groups {
-            let set = clip.set.select(tracks.iter().copied());
+            let set = (clip.set.select(tracks.iter().copied()))
+                .map_err(|error| Failure::evaluating(name, &error.into()))?;
             let explain =
                 |engine: &Engine| engine.explain_route(&set, with(method), frames, layout);
             let samples = frames.resolve(set.track_count(), clip.set.time_span());

@@ -137,7 +137,9 @@ impl Job<'_> {
                 frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
             numbers = own.collect();
         }
-        let set = &selected.map_or_else(|| set.clone(), |tracks| set.select(tracks));
+        let own = selected.map(|tracks| set.select(tracks)).transpose();
+        let own = own.map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let set = own.as_ref().unwrap_or(set);
         let size = (set.track_count(), timeline.len(), span(&timeline));
         let poses = Poses {
             set,
@@ -225,7 +227,7 @@ impl Job<'_> {
 /// The first and the last time of a result.
 fn span(timeline: &Timeline) -> Option<(f64, f64)> {
     let last = timeline.len().checked_sub(1)?;
-    Some((timeline.time(0, 0), timeline.time(0, last)))
+    Some((timeline.time(0, 0)?, timeline.time(0, last)?))
 }
 
 /// The numbers of the poses of a clip with a skeleton, or with translations or scales.

@@ -16,6 +16,7 @@ use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::Sampling;
+use crate::arguments::tracks::selected;
 use crate::batch::place::{self, Place};
 use crate::batch::room;
 use crate::commands::picture;
@@ -238,7 +239,7 @@ impl Arguments {
             false => tracks.chain(&clip, name)?,
         };
         Ok(Source::Clip(Box::new(match wanted {
-            Some(wanted) => clip.select(&wanted),
+            Some(wanted) => selected(&clip, &wanted, name)?,
             None => clip,
         })))
     }

@@ -18,6 +18,7 @@ use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{Manner, Wanted, WantedSelection, each_once, wanted_methods};
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
+use crate::arguments::tracks::selected;
 use crate::batch::place::Place;
 use crate::commands::travel::{Scenery, Source, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
@@ -100,7 +101,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut refused = 0;
     for path in &inputs {
         if is_path_file(path) {
-            let source = Source::of_paths(path, &arguments.path)?;
+            let source = Source::of_paths(path, &arguments.path, &arguments.inputs.tracks)?;
             shown.push(arguments.sampled(Shown::of_paths(path, source))?);
             continue;
         }
@@ -155,8 +156,10 @@ impl Arguments {
     fn own_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
         let (name, tracks) = (input::name(path), &self.inputs.tracks);
         if clip.skeleton.is_empty() && !clip.has_vectors() {
-            let chain = tracks.chain(&clip, &name)?;
-            return Ok(chain.map_or(clip.clone(), |chain| clip.select(&chain)));
+            return match tracks.chain(&clip, &name)? {
+                Some(chain) => selected(&clip, &chain, &name),
+                None => Ok(clip),
+            };
         }
         Ok(tracks.select_with_ancestors(&clip, &name)?.into_owned())
     }
