@@ -81,7 +81,7 @@ impl Engine {
     /// rule:
     ///
     /// * fewer than 2^20 rotations: the CPU. It has done them before a device is even open.
-    /// * Software devices (drivers such as Mesa's lavapipe and SwiftShader) never: they compute on
+    /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) never: they compute on
     ///   the CPU too, and slower.
     /// * Else every device that is exact, and the CPU, evaluate a probe of 2^19 rotations; what
     ///   counts is the shortest of three times.

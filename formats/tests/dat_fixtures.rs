@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use tumble::TrackSet;
 use tumble_formats::Limits;
 use tumble_formats::ReadOptions;
-use tumble_formats::dat::{open_dat, read_dat, write_dat};
+use tumble_formats::dat::write::write_dat;
+use tumble_formats::dat::{open_dat, read_dat};
 use tumble_formats::times::read_times;
 use tumble_formats::{Code, Diagnostic};
 

@@ -305,7 +305,7 @@ fn every_representation_has_its_columns() {
                 2.0 / 60.0
             );
             let mut wanted = vec![0; encoding.bytes()];
-            encoding.encode(&[all[4].to_array()], &mut wanted);
+            encoding.encode(&[all[4].to_array()], &mut wanted).unwrap();
             let found: Vec<u8> = (3..names.len())
                 .flat_map(|column| {
                     let column = batch.column(column);

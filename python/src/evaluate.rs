@@ -11,7 +11,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
-use crate::errors::{guarded, input};
+use crate::errors::{guarded, input, of_engine};
 use crate::options::{Request, Samples};
 use crate::output::{array, filled};
 use crate::run::{Job, check_signals};
@@ -290,11 +290,11 @@ pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
     }
 }
 
+/// The tracks of one method as a set, and their places in the clip; `None` where these are all.
+type Group = (Method, TrackSet, Option<Vec<usize>>);
+
 /// The sets of a clip by their methods.
-pub(crate) fn sets(
-    clip: &Motion,
-    request: &Request,
-) -> PyResult<Vec<(Method, TrackSet, Option<Vec<usize>>)>> {
+pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<Group>> {
     groups(clip, request.method)
         .into_iter()
         .map(|(method, group)| match group {

@@ -314,6 +314,7 @@ impl Timeline {
 
     /// The times of all samples of a track, seconds; none for a track that has no times of its own
     /// where every track has.
+    #[must_use]
     pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {
         let count = self.time(track, 0).map_or(0, |_| self.count);
         (0..count).map(move |sample| self.time_at(track, sample))

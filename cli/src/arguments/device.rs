@@ -110,8 +110,8 @@ impl ByCost {
         if self.options.memory.is_none() {
             return Ok(found);
         }
-        let all = probe::devices()?.into_iter();
-        let same = all.filter(|device| device.name() == info.name).next();
+        let mut all = probe::devices()?.into_iter();
+        let same = all.find(|device| device.name() == info.name);
         same.map_or(Ok(found.clone()), |device| {
             Engine::with_options(device, &self.options)
         })

@@ -154,12 +154,16 @@ fn between(before: DQuat, after: DQuat) -> DQuat {
 /// Where bodies come from.
 pub(crate) enum Source {
     /// Paths, and how they are followed.
-    Paths(TrackSet, Box<PathArguments>),
+    Paths(Box<TrackSet>, Box<PathArguments>),
     /// Roots that move by themselves.
     Clip(Box<Motion>),
 }
 
 /// What makes one result of a source: a frame for paths, a method for clips.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there are few of them, and they are copied freely"
+)]
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Maker {
     Frame(FrameArgument),
@@ -203,7 +207,10 @@ impl Source {
             ..Motion::default()
         };
         let paths = tracks.select(&paths, &input::name(path))?.into_owned();
-        Ok(Self::Paths(paths.set, Box::new(arguments.clone())))
+        Ok(Self::Paths(
+            Box::new(paths.set),
+            Box::new(arguments.clone()),
+        ))
     }
 
     pub(crate) fn set(&self) -> &TrackSet {

@@ -193,7 +193,7 @@ fn indices_beyond_32_bits() {
                     // As asked for alone.
                     let (track, sample) = (chunk.tracks.start, chunk.samples.start);
                     let time = sample as f64 / f64::from(rate);
-                    let own = set.select(track..track + 1);
+                    let own = set.select(track..track + 1)?;
                     let alone = Frames::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
                     let alone = engine.evaluate(&own, interpolation, &alone.between(time, time))?;
                     let angle = alone.as_quats()[0].angle_between(chunk.rotations().unwrap()[0]);

@@ -24,20 +24,18 @@ impl Arguments {
     /// Refuses, before any work, options that say nothing to whatever kind the results may be of.
     pub(super) fn check_before(&self, format: &Format) -> Result<(), Failure> {
         let mut kinds = Vec::new();
-        if !self.what.is_rotations() {
+        if self.what.is_rotations() {
+            if format.write.is_some() {
+                kinds.push(Kind::Rotations);
+            }
+            if format.write_motion.is_some() {
+                kinds.extend([Kind::Motion, Kind::Baked]);
+            }
+        } else {
             kinds.push(match self.what.poses() {
                 Some(_) => Kind::Poses,
                 None => Kind::Rotations,
             });
-        } else {
-            kinds.extend(format.write.is_some().then_some(Kind::Rotations));
-            let motion = format.write_motion.is_some();
-            kinds.extend(
-                motion
-                    .then_some([Kind::Motion, Kind::Baked])
-                    .into_iter()
-                    .flatten(),
-            );
         }
         let mut refusals = kinds.into_iter().map(|kind| self.refusal(kind, format));
         let first = refusals.next().flatten();

@@ -40,7 +40,7 @@ struct StoredMesh {
 
 impl StoredMesh {
     fn new(mesh: &Mesh) -> Self {
-        let places = mesh.positions().iter().flat_map(|place| place.to_array());
+        let places = mesh.positions().iter().flat_map(DVec3::to_array);
         Self {
             places: words(places.map(|number| (number as f32).to_bits())),
             triangles: words(mesh.triangles().iter().flatten().copied()),
