@@ -82,7 +82,7 @@ fn velocities_are_not_stored_as_rotations() {
                 assert_eq!(encoding.decode(first), Ok(expected));
             }
             (_, Err(Error::EncodesRotations { encoding: refused })) => {
-                assert_eq!(refused, encoding)
+                assert_eq!(refused, encoding);
             }
             (_, other) => panic!("{encoding:?}: {other:?}"),
         }

@@ -291,10 +291,10 @@ pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
 }
 
 /// The tracks of one method as a set, and their places in the clip; `None` where these are all.
-type Group = (Method, TrackSet, Option<Vec<usize>>);
+type OwnSet = (Method, TrackSet, Option<Vec<usize>>);
 
 /// The sets of a clip by their methods.
-pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<Group>> {
+pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<OwnSet>> {
     groups(clip, request.method)
         .into_iter()
         .map(|(method, group)| match group {
