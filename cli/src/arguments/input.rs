@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
-use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded};
+use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::reading::Reading;
@@ -122,13 +122,18 @@ impl Inputs {
         busy(&format!("reading {}", name(path)), || self.read(path))
     }
 
-    /// As [`Inputs::load_quietly`], without a word of how far it is.
-    pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
+    /// How files are read.
+    pub(crate) fn options(&self) -> ReadOptions {
         let limits = Limits {
             file: self.max_size,
             ..Limits::default()
         };
-        let options = self.reading.options(limits, self.pipes);
+        self.reading.options(limits, self.pipes)
+    }
+
+    /// As [`Inputs::load_quietly`], without a word of how far it is.
+    pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
+        let options = self.options();
         let refuse = |diagnostic: Diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",

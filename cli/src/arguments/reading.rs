@@ -98,6 +98,32 @@ fn format() -> impl TypedValueParser<Value = &'static Format> {
 }
 
 impl Reading {
+    /// Whether the command line says anything of how files are read.
+    pub(crate) fn is_given(&self) -> bool {
+        let Self {
+            from,
+            animation,
+            raw_times,
+            duplicates,
+            source_fps,
+            map,
+            time_unit,
+            offsets,
+            scale,
+            up,
+        } = self;
+        *raw_times
+            || from.is_some()
+            || animation.is_some()
+            || duplicates.is_some()
+            || source_fps.is_some()
+            || map.is_some()
+            || time_unit.is_some()
+            || offsets.is_some()
+            || scale.is_some()
+            || up.is_some()
+    }
+
     pub(crate) fn options(&self, limits: Limits, pipes: bool) -> ReadOptions {
         ReadOptions {
             limits,

@@ -89,6 +89,11 @@ impl Selector {
 const NAMED: usize = 12;
 
 impl Tracks {
+    /// Whether some are chosen.
+    pub(crate) fn is_given(&self) -> bool {
+        !self.tracks.is_empty()
+    }
+
     /// The tracks that are asked for, in the order of the clip; nothing where all are.
     pub(crate) fn of(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
         if self.tracks.is_empty() {

@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod check;
+pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod devices;
@@ -31,6 +32,7 @@ pub(crate) enum Command {
     Convert(convert::Arguments),
     Route(Box<route::Arguments>),
     Follow(Box<follow::Arguments>),
+    Compare(Box<compare::Arguments>),
     Verify(verify::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
@@ -55,6 +57,7 @@ impl Command {
             Self::Convert(arguments) => convert::run(&arguments),
             Self::Route(arguments) => route::run(&arguments),
             Self::Follow(arguments) => follow::run(&arguments),
+            Self::Compare(arguments) => compare::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),

@@ -94,6 +94,34 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     })
 }
 
+/// The numbers of an NPY file, whatever they mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Numbers {
+    /// The length of each axis.
+    pub shape: Vec<usize>,
+    /// All of them, the last axis fastest.
+    pub values: Vec<f64>,
+}
+
+/// Reads the numbers of an NPY file.
+///
+/// # Errors
+/// The first fault that refuses it; an array of anything but numbers is one.
+pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<Numbers, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let file = source.name.clone();
+    let archive = Archive::single(&file, source.into_bytes(options.limits.file)?);
+    let array = archive.array(0)?;
+    let values = array.numbers().ok_or_else(|| {
+        let message = format!("holds {}, no numbers", array.header.element);
+        archive.refuse(0, Code::UnknownArrays, message)
+    })?;
+    Ok(Numbers {
+        shape: array.header.shape.clone(),
+        values,
+    })
+}
+
 /// Reads an NPY file.
 ///
 /// # Errors

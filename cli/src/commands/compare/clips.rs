@@ -1,0 +1,321 @@
+//! Two clips, sampled at the same times.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use glam::{DQuat, Quat, Vec3};
+use serde::Serialize;
+use tumble::{Channel, Engine, Frames, Interpolation, Method};
+use tumble_formats::motion::Motion;
+use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::world;
+
+use crate::batch::room;
+use crate::commands::compare::tally::{Spread, Tally};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+/// Spans whose ends are nearer than this are the same: times in f32 of some hours.
+const SAME_TIME: f64 = 1e-3;
+
+/// What two clips come to.
+#[derive(Debug, Serialize)]
+pub(crate) struct Compared {
+    /// What messages call the clips.
+    inputs: [String; 2],
+    /// Tracks that both have.
+    tracks: usize,
+    /// Tracks that one alone has: of the first clip, and of the second.
+    pub(crate) missing: [Vec<String>; 2],
+    samples: usize,
+    /// First and last time, seconds.
+    span: [f64; 2],
+    /// Rotations whose bits are the same.
+    identical: u64,
+    /// Degrees.
+    pub(crate) rotation: Found,
+    /// Lengths, as in the files; nothing where neither clip moves.
+    pub(crate) translation: Option<Found>,
+    /// Lengths of the differences of scales; nothing where neither clip scales.
+    scale: Option<Found>,
+}
+
+/// Differences of one kind.
+#[derive(Debug, Serialize)]
+pub(crate) struct Found {
+    #[serde(flatten)]
+    pub(crate) spread: Spread,
+    /// Where the largest is: the name of the track and the time.
+    track: String,
+    time: f64,
+}
+
+/// The angle between two rotations, radians, whatever their norms are.
+pub(crate) fn angle(a: DQuat, b: DQuat) -> f64 {
+    let step = a.conjugate() * b;
+    let angle = 2.0 * step.xyz().length().atan2(step.w.abs());
+    debug_assert!(angle.is_nan() || (0.0..=TAU / 2.0 + 1e-9).contains(&angle));
+    angle
+}
+
+/// How clips are compared.
+pub(crate) struct Comparison<'a> {
+    pub(crate) engine: &'a Engine,
+    /// Frames from a time to a time; where there are none, every key of both and the middle between
+    /// neighbouring ones are taken.
+    pub(crate) frames: &'a dyn Fn(f64, f64) -> Option<Frames>,
+    /// Joints in the world instead of relative to their parents.
+    pub(crate) in_world: bool,
+}
+
+impl Comparison<'_> {
+    /// Compares two clips.
+    pub(crate) fn compare(&self, clips: [(&str, &Motion); 2]) -> Result<Compared, Failure> {
+        let names = clips.map(|(name, _)| name);
+        let own = clips.map(|(_, clip)| clip);
+        let (pairs, missing) = pairs(own).map_err(|message| {
+            let message = format!("{} and {}: {message}", names[0], names[1]);
+            Failure::new(ALL_INPUTS, message)
+        })?;
+        let frames = self.samples(names, own)?;
+        let sampled = [
+            self.poses(names[0], own[0], &frames)?,
+            self.poses(names[1], own[1], &frames)?,
+        ];
+        let times = &sampled[0].times;
+        let counts = own.map(|clip| clip.set.track_count());
+        // Differences at [sample][pair].
+        let each = || {
+            let samples = 0..times.len();
+            samples.flat_map(|sample| {
+                pairs
+                    .iter()
+                    .map(move |&pair| [0, 1].map(|side| sample * counts[side] + pair[side]))
+            })
+        };
+        let mut turned = Tally::default();
+        let mut identical = 0;
+        for [a, b] in each() {
+            let (a, b) = (sampled[0].rotations[a], sampled[1].rotations[b]);
+            let bits = |q: Quat| q.to_array().map(f32::to_bits);
+            identical += u64::from(bits(a) == bits(b) || bits(a) == bits(-b));
+            turned.add(angle(a.as_dquat(), b.as_dquat()));
+        }
+        let found = |tally: Tally, factor| {
+            let place = tally.place as usize;
+            let pair = pairs.get(place % pairs.len().max(1));
+            Found {
+                spread: tally.times(factor),
+                track: pair.map_or_else(String::new, |pair| own[0].set.track_name(pair[0])),
+                time: times
+                    .get(place / pairs.len().max(1))
+                    .copied()
+                    .unwrap_or(0.0),
+            }
+        };
+        let apart = |values: fn(&Samples) -> &[Vec3], channel| {
+            if sampled.iter().all(|samples| values(samples).is_empty()) {
+                return None;
+            }
+            let value = |side: usize, place: usize| {
+                let rest = || own[side].rest(channel, place % counts[side]);
+                values(&sampled[side])
+                    .get(place)
+                    .copied()
+                    .unwrap_or_else(rest)
+            };
+            let mut tally = Tally::default();
+            for [a, b] in each() {
+                let (a, b) = (value(0, a).as_dvec3(), value(1, b).as_dvec3());
+                tally.add(a.distance(b));
+            }
+            Some(found(tally, 1.0))
+        };
+        Ok(Compared {
+            inputs: names.map(str::to_owned),
+            tracks: pairs.len(),
+            missing,
+            samples: times.len(),
+            span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0)),
+            identical,
+            rotation: found(turned, 1f64.to_degrees()),
+            translation: apart(|samples| &samples.translations, Channel::Translation),
+            scale: apart(|samples| &samples.scales, Channel::Scale),
+        })
+    }
+
+    /// The times to compare at: those that both clips have.
+    fn samples(&self, names: [&str; 2], clips: [&Motion; 2]) -> Result<Frames, Failure> {
+        let spans = clips.map(|clip| clip.set.time_span().unwrap_or((0.0, 0.0)));
+        let start = spans[0].0.max(spans[1].0);
+        let end = spans[0].1.min(spans[1].1);
+        let far = |a: f64, b: f64| (a - b).abs() > SAME_TIME;
+        if far(spans[0].0, spans[1].0) || far(spans[0].1, spans[1].1) {
+            let told = [0, 1].map(|side| {
+                let (first, last) = spans[side];
+                format!("{} from {first} to {last} s", names[side])
+            });
+            if start > end {
+                return Err(Failure::new(
+                    ALL_INPUTS,
+                    format!("no time lies in both: {}, {}", told[0], told[1]),
+                ));
+            }
+            words::warning(&format!(
+                "the keys of both do not lie at the same times: {}, {}; compared from {start} to \
+                 {end} s",
+                told[0], told[1]
+            ));
+        }
+        if let Some(frames) = (self.frames)(start, end) {
+            return Ok(frames);
+        }
+        let mut times: Vec<f64> = clips.iter().flat_map(|clip| key_times(clip)).collect();
+        times.retain(|time| (start..=end).contains(time));
+        times.extend([start, end]);
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let middles: Vec<f64> = (times.windows(2))
+            .map(|pair| f64::midpoint(pair[0], pair[1]))
+            .collect();
+        times.extend(middles);
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        Ok(Frames::at(times))
+    }
+
+    /// All poses of a clip.
+    fn poses(&self, name: &str, clip: &Motion, frames: &Frames) -> Result<Samples, Failure> {
+        room::in_memory(name, &clip.set, frames, 7)?;
+        let with = |method: Method| Interpolation::from(method);
+        let methods = ChannelMethods {
+            method: None,
+            with: &with,
+        };
+        let mut samples = methods
+            .sample(self.engine, clip, frames)
+            .map_err(|error| Failure::evaluating(name, &error))?;
+        if self.in_world {
+            let poses = world(clip, &samples)
+                .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
+            samples.rotations = poses.iter().map(|pose| pose.rotation).collect();
+            samples.translations = poses.iter().map(|pose| pose.position).collect();
+            samples.scales.clear();
+        }
+        Ok(samples)
+    }
+}
+
+/// The times of all keys of a clip.
+fn key_times(clip: &Motion) -> Vec<f64> {
+    let set = &clip.set;
+    let mut times: Vec<f64> = Vec::new();
+    let mut last: Option<&[f64]> = None;
+    for track in 0..set.track_count() {
+        let channels = [Channel::Translation, Channel::Scale];
+        let vectors = channels.map(|channel| set.vector_keys(channel, track));
+        let own = set.get(track).map(|track| track.times);
+        let lists = own.into_iter();
+        for list in lists.chain(vectors.into_iter().flatten().map(|keys| keys.times)) {
+            // Tracks mostly share their times.
+            if last != Some(list) {
+                times.extend_from_slice(list);
+                last = Some(list);
+            }
+        }
+    }
+    times
+}
+
+/// The tracks that belong together, and the names of those that only one clip has: by their names,
+/// where all have one of their own and any agree, else by their places.
+#[expect(
+    clippy::type_complexity,
+    reason = "pairs, and a list of names for each side"
+)]
+fn pairs(clips: [&Motion; 2]) -> Result<(Vec<[usize; 2]>, [Vec<String>; 2]), String> {
+    let names = clips.map(|clip| {
+        let set = &clip.set;
+        let all: Vec<String> = (0..set.track_count())
+            .map(|track| set.track_name(track))
+            .collect();
+        all
+    });
+    let place = |side: usize| -> HashMap<&str, usize> {
+        let all = names[side].iter().enumerate();
+        all.map(|(place, name)| (&**name, place)).collect()
+    };
+    let places = [place(0), place(1)];
+    let distinct = (0..2).all(|side| places[side].len() == names[side].len());
+    let common: Vec<[usize; 2]> = (names[0].iter().enumerate())
+        .filter_map(|(first, name)| Some([first, *places[1].get(&**name)?]))
+        .collect();
+    if distinct && !common.is_empty() {
+        let missing = |side: usize| {
+            let other = &places[1 - side];
+            let lone = names[side]
+                .iter()
+                .filter(|name| !other.contains_key(&***name));
+            lone.cloned().collect()
+        };
+        let missing = [missing(0), missing(1)];
+        return Ok((common, missing));
+    }
+    match names[0].len() == names[1].len() && !names[0].is_empty() {
+        true => {
+            let all = 0..names[0].len();
+            Ok((
+                all.map(|place| [place; 2]).collect(),
+                [Vec::new(), Vec::new()],
+            ))
+        }
+        false => Err(format!(
+            "have {} and {}, none of the same name; --tracks chooses some",
+            words::count(names[0].len(), "track"),
+            words::count(names[1].len(), "track")
+        )),
+    }
+}
+
+impl Compared {
+    /// Lines that say it.
+    pub(crate) fn told(&self) -> String {
+        let mut text = format!(
+            "{} and {}: {} × {} from {} to {} s\n",
+            self.inputs[0],
+            self.inputs[1],
+            words::count(self.tracks, "track"),
+            words::count(self.samples, "sample"),
+            self.span[0],
+            self.span[1]
+        );
+        let mut line = |what: &str, unit: &str, found: &Found| {
+            let Spread { mean, rms, largest } = found.spread;
+            let place = match largest > 0.0 {
+                true => format!(" at {}, {:.4} s", found.track, found.time),
+                false => String::new(),
+            };
+            text += &format!(
+                "  {what:<12} mean {mean:.3e}{unit}, rms {rms:.3e}{unit}, largest \
+                 {largest:.3e}{unit}{place}\n"
+            );
+        };
+        line("rotation", "°", &self.rotation);
+        for (what, found) in [("translation", &self.translation), ("scale", &self.scale)] {
+            if let Some(found) = found {
+                line(what, "", found);
+            }
+        }
+        text += &format!(
+            "  {} of {} rotations are the same, bit for bit\n",
+            self.identical,
+            self.tracks * self.samples
+        );
+        for (side, missing) in self.missing.iter().enumerate() {
+            if !missing.is_empty() {
+                text += &format!("  only in {}: {}\n", self.inputs[side], missing.join(", "));
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,235 @@
+//! `tumble compare`: how far two motions, or two results, are apart.
+
+mod arrays;
+mod clips;
+mod tally;
+
+use std::path::Path;
+
+use clap::Args;
+use serde::Serialize;
+use tumble::{Device, Engine, FrameRate, Frames};
+use tumble_formats::Format;
+
+use crate::arguments::input::{self, Inputs, clip_name};
+use crate::arguments::time::{check_range, finite_seconds};
+use crate::commands::compare::clips::Comparison;
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::words;
+
+/// Compare two motions or two results: the largest and the mean difference, and where it is
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Motions are sampled as their files say (`eval --method authored`), at every key of both and halfway
+between neighbouring keys, or at the frames of --fps; tracks belong together by their names, or by
+their places where the names differ. Two NPY files are compared number by number, and by angles
+where they hold rotations. Exit code 8 where a difference is over --tolerance or --distance, or
+where one of two motions that have one of these lacks a track of the other.
+
+Examples:
+  tumble compare walk.bvh walk.glb
+  tumble compare walk.bvh reduced.glb --world --tolerance 0.1deg --distance 0.5
+  tumble compare one.npy other.npy --tolerance 0
+  tumble compare a.dat b.dat --fps 240 --json")]
+pub(crate) struct Arguments {
+    /// Two keyframe files, or two results of `tumble eval`
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Compare at so many frames per second [default: at the keys, and halfway between them]
+    #[arg(long, value_name = "FPS")]
+    fps: Option<FrameRate>,
+    /// Where to start, seconds [default: the first time that both have]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    start: Option<f64>,
+    /// Where to end, seconds [default: the last time that both have]
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    end: Option<f64>,
+    /// Compare joints in the world instead of relative to their parents
+    #[arg(long)]
+    world: bool,
+    /// The largest angle that passes: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
+    /// no rotations the largest difference of two numbers
+    #[arg(long, value_name = "ANGLE", value_parser = degrees)]
+    tolerance: Option<f64>,
+    /// The largest distance of two translations that passes
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative)]
+    distance: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
+        _ => Err(format!("`{text}` is no finite number from 0")),
+    }
+}
+
+/// An angle in degrees.
+fn degrees(text: &str) -> Result<f64, String> {
+    let (number, factor) = match (text.strip_suffix("deg"), text.strip_suffix("rad")) {
+        (Some(number), _) => (number, 1.0),
+        (None, Some(number)) => (number, 1f64.to_degrees()),
+        (None, None) => (text.strip_suffix('°').unwrap_or(text), 1.0),
+    };
+    Ok(not_negative(number)? * factor)
+}
+
+/// What was found, as JSON has it.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Report {
+    Clips(Vec<clips::Compared>),
+    Array(arrays::Compared),
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let inputs = arguments.inputs.distinct(false)?;
+    let [first, second] = &inputs[..] else {
+        return Err(Failure::usage(format!(
+            "two different inputs are compared, not {}",
+            inputs.len()
+        )));
+    };
+    check_range(arguments.start, arguments.end)?;
+    if (arguments.start, arguments.end) != (None, None) && arguments.fps.is_none() {
+        return Err(Failure::usage("--start and --end are for --fps; add it"));
+    }
+    let paths = [first.as_path(), second.as_path()];
+    let report = match arguments.are_arrays(paths)? {
+        true => Report::Array(arrays::compare(paths, &arguments.inputs.options())?),
+        false => Report::Clips(arguments.clips(paths)?),
+    };
+    match (&report, arguments.json) {
+        (report, true) => words::json(report)?,
+        (Report::Array(found), false) => words::listing(&found.told())?,
+        (Report::Clips(found), false) => {
+            let told: String = found.iter().map(clips::Compared::told).collect();
+            words::listing(&told)?;
+        }
+    }
+    arguments.judge(&report)
+}
+
+impl Arguments {
+    /// Whether both are arrays whose meaning nobody needs to know.
+    fn are_arrays(&self, paths: [&Path; 2]) -> Result<bool, Failure> {
+        let is_array = |path: &Path| Format::detected(path).name == "npy";
+        let own = self.inputs.tracks.is_given() || self.inputs.reading.is_given();
+        let all = paths.iter().all(|path| is_array(path));
+        if !all || own {
+            return Ok(false);
+        }
+        if self.fps.is_some() || self.world || self.distance.is_some() {
+            return Err(Failure::usage(
+                "two arrays are compared number by number, without --fps, --world and --distance; \
+                 say what they mean (--source-fps, --map) to compare them as motions",
+            ));
+        }
+        Ok(true)
+    }
+
+    /// Every clip of one file with its like of the other.
+    fn clips(&self, paths: [&Path; 2]) -> Result<Vec<clips::Compared>, Failure> {
+        let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
+        let counts = [0, 1].map(|side| loaded[side].clips.len());
+        if counts[0] != counts[1] {
+            return Err(Failure::new(
+                ALL_INPUTS,
+                format!(
+                    "{} has {} and {} has {}; choose one of each (--animation)",
+                    input::name(paths[0]),
+                    words::count(counts[0], "animation"),
+                    input::name(paths[1]),
+                    words::count(counts[1], "animation"),
+                ),
+            ));
+        }
+        let engine = Engine::new(Device::Cpu)
+            .map_err(|error| Failure::evaluating(&input::name(paths[0]), &error))?;
+        let frames = |start: f64, end: f64| {
+            let (start, end) = (self.start.unwrap_or(start), self.end.unwrap_or(end));
+            self.fps.map(|rate| Frames::rate(rate).between(start, end))
+        };
+        let comparison = Comparison {
+            engine: &engine,
+            frames: &frames,
+            in_world: self.world,
+        };
+        let mut found = Vec::new();
+        for (place, first) in loaded[0].clips.iter().enumerate() {
+            // Of the same name, else at the same place.
+            let same = |clip: &&tumble_formats::motion::Motion| {
+                first.name.is_some() && clip.name == first.name
+            };
+            let second = loaded[1].clips.iter().find(same);
+            let second = second.unwrap_or(&loaded[1].clips[place]);
+            let names =
+                [(paths[0], first), (paths[1], second)].map(|(path, clip)| match counts[0] {
+                    1 => input::name(path),
+                    _ => format!("{} {}", input::name(path), clip_name(clip)),
+                });
+            let tracks = &self.inputs.tracks;
+            let select = |clip, name: &str| match self.world {
+                true => tracks.select_with_ancestors(clip, name),
+                false => tracks.select(clip, name),
+            };
+            let own = [select(first, &names[0])?, select(second, &names[1])?];
+            found.push(comparison.compare([(&names[0], &own[0]), (&names[1], &own[1])])?);
+        }
+        Ok(found)
+    }
+
+    /// Fails where a difference is over its bound.
+    fn judge(&self, report: &Report) -> Result<(), Failure> {
+        let over = |what: &str, largest: f64, bound: Option<f64>, unit: &str| {
+            let bound = bound.filter(|&bound| largest > bound)?;
+            Some(format!("{what} of {largest:.3e}{unit} over {bound}{unit}"))
+        };
+        let mut faults = Vec::new();
+        match report {
+            Report::Array(found) => faults.extend(match &found.rotation {
+                Some(turn) => over("angle", turn.largest, self.tolerance, "°"),
+                None => over("difference", found.difference.largest, self.tolerance, ""),
+            }),
+            Report::Clips(all) => {
+                for found in all {
+                    let angle = found.rotation.spread.largest;
+                    faults.extend(over("angle", angle, self.tolerance, "°"));
+                    if let Some(moved) = &found.translation {
+                        let way = moved.spread.largest;
+                        faults.extend(over("distance", way, self.distance, ""));
+                    }
+                    let missing: usize = found.missing.iter().map(Vec::len).sum();
+                    if missing > 0 && (self.tolerance.is_some() || self.distance.is_some()) {
+                        faults.push(words::count(missing, "track") + " of one alone (--tracks)");
+                    }
+                }
+            }
+        }
+        match faults.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::new(
+                DIFFERENCE,
+                format!("they differ: {}", faults.join(", ")),
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_have_units() {
+        assert_eq!(degrees("0.1deg"), Ok(0.1));
+        assert_eq!(degrees("0.1"), Ok(0.1));
+        assert_eq!(degrees("0.1°"), Ok(0.1));
+        assert!((degrees("0.5rad").unwrap() - 28.647_889_756_541_16).abs() < 1e-12);
+        for wrong in ["", "deg", "-1", "nan", "inf", "1 grad"] {
+            assert!(degrees(wrong).is_err(), "{wrong}");
+        }
+    }
+}
