@@ -6,6 +6,7 @@ mod accuracy;
 mod bit_identity;
 mod encoding;
 mod external_vectors;
+mod extremes;
 mod follow;
 mod golden;
 mod motion;

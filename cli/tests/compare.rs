@@ -1,0 +1,176 @@
+//! `tumble compare`, by running it.
+
+use serde_json::Value;
+
+use crate::program::{run, sample_folder, succeed};
+
+fn json(place: &std::path::Path, line: &[&str]) -> (i32, Value) {
+    let run = run(place, line);
+    let value = serde_json::from_slice(&run.out);
+    (
+        run.code,
+        value.unwrap_or_else(|error| panic!("{line:?}: {error}: {}", run.words)),
+    )
+}
+
+#[test]
+fn a_motion_and_what_was_made_of_it() {
+    let folder = sample_folder();
+    let place = folder.path();
+    // The same keys, two tracks; the second file has one key turned by 0.2 radians about z.
+    let half = 0.1f64;
+    let turned = format!("{} 0 0 {}", half.cos(), half.sin());
+    let text = std::fs::read_to_string(place.join("a.dat")).unwrap();
+    let lines: Vec<String> = text
+        .lines()
+        .map(|line| match line.strip_prefix("0  ") {
+            // The first key of the first track is no turn at all.
+            Some(rest) => format!("0  {turned}  {}", rest.split("  ").nth(1).unwrap()),
+            None => line.to_owned(),
+        })
+        .collect();
+    std::fs::write(place.join("turned.dat"), lines.join("\n") + "\n").unwrap();
+
+    let same = succeed(place, &["compare", "a.dat", "b.dat", "--tolerance", "0"]);
+    let told = String::from_utf8(same.out).unwrap();
+    assert!(
+        told.contains("2 tracks × 9 samples from 0 to 2 s"),
+        "{told}"
+    );
+    assert!(
+        told.contains("18 of 18 rotations are the same, bit for bit"),
+        "{told}"
+    );
+
+    let (code, found) = json(place, &["compare", "a.dat", "turned.dat", "--json"]);
+    let clip = &found["clips"][0];
+    let degrees = 0.2f64.to_degrees();
+    let largest = clip["rotation"]["largest"].as_f64().unwrap();
+    assert!((largest - degrees).abs() < 1e-4, "{largest} of {degrees}");
+    assert_eq!(
+        (code, &clip["rotation"]["track"]),
+        (0, &Value::from("box1"))
+    );
+    assert_eq!(clip["rotation"]["time"].as_f64(), Some(0.0));
+    let mean = clip["rotation"]["mean"].as_f64().unwrap();
+    assert!(mean > 0.0 && mean < largest / 9.0, "{mean}");
+
+    for (tolerance, code) in [("12deg", 0), ("11deg", 8), ("0.21rad", 0), ("0.19rad", 8)] {
+        let line = ["compare", "a.dat", "turned.dat", "--tolerance", tolerance];
+        let run = run(place, &line);
+        assert_eq!(run.code, code, "{tolerance}: {}", run.words);
+        assert_eq!(
+            run.words.contains("they differ: angle of"),
+            code == 8,
+            "{}",
+            run.words
+        );
+    }
+    let second = [
+        "compare",
+        "a.dat",
+        "turned.dat",
+        "--tracks",
+        "box2",
+        "--tolerance",
+        "0",
+    ];
+    succeed(place, &second);
+    // At other samples the largest is another one: half a frame from the key it is less.
+    let fps = ["--fps", "4", "--start", "0.25", "--json"];
+    let line = [&["compare", "a.dat", "turned.dat"][..], &fps].concat();
+    let (_, found) = json(place, &line);
+    let less = found["clips"][0]["rotation"]["largest"].as_f64().unwrap();
+    assert!(less > 0.0 && less < largest, "{less}");
+}
+
+#[test]
+fn results_number_by_number() {
+    let folder = sample_folder();
+    let place = folder.path();
+    for (name, more) in [
+        ("one.npy", &["-m", "slerp"][..]),
+        ("same.npy", &["-m", "slerp", "--device", "cpu"]),
+        ("half.npy", &["-m", "slerp", "--encoding", "f16"]),
+        ("frames.npy", &["-m", "slerp", "--layout", "frame"]),
+        ("speed.npy", &["-m", "slerp", "--output", "velocity"]),
+        ("speed2.npy", &["-m", "c2", "--output", "velocity"]),
+    ] {
+        succeed(place, &[&["eval", "a.dat", "-o", name][..], more].concat());
+    }
+    succeed(
+        place,
+        &["compare", "one.npy", "same.npy", "--tolerance", "0"],
+    );
+    let (code, found) = json(place, &["compare", "one.npy", "half.npy", "--json"]);
+    let array = &found["array"];
+    let angle = array["rotation"]["largest"].as_f64().unwrap();
+    assert!(code == 0 && angle > 0.0 && angle < 0.2, "{angle}");
+    assert_eq!(array["shape"], serde_json::json!([2, 51, 4]));
+    assert_eq!(array["largest_rotation_at"].as_array().unwrap().len(), 2);
+    let beyond = run(
+        place,
+        &["compare", "one.npy", "half.npy", "--tolerance", "1e-6"],
+    );
+    assert_eq!(beyond.code, 8, "{}", beyond.words);
+    let (code, found) = json(place, &["compare", "speed.npy", "speed2.npy", "--json"]);
+    assert!(code == 0 && found["array"]["rotation"].is_null());
+    assert!(found["array"]["difference"]["largest"].as_f64().unwrap() > 0.1);
+    let shapes = run(place, &["compare", "one.npy", "frames.npy"]);
+    assert_eq!(shapes.code, 4);
+    assert!(
+        shapes.words.contains("has the shape [2, 51, 4] and"),
+        "{}",
+        shapes.words
+    );
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = sample_folder();
+    let place = folder.path();
+    std::fs::write(place.join("late.dat"), "# 1 1\n9 1 0 0 0\n10 1 0 0 0\n").unwrap();
+    std::fs::write(place.join("part.dat"), "# 1 1\n0 1 0 0 0\n1 0 1 0 0\n").unwrap();
+    for (line, code, says) in [
+        (
+            &["compare", "a.dat"][..],
+            2,
+            "two different inputs are compared, not 1",
+        ),
+        (&["compare", "a.dat", "b.dat", "folder/a.dat"], 2, "not 3"),
+        (&["compare", "a.dat", "bad.dat"], 4, "bad.dat:2"),
+        (
+            &["compare", "part.dat", "late.dat"],
+            4,
+            "no time lies in both",
+        ),
+        (
+            &["compare", "a.dat", "b.dat", "--tolerance", "-1"],
+            2,
+            "no finite number from 0",
+        ),
+        (
+            &["compare", "a.dat", "b.dat", "--start", "1"],
+            2,
+            "are for --fps",
+        ),
+        (
+            &["compare", "a.dat", "part.dat", "--tolerance", "360"],
+            8,
+            "1 track of one alone",
+        ),
+    ] {
+        let run = run(place, line);
+        assert_eq!(run.code, code, "{line:?}: {}", run.words);
+        assert!(run.words.contains(says), "{line:?}: {}", run.words);
+    }
+    // Without a bound the tracks and times of both are compared, and the rest is told.
+    let told = succeed(place, &["compare", "a.dat", "part.dat"]);
+    assert!(
+        told.words.contains("compared from 0 to 1 s"),
+        "{}",
+        told.words
+    );
+    let told = String::from_utf8(told.out).unwrap();
+    assert!(told.contains("only in a.dat: box2"), "{told}");
+}

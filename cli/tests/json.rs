@@ -1,0 +1,108 @@
+//! What `--json` prints is JSON of numbers, names and sentences, without any Rust in it.
+
+use serde_json::Value;
+
+use crate::program::{run, sample_folder};
+
+/// Marks of Rust's debug text.
+const MARKS: [&str; 7] = ["Some(", "None", "Ok(", "Err(", "::", " { ", "\\\""];
+
+/// What is wrong with a value, and where.
+fn faults(value: &Value, place: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(members) => {
+            for (name, value) in members {
+                let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+                if !name.chars().all(is_plain) {
+                    found.push(format!("{place}: the name `{name}`"));
+                }
+                faults(value, &format!("{place}.{name}"), found);
+            }
+        }
+        Value::Array(values) => {
+            let each = values.iter().enumerate();
+            each.for_each(|(i, value)| faults(value, &format!("{place}[{i}]"), found));
+        }
+        Value::String(text) => {
+            let words = text.split(|c: char| !c.is_ascii_alphanumeric());
+            // `TrackMajor` is a name in the source; `SwiftShader` is a driver.
+            let is_camel = |word: &str| {
+                let capitals = word.bytes().filter(u8::is_ascii_uppercase).count();
+                let starts = word.starts_with(|c: char| c.is_ascii_uppercase());
+                starts && capitals > 1 && word.bytes().any(|c| c.is_ascii_lowercase())
+            };
+            let names = ["SwiftShader", "LLVM", "LunarG", "PyPI", "NumPy"];
+            let camel = words
+                .clone()
+                .find(|word| is_camel(word) && !names.contains(word));
+            let is_device = place.ends_with("device") || place.contains("device_");
+            let mark = MARKS.iter().copied().find(|mark| text.contains(mark));
+            if let Some(mark) = mark.or(camel.filter(|_| !is_device)) {
+                found.push(format!("{place}: `{mark}` in `{text}`"));
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn every_command_prints_json_without_debug_text() {
+    let folder = sample_folder();
+    let place = folder.path();
+    let lines: &[&[&str]] = &[
+        &["info", "a.dat", "b.dat", "antipodal.dat"],
+        &["methods"],
+        &["devices"],
+        &["verify", "a.dat", "-m", "slerp,c2", "--fps", "5"],
+        &[
+            "verify",
+            "a.dat",
+            "-m",
+            "catmull-rom",
+            "--device",
+            "cpu",
+            "--fps",
+            "5",
+        ],
+        &["eval", "a.dat", "-o", "a.npy"],
+        &["eval", "a.dat", "-o", "e.csv", "--output", "euler"],
+        &["eval", "a.dat", "-o", "w.npy", "--output", "world"],
+        &["eval", "a.dat", "-o", "a.npz"],
+        &["eval", "a.dat", "b.dat", "-o", "both"],
+        &["compare", "a.dat", "b.dat"],
+        &["compare", "a.npy", "a.npy.again"],
+        &["bench", "slerp", "--shrink", "10000", "--device", "cpu"],
+    ];
+    for line in lines {
+        if line.contains(&"a.npy.again") {
+            std::fs::copy(place.join("a.npy"), place.join("a.npy.again")).unwrap();
+        }
+        let run = run(place, &[*line, &["--json"]].concat());
+        assert_eq!(run.code, 0, "{line:?}: {}", run.words);
+        let text = String::from_utf8(run.out).unwrap();
+        let mut found = Vec::new();
+        let values = serde_json::Deserializer::from_str(&text).into_iter::<Value>();
+        let mut count = 0;
+        for value in values {
+            let value = value.unwrap_or_else(|error| panic!("{line:?}: {error}\n{text}"));
+            faults(&value, "", &mut found);
+            count += 1;
+        }
+        assert!(count > 0, "{line:?}: printed nothing");
+        assert!(found.is_empty(), "{line:?}:\n{}", found.join("\n"));
+    }
+}
+
+#[test]
+fn debug_text_is_found() {
+    for wrong in [
+        serde_json::json!({"method": "Some(\"slerp\")"}),
+        serde_json::json!([{"layout": "TrackMajor"}]),
+        serde_json::json!({"ends": "Clamped { start: 0 }"}),
+        serde_json::json!({"someName": 1}),
+    ] {
+        let mut found = Vec::new();
+        faults(&wrong, "", &mut found);
+        assert_eq!(found.len(), 1, "{wrong}");
+    }
+}

@@ -1,0 +1,244 @@
+//! Options are obeyed or refused: every pair of `tumble eval`'s options, on inputs of several formats.
+//!
+//! A program of its own, since it runs the commands in its own process, a thousand times.
+
+use std::collections::HashMap;
+use std::ffi::OsString;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const DONE: u8 = 0;
+const USAGE: u8 = 2;
+
+/// What is added to a command line to give one option, with what it needs to say anything. The values
+/// are such that they change the result.
+const OPTIONS: &[&[&str]] = &[
+    &["--method", "catmull-rom"],
+    &["--method", "kochanek-bartels"],
+    &["--method", "kochanek-bartels", "--tension", "0.5"],
+    &["--method", "kochanek-bartels", "--continuity", "0.5"],
+    &["--method", "kochanek-bartels", "--bias", "0.5"],
+    &["--method", "slerp"],
+    &["--fps", "30"],
+    &["--times", "times.txt"],
+    &["--start", "0.3"],
+    &["--end", "1.3"],
+    &["--ends", "natural"],
+    &["--path", "as-authored"],
+    &["--speed", "constant"],
+    &["--start", "-0.7", "--before", "mirror"],
+    &["--end", "3.1", "--after", "loop"],
+    &["--tension", "0.5"],
+    &["--layout", "frame"],
+    &["--layout", "track"],
+    &["--order", "wxyz"],
+    &["--order", "xyzw"],
+    &["--encoding", "f16"],
+    &["--output", "euler"],
+    &["--output", "euler", "--sequence", "ZYX"],
+    &["--output", "matrix"],
+    &["--output", "matrix", "--major", "column"],
+    &["--output", "velocity"],
+    &["--output", "velocity", "--axes", "parent"],
+    &["--output", "world"],
+    &["--output", "transform"],
+    &["--sequence", "ZYX"],
+    &["--major", "column"],
+    &["--axes", "parent"],
+    &["--parents", "-1,-1"],
+    &["--output", "world", "--parents", "-1,-1"],
+    &["--tracks", "1"],
+    &["--to", "csv"],
+    &["--to", "npz"],
+    &["--to", "bvh"],
+    &["--scale", "2"],
+    &["--up", "y"],
+    &["--linear", "foot"],
+    &["--raw-times"],
+    &["--duplicates", "last"],
+    &["--source-fps", "10"],
+    &["--map", "rotations=keys:wxyz"],
+    &["--time-unit", "ms"],
+    &["--animation", "0"],
+    &["--offsets", "offsets.txt"],
+    &["--from", "dat"],
+];
+
+/// Options that decide over no byte: they say who computes, what may be read and replaced, and what is
+/// told.
+const SILENT: &[&[&str]] = &[
+    &["--overwrite"],
+    &["--pipes"],
+    &["--max-size", "1GiB"],
+    &["--device", "cpu"],
+    &["--explain-route"],
+    &["--json"],
+    &["--files-from", "list.txt"],
+];
+
+/// The bytes of a result by its command line; nothing where it was refused as a usage fault.
+struct Results {
+    place: PathBuf,
+    known: HashMap<Vec<&'static str>, Option<Vec<u8>>>,
+    runs: usize,
+}
+
+impl Results {
+    fn of(&mut self, input: &'static str, options: &[&'static [&'static str]]) -> Option<Vec<u8>> {
+        let mut line = vec![input];
+        line.extend(options.iter().copied().flatten());
+        if let Some(known) = self.known.get(&line) {
+            return known.clone();
+        }
+        let out = self.place.join("out");
+        let _ = std::fs::remove_file(&out);
+        let place = |word: &str| match word.contains('.') && !word.starts_with("--") {
+            true => Some(self.place.join(word)).filter(|path| path.exists()),
+            false => None,
+        };
+        let mut words: Vec<OsString> = vec!["tumble".into(), "eval".into()];
+        for word in &line {
+            words.push(place(word).map_or_else(|| word.into(), PathBuf::into_os_string));
+        }
+        words.extend(["-o".into(), out.clone().into_os_string()]);
+        let code = tumble_cli::host::run(words);
+        self.runs += 1;
+        let result = match code {
+            DONE => Some(std::fs::read(&out).expect("a result")),
+            USAGE => {
+                assert!(!out.exists(), "{line:?}: refused, and a result is there");
+                None
+            }
+            code => panic!("{line:?}: exit code {code}"),
+        };
+        self.known.insert(line, result.clone());
+        result
+    }
+}
+
+/// Two joints that turn and move, and times that BVH rounds.
+fn bvh() -> String {
+    let mut text = String::from(
+        "HIERARCHY\nROOT hip\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation \
+         Xrotation Yrotation\n JOINT knee\n {\n  OFFSET 0 -0.5 0.1\n  CHANNELS 3 Zrotation Xrotation \
+         Yrotation\n  End Site\n  {\n   OFFSET 0 -0.5 0\n  }\n }\n}\nMOTION\nFrames: 19\nFrame Time: \
+         0.133333\n",
+    );
+    for i in 0..19 {
+        let t = f64::from(i);
+        let _ = writeln!(
+            text,
+            "{} 1 {} {} {} 5 {} {} {}",
+            t * 0.1,
+            t * t * 0.01,
+            30.0 * (t * 0.9).sin(),
+            20.0 * (t * 0.5).cos(),
+            -40.0 * (t * 0.7).sin(),
+            t * 3.0,
+            12.0 * (t * 1.3).cos()
+        );
+    }
+    text
+}
+
+/// The same kind of motion, in our own format.
+fn dat() -> String {
+    let mut text = String::from("# 2 1.5\n");
+    for i in 0..10 {
+        let t = f64::from(i);
+        let _ = write!(text, "{}", t * 0.25);
+        for track in 0..2 {
+            let half = 0.9 * (t * (1.1 + f64::from(track))).sin();
+            let _ = write!(
+                text,
+                " {} {} 0 {}",
+                half.cos(),
+                half.sin() * 0.6,
+                half.sin() * 0.8
+            );
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn prepare(place: &Path) {
+    let write = |name: &str, text: &str| std::fs::write(place.join(name), text).unwrap();
+    write("walk.bvh", &bvh());
+    write("keys.dat", &dat());
+    write("times.txt", "0.11\n0.52\n0.97\n1.61\n");
+    write("offsets.txt", "0 0 0\n0 -1 0\n");
+    write("list.txt", "");
+    let run = |line: &[&str]| {
+        let words = line.iter().map(|word| match word.contains('.') {
+            true => place.join(word).into_os_string(),
+            false => word.into(),
+        });
+        assert_eq!(tumble_cli::host::run(words), DONE, "{line:?}");
+    };
+    run(&["tumble", "convert", "walk.bvh", "-o", "walk.glb"]);
+    run(&["tumble", "convert", "walk.bvh", "-o", "walk.npz"]);
+}
+
+#[test]
+fn every_pair_of_options_is_obeyed_or_refused() {
+    let place = tempfile::tempdir().unwrap();
+    prepare(place.path());
+    let mut results = Results {
+        place: place.path().to_owned(),
+        known: HashMap::new(),
+        runs: 0,
+    };
+    let mut ignored = Vec::new();
+    let mut obeyed = HashMap::new();
+    for input in ["walk.bvh", "keys.dat", "walk.glb", "walk.npz"] {
+        let plain = results
+            .of(input, &[])
+            .expect("a plain command line succeeds");
+        for silent in SILENT {
+            let own = results.of(input, &[silent]);
+            assert_eq!(own.as_ref(), Some(&plain), "{input} {silent:?}");
+        }
+        for (place, &first) in OPTIONS.iter().enumerate() {
+            let alone = results.of(input, &[first]);
+            *obeyed.entry(first).or_insert(0) += usize::from(alone.is_some());
+            if alone.as_ref() == Some(&plain) && !is_usual(input, first, &[]) {
+                ignored.push(format!("{input} {first:?}"));
+            }
+            for &second in &OPTIONS[place + 1..] {
+                // One option twice is a fault of its own.
+                if first
+                    .iter()
+                    .any(|word| word.starts_with("--") && second.contains(word))
+                {
+                    continue;
+                }
+                let Some(both) = results.of(input, &[first, second]) else {
+                    continue;
+                };
+                for (own, other) in [(first, second), (second, first)] {
+                    let without = results.of(input, &[other]);
+                    if without.as_ref() == Some(&both) && !is_usual(input, own, other) {
+                        ignored.push(format!("{input} {other:?} {own:?}"));
+                    }
+                }
+            }
+        }
+    }
+    println!("{} command lines", results.runs);
+    assert!(
+        ignored.is_empty(),
+        "ignored silently:\n{}",
+        ignored.join("\n")
+    );
+    for (option, times) in obeyed {
+        println!("{option:?}: obeyed on {times} of 4 inputs");
+    }
+}
+
+/// Whether an option says what would be so without it, beside another: then it is obeyed, and nothing
+/// changes.
+fn is_usual(input: &str, own: &[&str], other: &[&str]) -> bool {
+    let _ = (input, own, other);
+    false
+}

@@ -1,0 +1,514 @@
+//! Nothing that is public panics, whatever it is called with: every call with extreme numbers, lengths
+//! and indices gives a result or an error. The few that may panic say so and have a twin that does
+//! not ([`TrackSet::track`] and [`TrackSet::get`]).
+
+use std::ops::Range;
+
+use glam::{Affine3A, DVec3, Quat, Vec3};
+use proptest::prelude::*;
+use tumble::{
+    Axes, Channel, Direction, Encoding, Ends, Engine, Error, EulerSequence, Follow, Frame,
+    FrameRate, Frames, Interpolation, Layout, METHODS, OutputBuffer, Path, PathSpeed, Quantity,
+    Rotations, Skeleton, Smoothing, SmoothingEnds, SmoothingKernel, Speed, Tcb, TrackSet, Twist,
+    VectorMethod, Vectors, WrapMode,
+};
+
+use crate::support::{Random, vulkan_engines};
+
+const NUMBERS: [f64; 22] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    1e-5,
+    0.999_999_9,
+    1.000_000_1,
+    3.5,
+    -7.25,
+    1e4,
+    86_400.0,
+    1e9,
+    -1e9,
+    1e300,
+    -1e300,
+    f64::MIN_POSITIVE,
+    5e-324,
+    f64::MAX,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+];
+
+const COUNTS: [usize; 9] = [
+    0,
+    1,
+    2,
+    3,
+    5,
+    1 << 40,
+    usize::MAX / 16,
+    usize::MAX - 1,
+    usize::MAX,
+];
+
+/// Values of all kinds, tame ones more often: else nothing is ever evaluated.
+struct Any(Random);
+
+impl Any {
+    fn number(&mut self) -> f64 {
+        match self.0.next() % 3 {
+            0 => self.0.pick(&NUMBERS),
+            _ => self.0.between(-3.0, 3.0),
+        }
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.number(), self.number(), self.number())
+    }
+
+    fn small(&mut self) -> Vec3 {
+        match self.0.next() % 8 {
+            0 => self.vector().as_vec3(),
+            _ => self.0.direction().as_vec3(),
+        }
+    }
+
+    fn count(&mut self) -> usize {
+        self.0.pick(&COUNTS)
+    }
+
+    fn wild(&mut self, one_in: u64) -> bool {
+        self.0.next().is_multiple_of(one_in)
+    }
+
+    fn range(&mut self, below: usize) -> Range<usize> {
+        match self.wild(3) {
+            true => self.count()..self.count(),
+            false => 0..self.0.next() as usize % (below + 1),
+        }
+    }
+
+    fn times(&mut self, most: u64) -> Vec<f64> {
+        let count = self.0.next() % (most + 1);
+        let mut times: Vec<f64> = (0..count).map(|_| self.0.between(-2.0, 2.0)).collect();
+        if self.wild(4) {
+            times.iter_mut().for_each(|time| *time = self.number());
+        }
+        if !self.wild(8) {
+            times.sort_by(f64::total_cmp);
+        }
+        if !self.wild(8) {
+            times.dedup();
+        }
+        times
+    }
+
+    fn quat(&mut self) -> Quat {
+        match self.0.next() % 24 {
+            0 => Quat::from_array(std::array::from_fn(|_| self.number() as f32)),
+            1 => Quat::from_array([0.0; 4]),
+            2 => self.0.rotation().as_quat() * (1.0 + self.number() as f32 * 0.05),
+            _ => self.0.rotation().as_quat(),
+        }
+    }
+
+    fn set(&mut self) -> TrackSet {
+        let mut set = TrackSet::new();
+        for _ in 0..self.0.next() % 4 {
+            let times = self.times(6);
+            let more = usize::from(self.wild(16));
+            let keys: Vec<Quat> = (0..times.len() + more).map(|_| self.quat()).collect();
+            let _ = set.push("", &times, &keys);
+        }
+        for _ in 0..self.0.next() % 5 {
+            let track = self.index(&set);
+            let keys = set.get(track).map_or(1, |track| track.keys.len());
+            let keys = keys + usize::from(self.wild(16));
+            let times = set
+                .get(track)
+                .map_or(Vec::new(), |track| track.times.to_vec());
+            let times = if self.wild(2) { self.times(6) } else { times };
+            let points: Vec<Vec3> = times.iter().map(|_| self.small()).collect();
+            let _ = match self.0.next() % 6 {
+                0 => {
+                    let all: Vec<DVec3> = (0..keys).map(|_| self.vector()).collect();
+                    set.set_velocities(track, &all)
+                }
+                1 => {
+                    let all: Vec<_> = (0..keys).map(|_| [self.quat(), self.quat()]).collect();
+                    set.set_tangents(track, &all)
+                }
+                2 => {
+                    let all: Vec<Tcb> = (0..keys).map(|_| self.tcb()).collect();
+                    set.set_tcb(track, &all)
+                }
+                3 => {
+                    let tangents: Vec<_> = points.iter().map(|&point| [point, -point]).collect();
+                    let some = if self.wild(2) { &tangents[..] } else { &[] };
+                    set.set_translations(track, &times, &points, some)
+                }
+                4 => set.set_scales(track, &times, &points, &[]),
+                _ => {
+                    let ups: Vec<Option<Vec3>> =
+                        points.iter().map(|_| Some(self.small())).collect();
+                    set.push_path("way", &times, &points, &ups).map(drop)
+                }
+            };
+        }
+        set
+    }
+
+    fn index(&mut self, set: &TrackSet) -> usize {
+        match self.wild(6) {
+            true => self.count(),
+            false => self.0.next() as usize % set.track_count().max(1),
+        }
+    }
+
+    fn tcb(&mut self) -> Tcb {
+        Tcb {
+            tension: self.number(),
+            continuity: self.number(),
+            bias: self.number(),
+        }
+    }
+
+    fn ends(&mut self) -> Ends {
+        let clamped = Ends::Clamped {
+            start: self.vector(),
+            end: self.vector(),
+        };
+        let plain = [
+            Ends::Parabolic,
+            Ends::Natural,
+            Ends::Secant,
+            Ends::Loop,
+            Ends::Frozen,
+        ];
+        match self.wild(4) {
+            true => clamped,
+            false => self.0.pick(&plain),
+        }
+    }
+
+    fn interpolation(&mut self) -> Interpolation {
+        let method = METHODS[self.0.next() as usize % METHODS.len()];
+        let mut interpolation = Interpolation::from(method);
+        if self.wild(2) {
+            let wraps = [
+                WrapMode::Hold,
+                WrapMode::Loop,
+                WrapMode::Mirror,
+                WrapMode::Extrapolate,
+            ];
+            interpolation.path = self.0.pick(&[Path::Shortest, Path::AsAuthored]);
+            interpolation.ends = self.ends();
+            interpolation.tcb = self.tcb();
+            interpolation.speed = self.0.pick(&[Speed::AsKeyed, Speed::Constant]);
+            interpolation.before = self.0.pick(&wraps);
+            interpolation.after = self.0.pick(&wraps);
+            let axes = self.0.pick(&[Axes::Body, Axes::Parent]);
+            interpolation.quantity = self.0.pick(&[
+                Quantity::Rotation,
+                Quantity::Rotation,
+                Quantity::Velocity(axes),
+                Quantity::Acceleration(axes),
+            ]);
+        }
+        interpolation
+    }
+
+    fn frames(&mut self) -> Frames {
+        let few = Frames::fps(self.0.pick(&[1, 2, 7]));
+        match self.0.next() % 8 {
+            0 => Frames::fps(self.0.pick(&[0, 60, 4_000_000_000, u32::MAX])),
+            1 => Frames::at(self.times(8)),
+            2 => Frames::at_each(self.times(8)),
+            3 => few.between(self.number(), self.number()),
+            4 => few.spanning((self.number(), self.number())),
+            5 => Frames::at(self.times(3)).between(self.number(), self.number()),
+            6 => {
+                let parts = [0, 1, 2, 1001, u64::MAX - 1, u64::MAX];
+                let rate = FrameRate::new(self.0.pick(&parts), self.0.pick(&parts));
+                rate.map_or(few, Frames::rate)
+            }
+            _ => few,
+        }
+    }
+
+    fn layout(&mut self) -> Layout {
+        self.0.pick(&[Layout::TrackMajor, Layout::FrameMajor])
+    }
+
+    fn rotations(&mut self) -> Rotations {
+        let count = self.0.next() as usize % 13;
+        let all: Vec<Quat> = (0..count).map(|_| self.quat()).collect();
+        let tracks = if self.wild(4) {
+            self.count()
+        } else {
+            self.0.pick(&[1, 2, 3])
+        };
+        let layout = self.layout();
+        let whole = &all[..count - count.checked_rem(tracks).unwrap_or(0)];
+        Rotations::of(if self.wild(4) { &all } else { whole }, tracks, layout)
+            .unwrap_or_else(|_| Rotations::of(&[Quat::IDENTITY; 6], 2, layout).unwrap())
+    }
+
+    fn skeleton(&mut self) -> Skeleton {
+        let joints = self.0.next() as usize % 5;
+        let parent = |any: &mut Self, joint: usize| match any.0.next() % 8 {
+            0 => Some(any.count()),
+            1 => Some(joint),
+            2 => None,
+            _ => joint.checked_sub(1),
+        };
+        let parents = (0..joints).map(|joint| parent(self, joint)).collect();
+        let offsets = (0..joints + usize::from(self.wild(12)))
+            .map(|_| self.small())
+            .collect();
+        Skeleton::new(parents, offsets).unwrap_or_else(|_| Skeleton::chain(2, 1.0).unwrap())
+    }
+
+    fn follow(&mut self, set: &TrackSet) -> Follow {
+        let axes = ["x", "-x", "y", "-y", "z", "-z", "+z"];
+        Follow {
+            method: self.0.pick(&VectorMethod::ALL),
+            ends: self.ends(),
+            direction: match self.0.next() % 4 {
+                0 => Direction::Ahead(self.number()),
+                1 => Direction::Point(self.vector()),
+                2 => Direction::Track(self.index(set)),
+                _ => Direction::Tangent,
+            },
+            frame: self.0.pick(&[Frame::Minimal, Frame::Fixed, Frame::Frenet]),
+            up: self.vector(),
+            twist: self.0.pick(&[Twist::Spread, Twist::Free]),
+            speed: match self.0.next() % 3 {
+                0 => PathSpeed::Eased {
+                    start: self.number(),
+                    end: self.number(),
+                },
+                1 => PathSpeed::Constant,
+                _ => PathSpeed::Keys,
+            },
+            axes: [0, 1].map(|_| self.0.pick(&axes).parse().unwrap()),
+        }
+    }
+
+    fn smoothing(&mut self) -> Smoothing {
+        let kernel = match self.0.next() % 7 {
+            0 => SmoothingKernel::Linear,
+            1 => SmoothingKernel::Cubic,
+            2 => SmoothingKernel::Box(self.number()),
+            3 => SmoothingKernel::Tent(self.number()),
+            4 => SmoothingKernel::Gaussian(self.number()),
+            _ => SmoothingKernel::SavitzkyGolay {
+                radius: self.count(),
+                order: self.count(),
+            },
+        };
+        let mut smoothing = Smoothing::new(kernel);
+        smoothing.passes = self.0.pick(&[0, 1, 2, 3]);
+        smoothing.ends = self.0.pick(&[
+            SmoothingEnds::Keep,
+            SmoothingEnds::Parabolic,
+            SmoothingEnds::Loop,
+        ]);
+        smoothing
+    }
+}
+
+/// What a set tells about itself.
+fn ask(any: &mut Any, set: &TrackSet) {
+    let index = any.count();
+    let _ = (
+        set.get(index).is_some(),
+        set.track_name(index),
+        set.time_span(),
+    );
+    for channel in [Channel::Translation, Channel::Scale] {
+        let _ = set.vector_keys(channel, index).is_some();
+    }
+    let list: Vec<usize> = (0..any.0.next() % 3).map(|_| any.index(set)).collect();
+    let selected = set.select(list.iter().copied());
+    assert_eq!(
+        selected.is_ok(),
+        list.iter().all(|&track| track < set.track_count())
+    );
+    let shared: Vec<Quat> = (0..any.0.next() % 7).map(|_| any.quat()).collect();
+    let times = any.times(3);
+    let _ = TrackSet::with_shared_times(&times, &shared).is_ok();
+    let _ = TrackSet::from_shared_times(times, shared).is_ok();
+}
+
+/// Evaluates a set in every way that there is.
+fn evaluate(any: &mut Any, engine: &Engine, set: &TrackSet) {
+    let (interpolation, frames) = (any.interpolation(), any.frames());
+    let layout = any.layout();
+    let (tracks, few) = (set.track_count(), 1 << 12);
+    let resolved = frames.resolve(tracks, set.time_span());
+    let count = resolved
+        .as_ref()
+        .map_or(0, |timeline| tracks.saturating_mul(timeline.len()));
+    if let Ok(timeline) = &resolved {
+        let _ = timeline.time(any.count(), any.count());
+        let _ = timeline.times(any.count()).len();
+    }
+    let _ = frames
+        .resolve(any.count(), Some((any.number(), any.number())))
+        .is_ok();
+    let _ = engine
+        .explain_route(set, interpolation, &frames, layout)
+        .is_ok();
+    // What is large and still fits is evaluated elsewhere, in time; what does not fit is refused here.
+    if (few..1 << 32).contains(&count) {
+        return;
+    }
+    if let Ok(result) = engine.evaluate_as(set, interpolation, &frames, layout) {
+        assert_eq!(result.as_quats().len(), count);
+        assert_eq!(result.get(any.count(), any.count()), None);
+    } else {
+        let _ = engine.evaluate(set, interpolation, &frames).is_err();
+    }
+    let _ = engine.rates(set, interpolation, &frames, layout).is_ok();
+    let room = if any.wild(4) {
+        any.0.next() as usize % 9
+    } else {
+        count.min(few)
+    };
+    let mut output = OutputBuffer::new(room).unwrap();
+    let _ = engine
+        .evaluate_into(set, interpolation, &frames, layout, &mut output[..])
+        .is_ok();
+    let kinds = Encoding::KINDS;
+    let encoding = kinds[any.0.next() as usize % kinds.len()];
+    let mut bytes = vec![0; room.saturating_mul(encoding.bytes())];
+    let range = any.range(tracks);
+    let _ = engine
+        .evaluate_tracks_into(set, interpolation, &frames, range, encoding, &mut bytes)
+        .is_ok();
+    let method = any.0.pick(&VectorMethod::ALL);
+    let transforms = engine.transforms(set, interpolation, method, &frames, layout);
+    if let Ok(transforms) = &transforms {
+        let skeleton = any.skeleton();
+        let bind = [Affine3A::IDENTITY; 3];
+        let bind = [None, Some(&bind[..]), Some(&bind[..1])];
+        let bind = any.0.pick(&bind);
+        if let Ok(model) = engine.local_to_model(transforms, &skeleton, bind) {
+            let _ = (model.get(any.count(), 0), model.position(0, any.count()));
+        }
+    }
+    let follow = any.follow(set);
+    let _ = engine.follow(set, &follow, &frames, layout).is_ok();
+    let chunk = any.count();
+    if count < few {
+        let streamed: Result<(), Error> =
+            engine.stream(set, interpolation, &frames, layout, chunk, |chunk| {
+                let _ = (chunk.rotations().is_some(), chunk.rates().is_some());
+                Ok(())
+            });
+        let _ = streamed.is_ok();
+    }
+    let Ok(clip) = engine.upload(set, interpolation) else {
+        return;
+    };
+    let _ = clip.timeline(&frames).is_ok();
+    let _ = clip.evaluate_as(&frames, layout).is_ok();
+    let _ = clip.rates(&frames, layout).is_ok();
+    let _ = clip.evaluate_into(&frames, layout, &mut output[..]).is_ok();
+    let _ = clip.evaluate_encoded(&frames, layout, encoding).is_ok();
+    let _ = clip
+        .evaluate_encoded_into(&frames, layout, encoding, &mut bytes)
+        .is_ok();
+    let part = (any.range(tracks), any.range(3));
+    let _ = clip
+        .evaluate_part_into(&frames, layout, part, encoding, &mut bytes)
+        .is_ok();
+}
+
+/// Whole poses and smoothing.
+fn combine(any: &mut Any, engine: &Engine) {
+    let (a, b) = (any.rotations(), any.rotations());
+    let weights = [any.number() as f32, any.number() as f32];
+    let _ = engine.mix(&a, &b, weights[0]).is_ok();
+    let _ = engine.blend(&[(&a, weights[0]), (&b, weights[1])]).is_ok();
+    let _ = engine.blend(&[]).is_ok();
+    let reference: Vec<Quat> = (0..any.0.next() % 4).map(|_| any.quat()).collect();
+    let _ = engine.add(&a, &b, &reference, weights[1]).is_ok();
+    let skeleton = any.skeleton();
+    if let Ok(world) = engine.world(&a, &skeleton) {
+        let _ = (
+            world.position(any.count(), 0),
+            world.rotation(0, any.count()),
+        );
+    }
+    let smoothing = any.smoothing();
+    let _ = smoothing.check().is_ok();
+    let _ = engine.smooth(&a, &smoothing).is_ok();
+    let points: Vec<Vec3> = (0..6).map(|_| any.small()).collect();
+    if let Ok(vectors) = Vectors::of(&points, any.0.pick(&[1, 2, 3, 4]), any.layout()) {
+        let _ = engine.smooth_vectors(&vectors, &smoothing).is_ok();
+        let _ = vectors.get(any.count(), any.count()).is_none();
+    }
+}
+
+/// What takes numbers alone.
+fn small_things(any: &mut Any) {
+    let layout = any.layout();
+    let _ = layout.index(any.count(), any.count(), any.count(), any.count());
+    for kind in Encoding::KINDS {
+        let rows: Vec<[f32; 4]> = (0..3).map(|_| any.quat().to_array()).collect();
+        let mut bytes = vec![0; kind.bytes() * 3 + usize::from(any.wild(3))];
+        let _ = kind.encode(&rows, &mut bytes).is_ok();
+        let _ = kind.decode(&bytes[..kind.bytes().min(bytes.len())]).is_ok();
+        let _ = kind.decode(&[]).is_err();
+    }
+    let count = any.count();
+    if count > 1 << 32 {
+        assert!(OutputBuffer::new(count).is_err());
+        assert!(Skeleton::chain(count, any.number()).is_err());
+    }
+    let text = any.0.pick(&[
+        "", "xyz", "XYX", "xxx", "\u{fc}yz", "abcdefgh", "-9e999/0", "1/0", "30/1",
+    ]);
+    let _ = (
+        text.parse::<EulerSequence>().is_ok(),
+        text.parse::<FrameRate>().is_ok(),
+    );
+    let rate = FrameRate::new(any.0.pick(&[1, u64::MAX]), any.0.pick(&[1, u64::MAX])).unwrap();
+    let _ = (rate.time_of(u64::MAX), rate.per_second());
+    let _ = tumble::Method::named(text).is_none();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 3000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn nothing_panics_on_the_cpu(seed in any::<u64>()) {
+        let mut any = Any(Random(seed));
+        let engine = Engine::new(tumble::Device::Cpu).unwrap();
+        let set = any.set();
+        ask(&mut any, &set);
+        evaluate(&mut any, &engine, &set);
+        combine(&mut any, &engine);
+        small_things(&mut any);
+    }
+}
+
+/// The same on every Vulkan device, fewer times.
+#[test]
+fn nothing_panics_on_any_device() {
+    for engine in vulkan_engines(|_| {}) {
+        for seed in 0..60 {
+            let mut any = Any(Random(seed));
+            let set = any.set();
+            evaluate(&mut any, &engine, &set);
+            combine(&mut any, &engine);
+        }
+    }
+}
