@@ -35,6 +35,31 @@
 //! the textbook in f64, which shares nothing with the engine; [`verify`] compares the
 //! three.
 //!
+//! # Where to go on
+//!
+//! * **Results larger than memory**: [`Engine::stream`] and [`Clip::stream`] give a chunk at a time
+//!   while the next one is evaluated; [`Clip::evaluate_part_into`] evaluates some samples of some
+//!   tracks into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
+//! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
+//!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
+//!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.
+//!   [`Engine::blend`], [`Engine::mix`] and [`Engine::add`] put layers of poses together.
+//! * **Crowds**: keep a [`Clip`] of each animation. Many characters at their own times in one clip are
+//!   one call with [`Frames::at`], a sample for each character, in [`Layout::FrameMajor`]; give the times
+//!   in increasing order: the keys around them are then found in one pass.
+//! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue, and
+//!   [`Clip::evaluate_to_buffer`] leaves the poses in the renderer's buffer. `examples/own_device.rs`
+//!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
+//! * **Bodies that travel**: [`Engine::follow`] moves them along paths, [`Engine::smooth`] takes the
+//!   noise from samples.
+//! * **Smaller results**: an [`Encoding`] stores rotations in 16 bits, as matrices or as angles, made on
+//!   the device. [`Engine::rates`] gives angular velocities and accelerations.
+//! * **How right is it here**: [`verify::verify`] compares a device with the CPU, bit for bit, and both
+//!   with [`mod@reference`].
+//!
+//! [`glam`] and [`ash`] are re-exported in the versions that the interface uses; functions that take
+//! [`glam::Quat`] take `[f32; 4]`, `x y z w`, too.
+//!
 //! # What is promised
 //!
 //! * **Identical bits** from the CPU, at any vector width and number of threads, and
@@ -62,7 +87,6 @@ mod output;
 mod own_device;
 mod path;
 mod pose;
-mod pose_error;
 mod prepare;
 pub mod reference;
 mod shader;
@@ -92,6 +116,7 @@ pub use crate::output::buffer::OutputBuffer;
 pub use crate::output::component_type::ComponentType;
 pub use crate::output::encoding::{Encoding, EncodingLength, EncodingOptions, MatrixOrder};
 pub use crate::output::euler::{EulerSequence, UnknownSequence};
+pub use crate::output::pose_error::{PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
 pub use crate::output::row::Row;
 pub use crate::path::options::{
@@ -100,9 +125,8 @@ pub use crate::path::options::{
 pub use crate::pose::follow::Followed;
 pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
-pub use crate::pose::skeleton::{Skeleton, SkeletonError};
+pub use crate::pose::skeleton::Skeleton;
 pub use crate::pose::transforms::Transforms;
-pub use crate::pose_error::PoseError;
 pub use crate::shader::{Form, kernels};
 pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};

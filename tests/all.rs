@@ -5,6 +5,7 @@
 mod accuracy;
 mod bit_identity;
 mod encoding;
+mod examples;
 mod external_vectors;
 mod extremes;
 mod follow;

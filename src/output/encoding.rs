@@ -1,6 +1,8 @@
 //! The representations in which rotations are stored: one table, which says of each what it is
 //! called, what it looks like in memory, and how it is made and read on the CPU.
 
+use std::fmt;
+
 use glam::{Mat3, Quat, Vec3};
 
 use crate::output::component_type::ComponentType;
@@ -109,6 +111,17 @@ macro_rules! representations {
         #[non_exhaustive]
         pub enum Encoding {
             $($(#[$attribute])* $variant $(($type))?,)*
+        }
+
+        /// Its name and its option: `matrix column by column`.
+        impl fmt::Display for Encoding {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())?;
+                match self {
+                    $(Self::$variant $(($option))? => { $(write!(f, " {}", $option)?;)? })*
+                }
+                Ok(())
+            }
         }
 
         impl Encoding {
@@ -282,6 +295,15 @@ pub enum MatrixOrder {
     RowMajor = 0,
     /// Column by column.
     ColumnMajor = 1,
+}
+
+impl fmt::Display for MatrixOrder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::RowMajor => "row by row",
+            Self::ColumnMajor => "column by column",
+        })
+    }
 }
 
 impl Encoding {

@@ -5,6 +5,7 @@ pub(crate) mod buffer;
 pub(crate) mod component_type;
 pub(crate) mod encoding;
 pub(crate) mod euler;
+pub(crate) mod pose_error;
 pub(crate) mod rotations;
 pub(crate) mod row;
 pub(crate) mod window;

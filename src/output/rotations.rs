@@ -19,6 +19,15 @@ pub enum Layout {
     FrameMajor,
 }
 
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TrackMajor => "track by track",
+            Self::FrameMajor => "frame by frame",
+        })
+    }
+}
+
 impl Layout {
     /// The layout for this number of samples. With a single sample both orders are the same, and
     /// track-major stands for either.

@@ -10,9 +10,9 @@ use crate::evaluate::backend::Backend;
 use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
+use crate::output::pose_error::PoseError;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
-use crate::pose_error::PoseError;
 use crate::shader::{Link, ROOT};
 use crate::twin::matrix;
 

@@ -10,9 +10,9 @@ use crate::evaluate::backend::Backend;
 use crate::gpu::engine::VulkanEngine;
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
+use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
-use crate::pose_error::PoseError;
 use crate::shader::{Kernel, PoseDispatch};
 
 impl Engine {

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use crate::math::canonical::canonical;
-use crate::memory::{OutOfMemory, reserved};
+use crate::memory::reserved;
+use crate::output::pose_error::{MOST_TRACKS, SkeletonError};
 use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
@@ -14,56 +15,6 @@ pub struct Skeleton {
     /// Parents before their children.
     order: Vec<usize>,
 }
-
-/// Why parents make no skeleton. Places count from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SkeletonError {
-    /// The numbers of parents and offsets differ.
-    #[error("there are {parents} parents but {offsets} offsets; give one of each for a track")]
-    Lengths {
-        /// Parents given.
-        parents: usize,
-        /// Offsets given.
-        offsets: usize,
-    },
-    /// A parent that does not exist.
-    #[error("track {track} hangs from track {parent}, of {tracks}")]
-    NoSuchParent {
-        /// The track.
-        track: usize,
-        /// Its parent.
-        parent: usize,
-        /// How many there are.
-        tracks: usize,
-    },
-    /// A track that is its own ancestor.
-    #[error("track {track} hangs from itself")]
-    Cycle {
-        /// One track of the circle.
-        track: usize,
-    },
-    /// An offset is NaN or infinite.
-    #[error("track {track} hangs at {offset}, which is not finite")]
-    OffsetNotFinite {
-        /// The track.
-        track: usize,
-        /// Its offset.
-        offset: Vec3,
-    },
-    /// Tracks are counted in 32 bits on a device.
-    #[error("a skeleton of {tracks} tracks; there can be {} at most", MOST_TRACKS)]
-    TooMany {
-        /// Tracks given.
-        tracks: usize,
-    },
-    /// There is not the memory.
-    #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
-}
-
-/// The most tracks of a skeleton.
-const MOST_TRACKS: usize = ROOT as usize;
 
 impl Skeleton {
     /// A skeleton of these parents (`None` for a root) and offsets, in any unit of length. An

@@ -107,7 +107,7 @@ pub(crate) fn verify(
             worse(angle_between(decoded, rotation))
         };
         outputs.push(OutputVerification {
-            output: format!("{encoding:?}"),
+            output: encoding.to_string(),
             values: rotations.len() as u64,
             differing: pairs.filter(|(found, expected)| found != expected).count() as u64,
             max_error: (found.chunks(bytes).zip(rotations))

@@ -223,7 +223,7 @@ mod tests {
             ("*Foot", "it has 6 tracks, hips, LeftArm"),
             ("3..1", "before it starts at 3"),
             ("hips,", "give a name"),
-            ("[", "wildcard"),
+            ("[", "range pattern"),
         ] {
             let refused = chosen(list).unwrap_err();
             assert!(refused.contains(says), "{list}: {refused}");

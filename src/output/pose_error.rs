@@ -1,5 +1,8 @@
-//! Why poses cannot be put together as asked.
+//! Why poses cannot be put together as asked, and why parents make no skeleton.
 
+use glam::Vec3;
+
+use crate::memory::OutOfMemory;
 use crate::output::rotations::Layout;
 
 /// Why poses cannot be put together as asked. Places count from 0.
@@ -11,7 +14,7 @@ pub enum PoseError {
     NoLayer,
     /// Layers must be of the same tracks and samples, in the same order in memory.
     #[error(
-        "layer {layer} has {} tracks with {} samples, {:?}, and the first {} with {}, {:?}; evaluate them at the same frames",
+        "layer {layer} has {} tracks with {} samples, {}, and the first {} with {}, {}; evaluate them at the same frames",
         given.0, given.1, given.2, first.0, first.1, first.2
     )]
     Shape {
@@ -70,4 +73,54 @@ pub enum PoseError {
         /// Tracks of the poses.
         tracks: usize,
     },
+}
+
+/// The most tracks of a skeleton.
+pub(crate) const MOST_TRACKS: usize = u32::MAX as usize;
+
+/// Why parents make no skeleton. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SkeletonError {
+    /// The numbers of parents and offsets differ.
+    #[error("there are {parents} parents but {offsets} offsets; give one of each for a track")]
+    Lengths {
+        /// Parents given.
+        parents: usize,
+        /// Offsets given.
+        offsets: usize,
+    },
+    /// A parent that does not exist.
+    #[error("track {track} hangs from track {parent}, of {tracks}")]
+    NoSuchParent {
+        /// The track.
+        track: usize,
+        /// Its parent.
+        parent: usize,
+        /// How many there are.
+        tracks: usize,
+    },
+    /// A track that is its own ancestor.
+    #[error("track {track} hangs from itself")]
+    Cycle {
+        /// One track of the circle.
+        track: usize,
+    },
+    /// An offset is NaN or infinite.
+    #[error("track {track} hangs at {offset}, which is not finite")]
+    OffsetNotFinite {
+        /// The track.
+        track: usize,
+        /// Its offset.
+        offset: Vec3,
+    },
+    /// Tracks are counted in 32 bits on a device.
+    #[error("a skeleton of {tracks} tracks; there can be {} at most", MOST_TRACKS)]
+    TooMany {
+        /// Tracks given.
+        tracks: usize,
+    },
+    /// There is not the memory.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
 }

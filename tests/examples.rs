@@ -1,0 +1,40 @@
+//! The programs in `examples/`, run.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use crate::support::vulkan_devices;
+
+/// A program that was built beside this one.
+fn program(name: &str) -> PathBuf {
+    let tests = std::env::current_exe().unwrap();
+    let place = tests.parent().unwrap().parent().unwrap().join("examples");
+    place.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+}
+
+#[test]
+fn every_example_runs_and_says_what_it_found() {
+    let has_vulkan = !vulkan_devices().is_empty();
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        let (arguments, says): (&[&str], &str) = match name {
+            "into_memory" => (&["8", "3", "5"], "0."),
+            "own_device" if !has_vulkan => continue, // in CI its absence has failed already
+            "own_device" => (&[], "7200 rotations on"),
+            "same_bits" => (&[], ""),
+            _ => panic!("{name}: say here what it prints"),
+        };
+        let run = Command::new(program(name))
+            .args(arguments)
+            .output()
+            .unwrap();
+        let (out, words) = (
+            String::from_utf8_lossy(&run.stdout),
+            String::from_utf8_lossy(&run.stderr),
+        );
+        assert!(run.status.success(), "{name}: {out}{words}");
+        assert!(out.contains(says), "{name}: {out}{words}");
+    }
+}
