@@ -239,7 +239,7 @@ impl Engine {
 
     /// As [`Engine::evaluate_as`], or as [`Engine::rates`], into the caller's memory: [`Quat`] takes
     /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
-    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
+    /// when it is used again ([`OutputBuffer`]): the first touch
     /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
     /// without a copy.
     ///

@@ -174,3 +174,36 @@ fn what_cannot_be_compared_is_refused() {
     let told = String::from_utf8(told.out).unwrap();
     assert!(told.contains("only in a.dat: box2"), "{told}");
 }
+
+/// A chain goes into another format and back, and a part of it into `.dat`, without a bit of
+/// difference; what `.dat` has no room for is named.
+#[test]
+fn keys_come_back_as_dat() {
+    let folder = sample_folder();
+    let place = folder.path();
+    succeed(place, &["convert", "a.dat", "-o", "a.npz"]);
+    succeed(place, &["convert", "a.npz", "-o", "back.dat"]);
+    let same = ["compare", "a.dat", "back.dat", "--tolerance", "0"];
+    let told = String::from_utf8(succeed(place, &same).out).unwrap();
+    assert!(told.contains("18 of 18 rotations are the same"), "{told}");
+    let part = [
+        "convert", "a.dat", "--start", "0.5", "--end", "1.5", "-o", "part.dat",
+    ];
+    succeed(place, &part);
+    let text = std::fs::read_to_string(place.join("part.dat")).unwrap();
+    let times: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(' ').next().unwrap())
+        .collect();
+    assert_eq!(times.len(), 3, "{text}");
+    let moved = "HIERARCHY\nROOT hip\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition \
+                 Zrotation Xrotation Yrotation\n End Site\n {\n  OFFSET 0 1 0\n }\n}\nMOTION\nFrames: \
+                 2\nFrame Time: 0.5\n0 1 0 0 0 0\n1 1 0 90 0 0\n";
+    std::fs::write(place.join("moved.bvh"), moved).unwrap();
+    let run = succeed(place, &["convert", "moved.bvh", "-o", "moved.dat"]);
+    assert!(run.words.contains("warning[W205]"), "{}", run.words);
+    let line = ["compare", "moved.bvh", "moved.dat", "--tolerance", "1e-4"];
+    let told = String::from_utf8(succeed(place, &line).out).unwrap();
+    assert!(told.contains("translation"), "{told}");
+}

@@ -1,7 +1,7 @@
 //! Opening an input: what the name stands for, before a byte of it is read.
 
 use std::fs::{File, Metadata};
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -51,8 +51,13 @@ impl Source {
     }
 
     /// The first bytes of a file, up to 64; none of what is no file or cannot be read, whose fault
-    /// shows when it is opened.
+    /// shows when it is opened. Standard input keeps them for its reader: they lie in its buffer.
     pub(super) fn start(path: &Path) -> Vec<u8> {
+        if path.as_os_str() == "-" {
+            let mut input = io::stdin().lock();
+            let start = input.fill_buf().unwrap_or_default();
+            return start[..start.len().min(64)].to_vec();
+        }
         let mut start = Vec::new();
         let is_file = std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file());
         if is_file && let Ok(file) = File::open(path) {

@@ -108,6 +108,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::NotPerFrame,
         Code::LeftOut,
         Code::ListLength,
+        Code::RotationsAlone,
         Code::SeveralClips,
     ];
     for &code in Code::ALL {

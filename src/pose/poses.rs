@@ -119,7 +119,7 @@ impl Engine {
     /// set.push("lower", &[0.0, 1.0], &[keys[0]; 2])?;
     /// let engine = Engine::new(Device::Cpu)?;
     /// let local = engine.evaluate(&set, method::SLERP, &Frames::fps(1))?;
-    /// let world = engine.world(&local, &Skeleton::chain(2, 3.0))?;
+    /// let world = engine.world(&local, &Skeleton::chain(2, 3.0)?)?;
     /// // The lower box hangs at the end of the upper one, which has turned aside.
     /// assert!(world.position(1, 1).unwrap().distance(Vec3::new(3.0, 0.0, 0.0)) < 1e-6);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
