@@ -13,7 +13,7 @@ use tumble::{
     VectorMethod, Vectors, WrapMode,
 };
 
-use crate::support::{Random, vulkan_engines};
+use crate::support::{Random, vulkan_devices};
 
 const NUMBERS: [f64; 22] = [
     0.0,
@@ -500,11 +500,12 @@ proptest! {
     }
 }
 
-/// The same on every Vulkan device, fewer times.
+/// The same on a Vulkan device, fewer times: the checks are those of the CPU.
 #[test]
-fn nothing_panics_on_any_device() {
-    for engine in vulkan_engines(|_| {}) {
-        for seed in 0..60 {
+fn nothing_panics_on_a_device() {
+    for device in vulkan_devices().into_iter().take(1) {
+        let engine = Engine::new(device).unwrap();
+        for seed in 0..40 {
             let mut any = Any(Random(seed));
             let set = any.set();
             evaluate(&mut any, &engine, &set);

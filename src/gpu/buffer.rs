@@ -1,4 +1,4 @@
-//! One buffer with memory of its own.
+//! One buffer and its memory.
 
 use std::ops::Range;
 use std::ptr::NonNull;
@@ -9,6 +9,7 @@ use ash::vk;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::shared_memory::{Kind, Share};
 use crate::shader::PolynomialSegment;
 
 /// Where a buffer lives and who touches it.
@@ -70,7 +71,9 @@ pub(crate) struct Buffer {
     pub(crate) raw: vk::Buffer,
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
+    /// Memory of its own; null where it has a share of some.
     memory: vk::DeviceMemory,
+    share: Option<Share>,
     mapped: Option<NonNull<u8>>,
     size: u64,
 }
@@ -105,6 +108,16 @@ impl Buffer {
             .ok_or(VulkanError::NoMemoryType {
                 wanted: required.as_raw(),
             })?;
+        let kind = Kind {
+            memory_type,
+            mapped: residence != Residence::Device,
+        };
+        if let Some(share) = device.shared.take(&device.raw, kind, &needs)? {
+            buffer.share = Some(share);
+            buffer.mapped = share.mapped;
+            buffer.bind(share.memory, share.offset, is_texels, name)?;
+            return Ok(buffer);
+        }
         let allocate = vk::MemoryAllocateInfo::default()
             .allocation_size(needs.size)
             .memory_type_index(memory_type);
@@ -185,6 +198,7 @@ impl Buffer {
             raw,
             view: vk::BufferView::null(),
             memory: vk::DeviceMemory::null(),
+            share: None,
             mapped: None,
             size,
         })
@@ -200,8 +214,21 @@ impl Buffer {
         // SAFETY: a valid size and memory type.
         self.memory =
             unsafe { device.allocate_memory(allocate, None) }.named("vkAllocateMemory")?;
-        // SAFETY: fresh memory of a type that the buffer allows.
-        unsafe { device.bind_buffer_memory(self.raw, self.memory, 0) }
+        self.bind(self.memory, 0, is_texels, name)?;
+        self.device.name(self.memory, name);
+        Ok(())
+    }
+
+    fn bind(
+        &mut self,
+        memory: vk::DeviceMemory,
+        offset: u64,
+        is_texels: bool,
+        name: &str,
+    ) -> Result<(), VulkanError> {
+        let device = &self.device.raw;
+        // SAFETY: memory of a type that the buffer allows, of which nothing else uses this part.
+        unsafe { device.bind_buffer_memory(self.raw, memory, offset) }
             .named("vkBindBufferMemory")?;
         if is_texels {
             let info = vk::BufferViewCreateInfo::default()
@@ -214,7 +241,6 @@ impl Buffer {
                 unsafe { device.create_buffer_view(&info, None) }.named("vkCreateBufferView")?;
         }
         self.device.name(self.raw, name);
-        self.device.name(self.memory, name);
         Ok(())
     }
 
@@ -257,7 +283,10 @@ impl Drop for Buffer {
             unsafe {
                 self.device.raw.destroy_buffer_view(self.view, None);
                 self.device.raw.destroy_buffer(self.raw, None);
-                self.device.raw.free_memory(self.memory, None);
+                match self.share {
+                    Some(share) => self.device.shared.give_back(&self.device.raw, share),
+                    None => self.device.raw.free_memory(self.memory, None),
+                }
             }
         }
     }

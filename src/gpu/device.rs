@@ -12,6 +12,7 @@ use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::options::Reads;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::shared_memory::SharedMemory;
 
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(crate) struct LogicalDevice {
@@ -24,6 +25,8 @@ pub(crate) struct LogicalDevice {
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
     owned: bool,
+    /// Memory of small buffers.
+    pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
 }
@@ -94,6 +97,7 @@ impl LogicalDevice {
             names,
             borrows,
             owned,
+            shared: SharedMemory::default(),
             hung,
         })
     }
@@ -158,8 +162,13 @@ impl LogicalDevice {
 
 impl Drop for LogicalDevice {
     fn drop(&mut self) {
-        if self.owned && self.may_destroy() {
-            // SAFETY: every object created from it held an `Arc` to this and is gone.
+        if !self.may_destroy() {
+            return;
+        }
+        // SAFETY: every object created from it held an `Arc` to this and is gone.
+        unsafe { self.shared.free(&self.raw) };
+        if self.owned {
+            // SAFETY: as above.
             unsafe { self.raw.destroy_device(None) };
         }
     }

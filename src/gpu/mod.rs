@@ -20,5 +20,6 @@ pub(crate) mod recovery;
 pub(crate) mod run;
 pub(crate) mod sample_list;
 pub(crate) mod self_test;
+pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod work_list;

@@ -1,0 +1,232 @@
+//! Memory that small buffers share. Drivers allow a few thousand allocations, and each takes at least a
+//! page; a clip has several buffers.
+
+use std::ops::Range;
+use std::ptr::NonNull;
+use std::sync::Mutex;
+
+use ash::vk;
+
+use crate::gpu::engine::lock;
+use crate::gpu::error::{Named, VulkanError};
+
+/// Larger buffers have memory of their own.
+const LARGEST: u64 = 512 << 10;
+/// The size of what is allocated for buffers to share.
+const BLOCK: u64 = 4 << 20;
+
+/// The blocks of a device.
+#[derive(Default)]
+pub(crate) struct SharedMemory(Mutex<Vec<Block>>);
+
+/// Which memory a buffer wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Kind {
+    pub(crate) memory_type: u32,
+    /// Whether the host sees it.
+    pub(crate) mapped: bool,
+}
+
+/// A part of a block.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Share {
+    pub(crate) memory: vk::DeviceMemory,
+    pub(crate) offset: u64,
+    size: u64,
+    /// Where the host sees the first byte.
+    pub(crate) mapped: Option<NonNull<u8>>,
+}
+
+struct Block {
+    memory: vk::DeviceMemory,
+    kind: Kind,
+    mapped: Option<NonNull<u8>>,
+    free: Free,
+}
+
+// SAFETY: the pointer is to mapped memory that goes from thread to thread with the block; each part of
+// it is used by the one buffer that holds it.
+unsafe impl Send for Block {}
+
+impl SharedMemory {
+    /// Room for a buffer; `None` for one that is better off with memory of its own.
+    pub(crate) fn take(
+        &self,
+        device: &ash::Device,
+        kind: Kind,
+        needs: &vk::MemoryRequirements,
+    ) -> Result<Option<Share>, VulkanError> {
+        if needs.size > LARGEST {
+            return Ok(None);
+        }
+        let mut blocks = lock(&self.0);
+        let mut own = blocks.iter_mut().filter(|block| block.kind == kind);
+        if let Some(share) = own.find_map(|block| block.share(needs)) {
+            return Ok(Some(share));
+        }
+        let info = vk::MemoryAllocateInfo::default()
+            .allocation_size(BLOCK)
+            .memory_type_index(kind.memory_type);
+        // SAFETY: the device is alive, and has this type of memory.
+        let allocated = unsafe { device.allocate_memory(&info, None) };
+        let Ok(memory) = allocated else {
+            return Ok(None); // there may be room for the buffer alone
+        };
+        let mut block = Block {
+            memory,
+            kind,
+            mapped: None,
+            free: Free::new(BLOCK),
+        };
+        if kind.mapped {
+            let flags = vk::MemoryMapFlags::empty();
+            // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
+            let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
+            let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
+                // SAFETY: nothing uses it.
+                unsafe { device.free_memory(memory, None) }
+            })?;
+            block.mapped = NonNull::new(mapped.cast());
+        }
+        let share = block.share(needs);
+        blocks.push(block);
+        Ok(share)
+    }
+
+    /// Takes back what a buffer had. A block that nobody uses is kept if it is the only one of its
+    /// kind: whoever makes and drops clips in turn allocates nothing.
+    ///
+    /// # Safety
+    /// Nothing may use the memory any more.
+    pub(crate) unsafe fn give_back(&self, device: &ash::Device, share: Share) {
+        let mut blocks = lock(&self.0);
+        let Some(place) = blocks.iter().position(|block| block.memory == share.memory) else {
+            return;
+        };
+        blocks[place]
+            .free
+            .give(share.offset..share.offset + share.size);
+        let kind = blocks[place].kind;
+        let is_spare = |block: &&Block| block.kind == kind && block.free.is_whole();
+        if blocks[place].free.is_whole() && blocks.iter().filter(is_spare).count() > 1 {
+            let block = blocks.swap_remove(place);
+            // SAFETY: no buffer has a part of it, and the caller promises that no work does.
+            unsafe { device.free_memory(block.memory, None) };
+        }
+    }
+
+    /// Frees all blocks.
+    ///
+    /// # Safety
+    /// Nothing may use them any more.
+    pub(crate) unsafe fn free(&self, device: &ash::Device) {
+        for block in lock(&self.0).drain(..) {
+            // SAFETY: promised by the caller.
+            unsafe { device.free_memory(block.memory, None) };
+        }
+    }
+}
+
+impl Block {
+    fn share(&mut self, needs: &vk::MemoryRequirements) -> Option<Share> {
+        let offset = self.free.take(needs.size, needs.alignment)?;
+        let mapped = self.mapped.and_then(|first| {
+            // SAFETY: the offset lies within the block, which is mapped as a whole.
+            NonNull::new(unsafe { first.as_ptr().add(offset as usize) })
+        });
+        Some(Share {
+            memory: self.memory,
+            offset,
+            size: needs.size,
+            mapped,
+        })
+    }
+}
+
+/// The free parts of a block, in order, no two of which touch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Free {
+    ranges: Vec<Range<u64>>,
+    size: u64,
+}
+
+impl Free {
+    fn new(size: u64) -> Self {
+        let whole = 0..size;
+        Self {
+            ranges: vec![whole],
+            size,
+        }
+    }
+
+    fn is_whole(&self) -> bool {
+        self.ranges.first() == Some(&(0..self.size))
+    }
+
+    /// The first place where so many bytes fit.
+    fn take(&mut self, size: u64, alignment: u64) -> Option<u64> {
+        let found = self.ranges.iter().enumerate().find_map(|(place, range)| {
+            let start = range.start.next_multiple_of(alignment.max(1));
+            (start + size <= range.end).then_some((place, start))
+        });
+        let (place, start) = found?;
+        let range = self.ranges[place].clone();
+        let rest = [range.start..start, start + size..range.end];
+        let rest = rest.into_iter().filter(|rest| !rest.is_empty());
+        self.ranges.splice(place..=place, rest);
+        Some(start)
+    }
+
+    fn give(&mut self, mut range: Range<u64>) {
+        let mut place = self.ranges.partition_point(|own| own.start < range.start);
+        if place > 0 && self.ranges[place - 1].end == range.start {
+            place -= 1;
+            range.start = self.ranges.remove(place).start;
+        }
+        if self
+            .ranges
+            .get(place)
+            .is_some_and(|next| next.start == range.end)
+        {
+            range.end = self.ranges.remove(place).end;
+        }
+        self.ranges.insert(place, range);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn parts_never_overlap_and_become_whole_again(
+            steps in prop::collection::vec((1u64..400, 0u32..6, 0usize..8), 0..200)
+        ) {
+            let mut free = Free::new(4096);
+            let mut taken: Vec<Range<u64>> = Vec::new();
+            for (size, power, drop) in steps {
+                let alignment = 1 << power;
+                if drop < 3 && !taken.is_empty() {
+                    free.give(taken.swap_remove(drop % taken.len()));
+                } else if let Some(start) = free.take(size, alignment) {
+                    let own = start..start + size;
+                    prop_assert!(start % alignment == 0 && own.end <= 4096);
+                    let apart = |other: &Range<u64>| other.end <= own.start || own.end <= other.start;
+                    prop_assert!(taken.iter().all(apart), "{own:?} of {taken:?}");
+                    taken.push(own);
+                }
+                let left: u64 = free.ranges.iter().map(|range| range.end - range.start).sum();
+                let used: u64 = taken.iter().map(|range| range.end - range.start).sum();
+                prop_assert_eq!(left + used, 4096);
+                prop_assert!(free.ranges.is_sorted_by(|a, b| a.end < b.start));
+            }
+            for range in taken {
+                free.give(range);
+            }
+            prop_assert!(free.is_whole());
+        }
+    }
+}
