@@ -26,10 +26,13 @@ fn every_example_runs_and_says_what_it_found() {
             "same_bits" => (&[], ""),
             _ => panic!("{name}: say here what it prints"),
         };
-        let run = Command::new(program(name))
-            .args(arguments)
-            .output()
-            .unwrap();
+        let program = program(name);
+        let built = program.exists();
+        assert!(
+            built,
+            "{name} is not built: `cargo test -p tumble` without --test builds it"
+        );
+        let run = Command::new(program).args(arguments).output().unwrap();
         let (out, words) = (
             String::from_utf8_lossy(&run.stdout),
             String::from_utf8_lossy(&run.stderr),
