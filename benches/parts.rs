@@ -76,6 +76,6 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
         .bench_local(|| {
             encoding
                 .encode(divan::black_box(&rotations), &mut output)
-                .unwrap()
+                .unwrap();
         });
 }

@@ -88,6 +88,7 @@ mod own_device;
 mod path;
 mod pose;
 mod prepare;
+pub mod reduce;
 pub mod reference;
 mod shader;
 mod simd;

@@ -109,7 +109,7 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 22] = [
+const LAYERS: [&str; 23] = [
     "memory",
     "shader",
     "math",
@@ -124,6 +124,7 @@ const LAYERS: [&str; 22] = [
     "prepare",
     "path",
     "smooth",
+    "reduce",
     "output",
     "from_keys",
     "cpu",

@@ -35,9 +35,10 @@ fn faults(value: &Value, place: &str, found: &mut Vec<String>) {
             let camel = words
                 .clone()
                 .find(|word| is_camel(word) && !names.contains(word));
-            let is_device = place.ends_with("device") || place.contains("device_");
+            // Names that others have given.
+            let is_name = place.contains("device") || place.ends_with(".source");
             let mark = MARKS.iter().copied().find(|mark| text.contains(mark));
-            if let Some(mark) = mark.or(camel.filter(|_| !is_device)) {
+            if let Some(mark) = mark.or(camel.filter(|_| !is_name)) {
                 found.push(format!("{place}: `{mark}` in `{text}`"));
             }
         }

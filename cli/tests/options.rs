@@ -90,7 +90,12 @@ impl Results {
         if let Some(known) = self.known.get(&line) {
             return known.clone();
         }
-        let out = self.place.join("out");
+        let name = if line.contains(&"--to") {
+            "out"
+        } else {
+            "out.npy"
+        };
+        let out = self.place.join(name);
         let _ = std::fs::remove_file(&out);
         let place = |word: &str| match word.contains('.') && !word.starts_with("--") {
             true => Some(self.place.join(word)).filter(|path| path.exists()),

@@ -116,4 +116,7 @@ pub struct Sampled<'a> {
     pub scales: &'a [Vec3],
     /// What made them, for formats that have room for it: `("method", "slerp")`.
     pub notes: &'a [(&'a str, String)],
+    /// The samples are those of the clip's own keys: a format that has keys of each channel at times of
+    /// their own (glTF) writes these instead, unless the clip is in the world.
+    pub of_own_keys: bool,
 }

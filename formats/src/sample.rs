@@ -220,6 +220,7 @@ impl Samples {
             translations: &self.translations,
             scales: &self.scales,
             notes,
+            of_own_keys: false,
         }
     }
 }

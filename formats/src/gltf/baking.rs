@@ -12,8 +12,15 @@ use crate::gltf::animation::{Read, SampledChannel};
 use crate::gltf::channel::Path;
 use crate::gltf::edits::Edits;
 use crate::gltf::json::{Json, Members};
+use crate::gltf::own_keys::OwnKeys;
 use crate::gltf::schema::{Animation, Channel};
 use crate::motion::Sampled;
+
+/// Numbers as a file has them.
+fn bytes_of(numbers: &[f32]) -> Vec<u8> {
+    let each = numbers.iter().flat_map(|number| number.to_le_bytes());
+    each.collect()
+}
 
 /// One animation on its way into the file.
 pub(super) struct Baking<'a> {
@@ -35,6 +42,8 @@ pub(super) struct Baking<'a> {
 /// A sampler that was changed or appended.
 struct Made {
     place: usize,
+    input: usize,
+    interpolation: &'static str,
     values: Range<usize>,
 }
 
@@ -97,20 +106,29 @@ impl<'a> Baking<'a> {
     /// # Errors
     /// When f32 cannot tell times apart.
     pub(super) fn bake(&mut self, edits: &mut Edits<'_>) -> Result<(), WriteError> {
-        let times = self.times()?;
-        let [first, last] = [times[0], times[times.len() - 1]].map(f64::from);
-        let range = format!(",\"min\":[{first:?}],\"max\":[{last:?}]");
-        self.bytes
-            .extend(times.iter().flat_map(|time| time.to_le_bytes()));
-        let input = edits.append_to("accessors", self.accessor(0, times.len(), "SCALAR", &range));
+        let mut inputs = HashMap::new();
+        let shared = self.input(self.sampled.times, &mut inputs, edits)?;
         // By the samplers whose keys the samples stand for.
         let mut made: HashMap<usize, Vec<Made>> = HashMap::new();
         for channel in &self.read.sampled {
-            let values = self.values(channel);
+            let own = match self.sampled.of_own_keys {
+                true => OwnKeys::of(self.sampled.clip, channel.track, channel.path),
+                false => None,
+            };
+            let (input, interpolation) = match &own {
+                Some(own) => (
+                    self.input(&own.times, &mut inputs, edits)?,
+                    own.sampler.name(),
+                ),
+                None => (shared, "LINEAR"),
+            };
+            let values = own.map_or_else(|| self.values(channel), |own| bytes_of(&own.values));
+            let count = values.len() / (4 * channel.path.width());
             let made = made.entry(channel.sampler).or_default();
-            let same = made
-                .iter()
-                .find(|made| self.bytes[made.values.clone()] == values);
+            let same = made.iter().find(|made| {
+                self.bytes[made.values.clone()] == values
+                    && (made.input, made.interpolation) == (input, interpolation)
+            });
             let sampler = match same {
                 Some(made) => made.place,
                 None => {
@@ -121,20 +139,27 @@ impl<'a> Baking<'a> {
                     } else {
                         "VEC3"
                     };
-                    let accessor = self.accessor(start, times.len(), kind, "");
+                    let accessor = self.accessor(start, count, kind, "");
                     let output = edits.append_to("accessors", accessor);
-                    let is_free = made.is_empty() && !self.kept.contains(&channel.sampler);
+                    let is_free = made.is_empty()
+                        && !self.kept.contains(&channel.sampler)
+                        && self.takes(channel.sampler, interpolation)?;
                     let place = match is_free {
-                        true => self.change_sampler(channel.sampler, (input, output), edits)?,
+                        true => {
+                            let keys = (input, output, interpolation);
+                            self.change_sampler(channel.sampler, keys, edits)?
+                        }
                         false => {
                             let sampler = format!(
-                                "{{\"input\":{input},\"output\":{output},\"interpolation\":\"LINEAR\"}}"
+                                "{{\"input\":{input},\"output\":{output},\"interpolation\":\"{interpolation}\"}}"
                             );
                             edits.append(self.samplers_array, self.samplers.len(), &sampler)
                         }
                     };
                     made.push(Made {
                         place,
+                        input,
+                        interpolation,
                         values: start..self.bytes.len(),
                     });
                     place
@@ -147,17 +172,35 @@ impl<'a> Baking<'a> {
         Ok(())
     }
 
-    /// The times of the samples in f32, from the first key time that the file has to the last.
-    fn times(&self) -> Result<Vec<f32>, Diagnostic> {
-        let mut times: Vec<f32> = self.sampled.times.iter().map(|&time| time as f32).collect();
-        let ends = [0, times.len() - 1];
-        for ((place, clip), stored) in ends
-            .into_iter()
-            .zip(self.read.span)
-            .zip(self.read.stored_span)
-        {
-            if self.sampled.times[place] == clip {
-                times[place] = stored;
+    /// The accessor of times, one for equal ones.
+    fn input(
+        &mut self,
+        seconds: &[f64],
+        known: &mut HashMap<Vec<u32>, usize>,
+        edits: &mut Edits<'_>,
+    ) -> Result<usize, Diagnostic> {
+        let times = self.times(seconds)?;
+        let bits: Vec<u32> = times.iter().map(|time| time.to_bits()).collect();
+        if let Some(&input) = known.get(&bits) {
+            return Ok(input);
+        }
+        let [first, last] = [times[0], times[times.len() - 1]].map(f64::from);
+        let range = format!(",\"min\":[{first:?}],\"max\":[{last:?}]");
+        let start = self.bytes.len();
+        self.bytes.extend(bytes_of(&times));
+        let accessor = self.accessor(start, times.len(), "SCALAR", &range);
+        let input = edits.append_to("accessors", accessor);
+        known.insert(bits, input);
+        Ok(input)
+    }
+
+    /// Times in f32, those of the first key that the file has and of the last as the file has them.
+    fn times(&self, seconds: &[f64]) -> Result<Vec<f32>, Diagnostic> {
+        let mut times: Vec<f32> = seconds.iter().map(|&time| time as f32).collect();
+        for (time, &given) in times.iter_mut().zip(seconds) {
+            let ends = self.read.span.iter().zip(self.read.stored_span);
+            for (_, stored) in ends.filter(|&(&end, _)| end == given) {
+                *time = stored;
             }
         }
         match times.windows(2).find(|pair| pair[0] >= pair[1]) {
@@ -188,6 +231,13 @@ impl<'a> Baking<'a> {
         }
     }
 
+    /// Whether a sampler's interpolation can be changed in its place: linear need not be named.
+    fn takes(&self, sampler: usize, interpolation: &str) -> Result<bool, Diagnostic> {
+        let raw = self.samplers[sampler];
+        let members: Members<'a> = self.json.typed(raw, &self.pointer)?;
+        Ok(interpolation == "LINEAR" || members.get("interpolation").is_some())
+    }
+
     fn accessor(&self, offset: usize, count: usize, kind: &str, more: &str) -> String {
         format!(
             "{{\"bufferView\":{},\"byteOffset\":{offset},\"componentType\":5126,\
@@ -200,7 +250,7 @@ impl<'a> Baking<'a> {
     fn change_sampler(
         &self,
         sampler: usize,
-        (input, output): (usize, usize),
+        (input, output, interpolation): (usize, usize, &str),
         edits: &mut Edits<'_>,
     ) -> Result<usize, Diagnostic> {
         let raw = self.samplers[sampler];
@@ -208,7 +258,7 @@ impl<'a> Baking<'a> {
         let changes = [
             ("input", input.to_string()),
             ("output", output.to_string()),
-            ("interpolation", "\"LINEAR\"".to_owned()),
+            ("interpolation", format!("\"{interpolation}\"")),
         ];
         for (name, value) in changes {
             if let Some(old) = members.get(name) {

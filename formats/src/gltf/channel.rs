@@ -31,6 +31,14 @@ impl Path {
         })
     }
 
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+            Self::Scale => "scale",
+        }
+    }
+
     /// Numbers of a value.
     pub(super) fn width(self) -> usize {
         match self {

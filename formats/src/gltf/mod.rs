@@ -19,6 +19,7 @@ mod matrix;
 pub mod meshes;
 mod meshopt;
 mod nodes;
+mod own_keys;
 mod reader;
 mod schema;
 mod uri;

@@ -7,6 +7,7 @@ mod json;
 mod rig;
 mod samples;
 
+use std::collections::HashMap;
 use std::io::{self, BufWriter, Write};
 
 use base64::Engine;
@@ -15,6 +16,7 @@ use serde_json::Value;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
+use crate::gltf::own_keys::OwnKeys;
 use crate::gltf::write_new::binary::{Binary, Data};
 use crate::gltf::write_new::json::{
     Animation, Asset, Buffer, Channel, Root, Sampler, Scene, Skin, Target,
@@ -34,7 +36,8 @@ const HEADERS: u64 = 28;
 /// nodes of their own. Tracks of a clip without skeleton are roots without skin. Poses in the world
 /// become relative to the parents. Rotations are f32, each with the sign that continues the one
 /// before it; translations and scales are written of joints where they leave the rest pose. Steps
-/// stay steps, all else is linear.
+/// stay steps, all else is linear; the keys of clips that are written as such
+/// ([`Sampled::of_own_keys`]) keep their samplers.
 ///
 /// # Errors
 /// When writing fails; [`Code::NothingToAnimate`], [`Code::NotTrees`], [`Code::TimesInF32`],
@@ -116,8 +119,40 @@ fn moved_starts(clips: &[Sampled<'_>], options: &MotionOptions) -> Vec<Diagnosti
 struct Part<'a> {
     samples: Samples<'a>,
     times: Vec<f32>,
+    /// Keys of its channels that are written instead of the samples, each channel with its times.
+    keys: Option<Vec<KeyedChannel>>,
     /// The node of its first track; the others follow.
     first_node: usize,
+}
+
+/// A channel whose keys are written.
+struct KeyedChannel {
+    track: usize,
+    property: Property,
+    times: Vec<f32>,
+    keys: OwnKeys,
+}
+
+/// The channels of a clip whose own keys are written; nothing where its samples are.
+fn keyed_channels(samples: Samples<'_>) -> Result<Option<Vec<KeyedChannel>>, (Code, String)> {
+    let clip = samples.clip();
+    if !clip.of_own_keys || clip.clip.is_world {
+        return Ok(None);
+    }
+    let mut channels = Vec::new();
+    for track in 0..samples.tracks {
+        for property in Property::ALL {
+            if let Some(keys) = OwnKeys::of(clip.clip, track, property.path()) {
+                channels.push(KeyedChannel {
+                    track,
+                    property,
+                    times: f32_times(samples, &keys.times)?,
+                    keys,
+                });
+            }
+        }
+    }
+    Ok(Some(channels))
 }
 
 /// Checks all clips, and adds their nodes.
@@ -137,6 +172,7 @@ fn parts<'a>(
         };
         let samples = Samples::of(clip)?;
         let times = f32_times(samples, clip.times).map_err(refuse)?;
+        let keys = keyed_channels(samples).map_err(refuse)?;
         if samples.has_scaled_parents_in_world() {
             let why = "its poses are in the world and its joints have scales, so they cannot be \
                        made relative to their parents; write it without scales";
@@ -155,6 +191,7 @@ fn parts<'a>(
         parts.push(Part {
             samples,
             times,
+            keys,
             first_node,
         });
     }
@@ -257,6 +294,9 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
 fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
     let samples = part.samples;
     binary.begin_view();
+    if let Some(channels) = part.keys.filter(|channels| !channels.is_empty()) {
+        return keyed_animation(binary, channels, part.first_node);
+    }
     let input = binary.push(Data::Times(part.times));
     let mut channels = Vec::new();
     for track in 0..samples.tracks {
@@ -279,7 +319,34 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
         });
         let target = Target {
             node: part.first_node + track,
-            path: property.path(),
+            path: property.path().name(),
+        };
+        animation.channels.push(Channel { sampler, target });
+    }
+    animation
+}
+
+/// The animation of channels that have keys of their own; equal times are written once.
+fn keyed_animation(
+    binary: &mut Binary<'_>,
+    channels: Vec<KeyedChannel>,
+    first_node: usize,
+) -> Animation {
+    let mut animation = Animation::default();
+    let mut inputs: HashMap<Vec<u32>, usize> = HashMap::new();
+    for (sampler, own) in channels.into_iter().enumerate() {
+        let bits = own.times.iter().map(|time| time.to_bits()).collect();
+        let input = *inputs
+            .entry(bits)
+            .or_insert_with(|| binary.push(Data::Times(own.times)));
+        animation.samplers.push(Sampler {
+            input,
+            output: binary.push(Data::Keys(own.property, own.keys.values)),
+            interpolation: own.keys.sampler.name(),
+        });
+        let target = Target {
+            node: first_node + own.track,
+            path: own.property.path().name(),
         };
         animation.channels.push(Channel { sampler, target });
     }

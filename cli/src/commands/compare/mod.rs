@@ -49,10 +49,10 @@ pub(crate) struct Arguments {
     world: bool,
     /// The largest angle that passes: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
     /// no rotations the largest difference of two numbers
-    #[arg(long, value_name = "ANGLE", value_parser = degrees)]
+    #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
     /// The largest distance of two translations that passes
-    #[arg(long, value_name = "LENGTH", value_parser = not_negative)]
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Print JSON
     #[arg(long)]

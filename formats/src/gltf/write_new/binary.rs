@@ -13,6 +13,8 @@ pub(super) enum Data<'a> {
     Times(Vec<f32>),
     /// The samples of a channel.
     Channel(Samples<'a>, usize, Property),
+    /// The keys of a channel.
+    Keys(Property, Vec<f32>),
 }
 
 impl Data<'_> {
@@ -23,6 +25,8 @@ impl Data<'_> {
             Self::Times(times) => ("SCALAR", 4, times.len()),
             Self::Channel(samples, _, Property::Rotation) => ("VEC4", 16, samples.len()),
             Self::Channel(samples, _, _) => ("VEC3", 12, samples.len()),
+            Self::Keys(Property::Rotation, numbers) => ("VEC4", 16, numbers.len() / 4),
+            Self::Keys(_, numbers) => ("VEC3", 12, numbers.len() / 3),
         }
     }
 
@@ -35,6 +39,7 @@ impl Data<'_> {
                 Property::Translation => bytes_of(samples.translations(*track)),
                 Property::Scale => bytes_of(samples.scales(*track)),
             },
+            Self::Keys(_, numbers) => bytes_of(numbers.iter().map(|&number| [number])),
         }
     }
 }

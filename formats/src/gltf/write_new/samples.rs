@@ -5,6 +5,7 @@ use std::io;
 
 use glam::{DQuat, Quat, Vec3};
 
+use crate::gltf::channel::Path;
 use crate::motion::{Channels, Sampled, Sampler, Transform};
 
 /// What a channel moves.
@@ -19,11 +20,11 @@ impl Property {
     pub(super) const ALL: [Self; 3] = [Self::Rotation, Self::Translation, Self::Scale];
 
     /// The path of a channel's target.
-    pub(super) fn path(self) -> &'static str {
+    pub(super) fn path(self) -> Path {
         match self {
-            Self::Rotation => "rotation",
-            Self::Translation => "translation",
-            Self::Scale => "scale",
+            Self::Rotation => Path::Rotation,
+            Self::Translation => Path::Translation,
+            Self::Scale => Path::Scale,
         }
     }
 }
@@ -56,6 +57,10 @@ impl<'a> Samples<'a> {
             }
         }
         Ok(Self { clip, tracks })
+    }
+
+    pub(super) fn clip(self) -> &'a Sampled<'a> {
+        self.clip
     }
 
     /// The number of samples.

@@ -1,0 +1,93 @@
+//! The keys of one channel as a file has them: at times of their own, with their own sampler.
+
+use glam::Quat;
+use tumble::Channel;
+
+use crate::gltf::channel::Path;
+use crate::motion::{Motion, Sampler};
+
+/// The keys of a channel of a clip.
+pub(super) struct OwnKeys {
+    /// Seconds.
+    pub(super) times: Vec<f64>,
+    /// A value for each time; of cubics the arriving tangent, the value and the leaving tangent.
+    pub(super) values: Vec<f32>,
+    pub(super) sampler: Sampler,
+}
+
+impl OwnKeys {
+    /// The keys with which a clip moves a track; nothing where it rests.
+    pub(super) fn of(clip: &Motion, track: usize, path: Path) -> Option<Self> {
+        let samplers = clip.channels.get(track);
+        match path {
+            Path::Rotation => Self::of_rotations(clip, track, samplers.map(|own| own.rotation)),
+            Path::Translation => {
+                let sampler = samplers.map(|own| own.translation);
+                Self::of_vectors(clip, track, Channel::Translation, sampler)
+            }
+            Path::Scale => {
+                let sampler = samplers.map(|own| own.scale);
+                Self::of_vectors(clip, track, Channel::Scale, sampler)
+            }
+        }
+    }
+
+    /// `sampler` is nothing where the clip says nothing of its tracks, and nothing inside where the
+    /// track rests.
+    fn of_rotations(clip: &Motion, track: usize, sampler: Option<Option<Sampler>>) -> Option<Self> {
+        let sampler = sampler.unwrap_or(Some(Sampler::Linear))?;
+        let own = clip.set.get(track)?;
+        let mut values = Vec::new();
+        let mut before: Option<Quat> = None;
+        for (place, &key) in own.keys.iter().enumerate() {
+            if sampler == Sampler::Cubic {
+                let none = [Quat::from_array([0.0; 4]); 2];
+                let [arriving, leaving] = own.tangents.get(place).copied().unwrap_or(none);
+                values.extend(
+                    [arriving, key, leaving]
+                        .map(|q| q.to_array())
+                        .as_flattened(),
+                );
+                continue;
+            }
+            // Each with the sign that continues the one before it.
+            let turns = before.is_some_and(|before| before.dot(key) < 0.0);
+            values.extend(before.insert(if turns { -key } else { key }).to_array());
+        }
+        Some(Self {
+            times: own.times.to_vec(),
+            values,
+            sampler,
+        })
+    }
+
+    fn of_vectors(
+        clip: &Motion,
+        track: usize,
+        channel: Channel,
+        sampler: Option<Option<Sampler>>,
+    ) -> Option<Self> {
+        let sampler = sampler.unwrap_or(Some(Sampler::Linear))?;
+        let own = clip.set.vector_keys(channel, track)?;
+        let mut values = Vec::new();
+        for (place, key) in own.keys.iter().enumerate() {
+            match sampler {
+                Sampler::Cubic => {
+                    let tangents = own.tangents.get(place).copied().unwrap_or_default();
+                    let [arriving, leaving] = tangents;
+                    values.extend(
+                        [arriving, *key, leaving]
+                            .map(|v| v.to_array())
+                            .as_flattened(),
+                    );
+                }
+                _ => values.extend(key.to_array()),
+            }
+        }
+        Some(Self {
+            times: own.times.to_vec(),
+            values,
+            sampler,
+        })
+    }
+}

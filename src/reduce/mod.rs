@@ -1,0 +1,188 @@
+//! The opposite of evaluating: few keys whose curve stays near dense samples.
+//!
+//! Keys are samples, so that they keep their values. [`ReducedCurve::Linear`] and
+//! [`ReducedCurve::GltfCubic`] have intervals that do not depend on each other: from each key the
+//! farthest sample is taken that an interval reaches within the tolerance. The curves of
+//! [`ReducedCurve::BesselOverhauser`] depend on neighbouring keys: keys are put in where the curve is
+//! farthest away, until it is near everywhere, and then each that can be missed is taken out.
+//!
+//! All is computed in f64. Every sample is looked at, and none is farther from the curve than the
+//! tolerance; what an evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
+
+mod inserted;
+mod intervals;
+mod value;
+
+use glam::{DQuat, DVec3};
+
+use crate::reduce::inserted::inserted;
+use crate::reduce::intervals::Intervals;
+use crate::reduce::value::Value;
+
+/// The curve that joins the keys that stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum ReducedCurve {
+    /// The shorter arc ([`slerp`](crate::method::slerp::SLERP)), and straight lines.
+    #[default]
+    Linear,
+    /// [`bessel-overhauser`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER), with
+    /// [parabolic ends](crate::Ends::Parabolic).
+    BesselOverhauser,
+    /// Hermite cubics whose tangents are found by least squares
+    /// ([`gltf-cubic`](crate::method::gltf_cubic::GLTF_CUBIC)).
+    GltfCubic,
+}
+
+/// The keys that stay.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct ReducedKeys<T> {
+    /// Which samples are keys, increasing. A channel that stands still has one, every other the first
+    /// and the last sample at least.
+    pub places: Vec<usize>,
+    /// Values of the keys: those of the samples; rotations with the sign that continues the one before.
+    pub keys: Vec<T>,
+    /// For [`ReducedCurve::GltfCubic`] the tangents with which the curve arrives at each key and leaves
+    /// it, per second; else nothing.
+    pub tangents: Vec<[T; 2]>,
+    /// The largest distance of a sample from the curve: radians, or the samples' unit.
+    pub error: f64,
+}
+
+/// Why samples cannot be reduced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReduceError {
+    /// Every sample has a time.
+    #[error("there are {samples} samples and {times} times; give a time for each sample")]
+    Lengths {
+        /// Samples given.
+        samples: usize,
+        /// Times given.
+        times: usize,
+    },
+    /// Times are finite and increase.
+    #[error("time {place} is {time} s; times are finite and increase")]
+    Time {
+        /// Its place, from 0.
+        place: usize,
+        /// Seconds.
+        time: f64,
+    },
+    /// A sample is not finite, or a rotation of norm 0.
+    #[error("sample {place} is no finite value")]
+    Sample {
+        /// Its place, from 0.
+        place: usize,
+    },
+    /// A tolerance is finite and at least 0.
+    #[error("the tolerance is {tolerance}; give a finite number from 0")]
+    Tolerance {
+        /// What was given.
+        tolerance: f64,
+    },
+}
+
+/// The keys of a channel of rotations: every sample is within `tolerance` radians of their curve. Times
+/// are seconds.
+///
+/// ```
+/// use glam::DQuat;
+/// use tumble::reduce::{ReducedCurve, reduce_rotations};
+/// let times: Vec<f64> = (0..100).map(|i| f64::from(i) / 100.0).collect();
+/// let even: Vec<DQuat> = times.iter().map(|&t| DQuat::from_rotation_y(t)).collect();
+/// let reduced = reduce_rotations(&times, &even, 1e-4, ReducedCurve::Linear)?;
+/// assert_eq!(reduced.places, [0, 99]);
+/// # Ok::<(), tumble::reduce::ReduceError>(())
+/// ```
+///
+/// # Errors
+/// A [`ReduceError`] that names the sample.
+pub fn reduce_rotations(
+    times: &[f64],
+    samples: &[DQuat],
+    tolerance: f64,
+    curve: ReducedCurve,
+) -> Result<ReducedKeys<DQuat>, ReduceError> {
+    let mut own: Vec<DQuat> = samples.to_vec();
+    for place in 0..own.len() {
+        let unit = own[place].normalize();
+        let continues = place == 0 || own[place - 1].dot(unit) >= 0.0;
+        own[place] = if continues { unit } else { -unit };
+    }
+    reduced(times, &own, tolerance, curve)
+}
+
+/// As [`reduce_rotations`], for translations or scales; the tolerance is a distance.
+///
+/// # Errors
+/// As there.
+pub fn reduce_vectors(
+    times: &[f64],
+    samples: &[DVec3],
+    tolerance: f64,
+    curve: ReducedCurve,
+) -> Result<ReducedKeys<DVec3>, ReduceError> {
+    reduced(times, samples, tolerance, curve)
+}
+
+/// Samples that have been checked, and how near to them the curve has to be.
+pub(crate) struct Task<'a, T> {
+    pub(crate) times: &'a [f64],
+    pub(crate) samples: &'a [T],
+    pub(crate) tolerance: f64,
+}
+
+fn reduced<T: Value>(
+    times: &[f64],
+    samples: &[T],
+    tolerance: f64,
+    curve: ReducedCurve,
+) -> Result<ReducedKeys<T>, ReduceError> {
+    if samples.len() != times.len() {
+        return Err(ReduceError::Lengths {
+            samples: samples.len(),
+            times: times.len(),
+        });
+    }
+    if !(tolerance >= 0.0 && tolerance.is_finite()) {
+        return Err(ReduceError::Tolerance { tolerance });
+    }
+    if let Some(place) = samples.iter().position(|sample| !sample.is_finite()) {
+        return Err(ReduceError::Sample { place });
+    }
+    let increases = |place: usize| place == 0 || times[place - 1] < times[place];
+    if let Some(place) = (0..times.len()).find(|&i| !(times[i].is_finite() && increases(i))) {
+        let time = times[place];
+        return Err(ReduceError::Time { place, time });
+    }
+    let Some(&first) = samples.first() else {
+        return Ok(ReducedKeys::default());
+    };
+    let task = Task {
+        times,
+        samples,
+        tolerance,
+    };
+    let still = samples
+        .iter()
+        .map(|own| own.apart(first))
+        .fold(0.0, f64::max);
+    if still <= tolerance {
+        return Ok(ReducedKeys {
+            places: vec![0],
+            keys: vec![first],
+            tangents: match curve {
+                ReducedCurve::GltfCubic => vec![[T::default(); 2]],
+                _ => Vec::new(),
+            },
+            error: still,
+        });
+    }
+    Ok(match curve {
+        ReducedCurve::Linear => Intervals::new(&task, false).keys(),
+        ReducedCurve::GltfCubic => Intervals::new(&task, true).keys(),
+        ReducedCurve::BesselOverhauser => inserted(&task),
+    })
+}
