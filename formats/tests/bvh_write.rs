@@ -42,6 +42,7 @@ fn sampled<'a>(clip: &'a Motion, times: &'a [f64], rotations: &'a [Quat]) -> Sam
         translations: &[],
         scales: &[],
         notes: &[],
+        of_own_keys: false,
     }
 }
 

@@ -77,6 +77,7 @@ fn more_than_a_glb_holds_is_refused_before_any_work() {
         translations: &[],
         scales: &[],
         notes: &[],
+        of_own_keys: false,
     };
     let clips: Vec<_> = loaded.clips.iter().map(sampled).enumerate().collect();
     let mut out = Vec::new();

@@ -76,6 +76,7 @@ impl Picked {
             translations: &self.translations,
             scales: &[],
             notes: &[],
+            of_own_keys: false,
         }
     }
 }

@@ -72,6 +72,7 @@ fn sampled_clips_come_back_bit_for_bit() {
         translations: &moved,
         scales: &scaled,
         notes: &[("method", "slerp".to_owned())],
+        of_own_keys: false,
     };
     for format in ["parquet", "arrow", "csv"] {
         let bytes = written(format, std::slice::from_ref(&sampled)).unwrap();
@@ -114,6 +115,7 @@ fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
             "slerp" => &NOTES[..1],
             _ => &NOTES[1..],
         },
+        of_own_keys: false,
     };
     let clips = [
         sampled(&motions[0], 2, "slerp"),
@@ -181,6 +183,7 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
         translations: &[],
         scales: &[],
         notes: &[],
+        of_own_keys: false,
     };
     for format in ["parquet", "arrow", "csv"] {
         let bytes = written(format, std::slice::from_ref(&sampled)).unwrap();

@@ -30,6 +30,7 @@ impl Clip {
             translations: &self.translations,
             scales: &self.scales,
             notes: &[],
+            of_own_keys: false,
         }
     }
 }

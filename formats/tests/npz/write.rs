@@ -59,6 +59,7 @@ fn our_layout_reads_back_as_written() {
         translations: &vectors,
         scales: &vectors,
         notes: &[("method", "slerp".to_owned()), ("names", "odd".to_owned())],
+        of_own_keys: false,
     };
     let mut bytes = Vec::new();
     let warnings = write_npz(
