@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 const DONE: u8 = 0;
 const USAGE: u8 = 2;
+/// What is read in a format that it is not in.
+const INPUT: u8 = 4;
 
 /// What is added to a command line to give one option, with what it needs to say anything. The values
 /// are such that they change the result.
@@ -110,7 +112,7 @@ impl Results {
         self.runs += 1;
         let result = match code {
             DONE => Some(std::fs::read(&out).expect("a result")),
-            USAGE => {
+            USAGE | INPUT => {
                 assert!(!out.exists(), "{line:?}: refused, and a result is there");
                 None
             }

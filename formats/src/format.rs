@@ -82,6 +82,8 @@ pub enum FormatOption {
     Order,
     /// [`MotionOptions::box_length`].
     BoxLength,
+    /// [`Sampled::of_own_keys`].
+    OwnKeys,
 }
 
 impl FormatOption {

@@ -28,6 +28,7 @@ pub mod parquet;
 pub mod path;
 pub mod poses;
 pub mod quaternion;
+pub mod reduce;
 pub mod sample;
 mod select;
 mod source;

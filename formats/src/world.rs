@@ -101,7 +101,7 @@ impl Accumulated {
 }
 
 /// All joints, each after the one that it hangs on.
-fn parents_first(clip: &Motion, joints: usize) -> Result<Vec<usize>, HierarchyError> {
+pub(crate) fn parents_first(clip: &Motion, joints: usize) -> Result<Vec<usize>, HierarchyError> {
     let parent = |joint: usize| clip.skeleton.get(joint).and_then(|joint| joint.parent);
     let mut order = Vec::with_capacity(joints);
     let mut is_placed = vec![false; joints];

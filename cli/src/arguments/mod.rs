@@ -9,5 +9,6 @@ pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;
 pub(crate) mod time;
+pub(crate) mod tolerance;
 pub(crate) mod tracks;
 pub(crate) mod what;

@@ -10,6 +10,7 @@ use tumble_formats::{Format, Loaded};
 use crate::arguments::gather::Gathered;
 use crate::arguments::input::{Inputs, clip_name, name, several, tell_warnings};
 use crate::batch::output::{self, Plan, Target, Wish};
+use crate::batch::place::Place;
 use crate::batch::run::{Batch, Done, Evaluated};
 use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
 use crate::messages::progress::busy;
@@ -32,9 +33,15 @@ pub(crate) struct Results {
 }
 
 impl Results {
-    /// Whether existing files are replaced.
-    pub(crate) fn overwrites(&self) -> bool {
-        self.overwrite
+    /// Where a picture goes that is drawn beside the result of one input.
+    pub(crate) fn picture(&self, file: &Path, inputs: &Gathered) -> Result<Option<Place>, Failure> {
+        let inputs = inputs.paths();
+        if inputs.len() > 1 {
+            return Err(Failure::usage("--plot is of one input"));
+        }
+        let place = Place::new(file, self.overwrite, &inputs)?;
+        place.try_out()?;
+        Ok(Some(place))
     }
 
     /// Where each input's result goes. Everything that can be refused is refused here, before any

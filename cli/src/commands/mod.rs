@@ -15,6 +15,7 @@ pub(crate) mod methods;
 pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
+pub(crate) mod reduce;
 pub(crate) mod render;
 pub(crate) mod route;
 pub(crate) mod smooth;
@@ -42,6 +43,7 @@ pub(crate) enum Command {
     View(Box<view::Arguments>),
     Render(Box<render::Arguments>),
     Smooth(Box<smooth::Arguments>),
+    Reduce(Box<reduce::Arguments>),
     Bench(bench::Arguments),
     Check(check::Arguments),
     Explain(explain::Arguments),
@@ -67,6 +69,7 @@ impl Command {
             Self::View(arguments) => view::run(&arguments),
             Self::Render(arguments) => render::run(&arguments),
             Self::Smooth(arguments) => smooth::run(&arguments),
+            Self::Reduce(arguments) => reduce::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),

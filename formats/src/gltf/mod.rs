@@ -51,7 +51,11 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write_new::write_new),
     many_clips: true,
-    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::OwnKeys,
+    ],
 };
 
 /// The longest GLB: its header says the length in 32 bits.

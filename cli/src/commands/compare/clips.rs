@@ -170,7 +170,7 @@ impl Comparison<'_> {
         if let Some(frames) = (self.frames)(start, end) {
             return Ok(frames);
         }
-        let mut times: Vec<f64> = clips.iter().flat_map(|clip| key_times(clip)).collect();
+        let mut times: Vec<f64> = clips.iter().flat_map(|clip| clip.key_times()).collect();
         times.retain(|time| (start..=end).contains(time));
         times.extend([start, end]);
         times.sort_by(f64::total_cmp);
@@ -204,27 +204,6 @@ impl Comparison<'_> {
         }
         Ok(samples)
     }
-}
-
-/// The times of all keys of a clip.
-fn key_times(clip: &Motion) -> Vec<f64> {
-    let set = &clip.set;
-    let mut times: Vec<f64> = Vec::new();
-    let mut last: Option<&[f64]> = None;
-    for track in 0..set.track_count() {
-        let channels = [Channel::Translation, Channel::Scale];
-        let vectors = channels.map(|channel| set.vector_keys(channel, track));
-        let own = set.get(track).map(|track| track.times);
-        let lists = own.into_iter();
-        for list in lists.chain(vectors.into_iter().flatten().map(|keys| keys.times)) {
-            // Tracks mostly share their times.
-            if last != Some(list) {
-                times.extend_from_slice(list);
-                last = Some(list);
-            }
-        }
-    }
-    times
 }
 
 /// The tracks that belong together, and the names of those that only one clip has: by their names,

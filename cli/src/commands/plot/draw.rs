@@ -1,6 +1,6 @@
 //! Draws a figure as SVG or PNG.
 
-use std::io;
+use std::io::{self, Write};
 
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -8,9 +8,11 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use resvg::{tiny_skia, usvg};
 
+use crate::batch::place::Place;
 use crate::commands::picture;
 use crate::commands::plot::figure::{Axes, Axis, Entry, Figure, Mark, Panel};
 use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};
+use crate::messages::exit::Failure;
 
 type Area<'a, DB> = DrawingArea<DB, Shift>;
 type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -22,6 +24,22 @@ const PIXELS: u32 = 2;
 /// Units of an SVG's drawing for one of its pixels: plotters knows whole ones only.
 const FINER: u32 = 10;
 const MARGIN: f64 = 16.0;
+
+/// Draws into a file, which ends in .svg or .png.
+pub(crate) fn write(figure: &Figure, place: &Place) -> Result<(), Failure> {
+    let name = place.to_string();
+    let extension = place.path().extension().unwrap_or_default();
+    let drawn = match extension.to_string_lossy().to_lowercase().as_str() {
+        "svg" => svg(figure).map(String::into_bytes),
+        "png" => png(figure),
+        _ => {
+            let message = format!("{name}: end the picture in .svg or .png");
+            return Err(Failure::usage(message));
+        }
+    };
+    let bytes = drawn.map_err(|error| Failure::writing(&name, &error))?;
+    place.write(None, |out| out.write_all(&bytes))
+}
 
 /// A figure as the text of an SVG file.
 pub(crate) fn svg(figure: &Figure) -> io::Result<String> {

@@ -16,12 +16,11 @@ use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
 
 use crate::arguments::device::{DeviceArguments, Opened};
-use crate::arguments::gather::Gathered;
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::results::{Results, each_file};
 use crate::batch::output::Target;
-use crate::batch::place::{Place, Written};
+use crate::batch::place::Written;
 use crate::batch::room;
 use crate::batch::run::Evaluated;
 use crate::commands::smooth::picture::Subject;
@@ -93,7 +92,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Failure::usage(error.to_string()))?;
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
-    let plot = arguments.plot(&files)?;
+    let plot = match &arguments.plot {
+        Some(file) => arguments.results.picture(file, &files)?,
+        None => None,
+    };
     let mut device = arguments.device.open()?;
     let options = format!("smooth {}", arguments.given.options());
     arguments.results.make(
@@ -155,22 +157,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             each_file(&input::name(path), (path, loaded), target, done, &mut make)
         },
     )
-}
-
-impl Arguments {
-    /// Where a picture goes; it is of one input.
-    fn plot(&self, files: &Gathered) -> Result<Option<Place>, Failure> {
-        let Some(file) = &self.plot else {
-            return Ok(None);
-        };
-        let inputs = files.paths();
-        if inputs.len() > 1 {
-            return Err(Failure::usage("--plot is of one input"));
-        }
-        let place = Place::new(file, self.results.overwrites(), &inputs)?;
-        place.try_out()?;
-        Ok(Some(place))
-    }
 }
 
 /// A clip's samples as they were and smoothed, and the rate that they are frames of.

@@ -1,7 +1,5 @@
 //! Samples before and after smoothing: how fast the joint turns and moves that had the most noise.
 
-use std::io::Write;
-
 use glam::{Quat, Vec3};
 use tumble_formats::sample::Samples;
 
@@ -33,19 +31,7 @@ pub(super) struct Subject<'a> {
 
 /// Draws into a file, which ends in .svg or .png.
 pub(super) fn draw(subject: &Subject<'_>, place: &Place) -> Result<(), Failure> {
-    let name = place.to_string();
-    let figure = figure(subject);
-    let extension = place.path().extension().unwrap_or_default();
-    let drawn = match extension.to_string_lossy().to_lowercase().as_str() {
-        "svg" => draw::svg(&figure).map(String::into_bytes),
-        "png" => draw::png(&figure),
-        _ => {
-            let message = format!("{name}: end the picture in .svg or .png");
-            return Err(Failure::usage(message));
-        }
-    };
-    let bytes = drawn.map_err(|error| Failure::writing(&name, &error))?;
-    place.write(None, |out| out.write_all(&bytes))
+    draw::write(&figure(subject), place)
 }
 
 fn figure(subject: &Subject<'_>) -> Figure {

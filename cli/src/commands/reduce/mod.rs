@@ -1,0 +1,354 @@
+//! `tumble reduce`: motion with few keys.
+
+mod picture;
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use tumble::reduce::ReducedCurve;
+use tumble::{Device, Engine, FrameRate, Frames, Interpolation, Method};
+use tumble_formats::Loaded;
+use tumble_formats::format::{FormatOption, MotionOptions};
+use tumble_formats::keyed::keyed;
+use tumble_formats::motion::{Motion, Sampled, Sampler};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
+use tumble_formats::sample::{ChannelMethods, Samples};
+
+use crate::arguments::given::Given;
+use crate::arguments::input::{self, Inputs};
+use crate::arguments::results::{Results, each_file};
+use crate::arguments::tolerance::{degrees, not_negative};
+use crate::batch::output::Target;
+use crate::batch::place::{Place, Written};
+use crate::batch::room;
+use crate::batch::run::Evaluated;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+/// Take keys out of motion: the fewest whose curves stay near all samples
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The keys of the input are the samples (or the frames of --fps). At each of them every joint stays
+within the angle of --tolerance and the distance of --distance: in the world where the input has a
+skeleton, else each track for itself. That it does is found by evaluating the keys that stay. glTF
+holds keys of each joint at times of their own; other formats hold all joints at the same times, so
+that they take tracks whose keys do not differ in time. A GLB or glTF that is written as one keeps
+all else that it holds.
+
+Examples:
+  tumble reduce walk.bvh --tolerance 0.1deg -o walk.glb
+  tumble reduce dance.glb --tolerance 0.05deg --distance 0.001 --shell 0.1 -o small.glb
+  tumble reduce walk.bvh --curve cubic -o walk.glb --plot errors.svg
+  tumble reduce takes -o small --to glb --resume")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    given: Given,
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    results: Results,
+    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit
+    #[arg(long, value_name = "ANGLE", default_value = "0.1deg", value_parser = degrees, allow_hyphen_values = true)]
+    tolerance: f64,
+    /// The largest distance, in the input's unit of length [default: what the angle amounts to at the
+    /// end of the longest chain of joints]
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
+    distance: Option<f64>,
+    /// Points so far from each joint, along its axes, stay within the distance too: the skin about the
+    /// joints
+    #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
+    shell: f64,
+    /// The curve that joins the keys
+    #[arg(long, value_name = "CURVE", default_value = "linear")]
+    curve: CurveArgument,
+    /// Sample at this rate first [default: the keys are the samples]
+    #[arg(long, value_name = "FPS")]
+    fps: Option<FrameRate>,
+    /// Also draw, as .svg or .png, how far the joints are away over time; of one input
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Print JSON about the results on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CurveArgument {
+    /// arcs (slerp) and straight lines
+    Linear,
+    /// bessel-overhauser, which glTF does not have
+    BesselOverhauser,
+    /// glTF's cubics
+    Cubic,
+}
+
+impl CurveArgument {
+    fn curve(self) -> ReducedCurve {
+        match self {
+            Self::Linear => ReducedCurve::Linear,
+            Self::BesselOverhauser => ReducedCurve::BesselOverhauser,
+            Self::Cubic => ReducedCurve::GltfCubic,
+        }
+    }
+}
+
+/// What is told of one clip.
+#[derive(Debug, Clone, Serialize)]
+struct Told {
+    /// The input, and its animation where it has several.
+    input: String,
+    output: String,
+    keys_before: usize,
+    keys_after: usize,
+    samples: usize,
+    /// Degrees.
+    angle: Worst,
+    /// In the input's unit of length.
+    distance: Worst,
+    seconds: f64,
+}
+
+/// The largest error of a kind.
+#[derive(Debug, Clone, Serialize)]
+struct Worst {
+    largest: f64,
+    bound: f64,
+    track: String,
+    /// Seconds.
+    time: f64,
+}
+
+impl Worst {
+    fn of(reduced: &Reduced, kind: usize, factor: f64) -> Self {
+        let (joint, sample) = reduced.worst[kind];
+        Self {
+            largest: reduced.errors.get(sample).map_or(0.0, |own| own[kind]) * factor,
+            bound: reduced.bounds[kind] * factor,
+            track: reduced.clip.set.track_name(joint),
+            time: reduced.times.get(sample).copied().unwrap_or(0.0),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let files = arguments.inputs.gather(false)?;
+    let plan = arguments.results.plan(&files)?;
+    let plot = match &arguments.plot {
+        Some(file) => arguments.results.picture(file, &files)?,
+        None => None,
+    };
+    let format = plan.targets.first().map(Target::format);
+    let is_bessel = matches!(arguments.curve, CurveArgument::BesselOverhauser);
+    if is_bessel && format.is_some_and(|format| format.takes(FormatOption::OwnKeys)) {
+        return Err(Failure::usage(
+            "glTF has no bessel-overhauser; choose --curve linear or cubic, or write .npz",
+        ));
+    }
+    let engine =
+        Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
+    let options = format!("reduce {}", arguments.given.options());
+    let mut all = Vec::new();
+    let outcome = arguments.results.make(
+        &arguments.inputs,
+        &files,
+        plan,
+        options,
+        |path, loaded, target, done| {
+            let name = input::name(path);
+            let mut make = |name: &str, clips: &[&Motion], target: &Target| {
+                let one = (path, loaded);
+                let (evaluated, told) =
+                    arguments.make(&engine, one, (name, clips), target, plot.as_ref())?;
+                all.extend(told);
+                Ok(evaluated)
+            };
+            each_file(&name, (path, loaded), target, done, &mut make)
+        },
+    );
+    if arguments.json {
+        words::json(&all)?;
+    }
+    outcome
+}
+
+impl Arguments {
+    /// Reduces clips and writes them into one file.
+    fn make(
+        &self,
+        engine: &Engine,
+        (path, loaded): (&Path, &Loaded),
+        (name, clips): (&str, &[&Motion]),
+        target: &Target,
+        plot: Option<&Place>,
+    ) -> Result<(Evaluated, Vec<Told>), Failure> {
+        let started = Instant::now();
+        let own = |clip: &&Motion| match clips.len() {
+            1 => name.to_owned(),
+            _ => format!("{name} {}", input::clip_name(clip)),
+        };
+        let names: Vec<String> = clips.iter().map(own).collect();
+        let mut all = Vec::new();
+        for (clip, name) in clips.iter().zip(&names) {
+            all.push(self.reduced(engine, name, clip)?);
+        }
+        if let (Some(place), [reduced]) = (plot, &*all) {
+            picture::draw(&input::file_name(path), reduced, place)?;
+        }
+        let written = self.write(engine, (name, clips), &all, loaded, target)?;
+        let mut told = Vec::new();
+        let mut lines = Vec::new();
+        for (reduced, input) in all.iter().zip(names) {
+            let own = Told {
+                input,
+                output: target.to_string(),
+                keys_before: reduced.keys[0],
+                keys_after: reduced.keys[1],
+                samples: reduced.times.len(),
+                angle: Worst::of(reduced, 0, 1f64.to_degrees()),
+                distance: Worst::of(reduced, 1, 1.0),
+                seconds: started.elapsed().as_secs_f64(),
+            };
+            lines.push(own.line(reduced));
+            told.push(own);
+        }
+        let spent = words::duration(started.elapsed());
+        let evaluated = Evaluated {
+            written,
+            device: engine.device_name().to_owned(),
+            told: format!("{} in {spent} → {target}", lines.join("; ")),
+        };
+        Ok((evaluated, told))
+    }
+
+    fn reduced(&self, engine: &Engine, name: &str, clip: &Motion) -> Result<Reduced, Failure> {
+        let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
+        let failed = |error: ReduceMotionError| match error {
+            ReduceMotionError::Evaluating(error) => Failure::evaluating(name, &error),
+            error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
+        };
+        let clip = match self.fps {
+            Some(rate) => {
+                let frames = Frames::rate(rate);
+                room::in_memory(name, &clip.set, &frames, 7)?;
+                let sampled = clip.sampled(engine, &frames);
+                Cow::Owned(sampled.map_err(|error| Failure::evaluating(name, &error))?)
+            }
+            None if is_cubic(&clip) => {
+                return Err(Failure::usage(format!(
+                    "{name}: its keys are joined by cubics with tangents, so they are not its \
+                     samples; give --fps"
+                )));
+            }
+            None => clip,
+        };
+        let times = Frames::at(clip.key_times());
+        // The samples and the poses, of the input and of what becomes of it.
+        room::in_memory(name, &clip.set, &times, 14)?;
+        let options = ReduceOptions {
+            curve: self.curve.curve(),
+            angle: self.tolerance.to_radians(),
+            distance: self.distance,
+            shell: self.shell,
+        };
+        reduce(&clip, engine, &options).map_err(failed)
+    }
+
+    /// Writes reduced clips: into the input's own file where that is of the same format, else into a
+    /// new one.
+    fn write(
+        &self,
+        engine: &Engine,
+        (name, clips): (&str, &[&Motion]),
+        reduced: &[Reduced],
+        loaded: &Loaded,
+        target: &Target,
+    ) -> Result<Written, Failure> {
+        let format = target.format();
+        let has_own_keys = format.takes(FormatOption::OwnKeys);
+        let mut samples = Vec::new();
+        for reduced in reduced {
+            samples.push(match has_own_keys && !reduced.clip.is_world {
+                true => ends(engine, name, &reduced.clip)?,
+                false => keyed(&reduced.clip).map_err(|error| {
+                    let message = format!("{name}: {error}; or write .glb, which holds them");
+                    Failure::new(ALL_INPUTS, message)
+                })?,
+            });
+        }
+        let notes = [
+            ("input", name.to_owned()),
+            ("tolerance", format!("{}°", self.tolerance)),
+        ];
+        let own = reduced.iter().zip(&samples);
+        let sampled: Vec<Sampled<'_>> = own
+            .map(|(reduced, samples)| Sampled {
+                of_own_keys: has_own_keys,
+                ..samples.of(&reduced.clip, None, &notes)
+            })
+            .collect();
+        let options = MotionOptions {
+            box_length: loaded.box_length,
+            ..target.motion_options()
+        };
+        let document = loaded.document.as_ref();
+        let document = document
+            .filter(|document| document.writes(format) && has_own_keys)
+            .filter(|_| !self.inputs.tracks.is_given());
+        let Some(write) = format.write_motion else {
+            let message = format!("{target}: {} holds results, not keys", format.name);
+            return Err(Failure::usage(message));
+        };
+        target.write_motion(|out| match document {
+            Some(document) => {
+                let places = clips.iter().map(|clip| clip.place);
+                let clips: Vec<_> = places.zip(sampled.iter().cloned()).collect();
+                document.write(&clips, &options, target.path(), out)
+            }
+            None => write(&sampled, &options, out),
+        })
+    }
+}
+
+impl Told {
+    fn line(&self, reduced: &Reduced) -> String {
+        format!(
+            "{}: {} → {} keys ({:.1} times fewer), at most {:.4}° ({}, {:.3} s) and {:.3e} ({}, {:.3} \
+             s) from {}",
+            self.input,
+            self.keys_before,
+            self.keys_after,
+            self.keys_before as f64 / self.keys_after.max(1) as f64,
+            self.angle.largest,
+            self.angle.track,
+            self.angle.time,
+            self.distance.largest,
+            self.distance.track,
+            self.distance.time,
+            words::count(reduced.times.len(), "sample")
+        )
+    }
+}
+
+fn is_cubic(clip: &Motion) -> bool {
+    let has = |own: &tumble_formats::motion::Channels| {
+        [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Cubic))
+    };
+    clip.channels.iter().any(has)
+}
+
+/// The samples at a clip's first and last time: its own keys are written in their place.
+fn ends(engine: &Engine, name: &str, clip: &Motion) -> Result<Samples, Failure> {
+    let (first, last) = clip.set.time_span().unwrap_or_default();
+    let mut times = vec![first, last];
+    times.dedup();
+    let methods = ChannelMethods {
+        method: None,
+        with: &|method: Method| Interpolation::from(method),
+    };
+    methods
+        .sample(engine, clip, &Frames::at(times))
+        .map_err(|error| Failure::evaluating(name, &error))
+}

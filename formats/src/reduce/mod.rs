@@ -1,0 +1,316 @@
+//! Clips with few keys, whose poses stay near those of dense samples: at every sample each joint is
+//! within an angle and a distance, in the world where the clip has a skeleton.
+//!
+//! Joints are reduced from the root on. What a joint is to be is told relative to its parent as that
+//! has become, so that angles do not add up along a chain. Distances do: where one is beyond its bound,
+//! the tolerances of the joints above it shrink, and all is done again. Whether the bounds hold is found
+//! by evaluating the keys as `eval` does.
+
+mod keys;
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use tumble::reduce::{ReduceError, ReducedCurve};
+use tumble::{Channel, Engine, Error, Frames, Interpolation, Method, TrackError};
+
+use crate::motion::Motion;
+use crate::sample::{ChannelMethods, Samples};
+use crate::world::{HierarchyError, WorldPose, parents_first, world};
+
+/// How near the reduced clip stays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReduceOptions {
+    /// The curve that joins the keys.
+    pub curve: ReducedCurve,
+    /// The largest angle, radians.
+    pub angle: f64,
+    /// The largest distance [default: what the angle amounts to at the end of the longest chain of
+    /// joints, at least of length 1].
+    pub distance: Option<f64>,
+    /// Points so far from each joint, along its axes, stay within the distance too.
+    pub shell: f64,
+}
+
+/// A reduced clip, and how far it is from the samples.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Reduced {
+    /// The clip with few keys.
+    pub clip: Motion,
+    /// Keys of all channels before and after.
+    pub keys: [usize; 2],
+    /// The times of the samples, seconds.
+    pub times: Vec<f64>,
+    /// The bounds: radians, and a length.
+    pub bounds: [f64; 2],
+    /// At each sample the largest angle and the largest distance of all joints.
+    pub errors: Vec<[f64; 2]>,
+    /// Of both the largest: its joint and its sample.
+    pub worst: [(usize, usize); 2],
+}
+
+/// Why a clip cannot be reduced.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReduceMotionError {
+    /// The samples were not evaluated.
+    #[error(transparent)]
+    Evaluating(#[from] Error),
+    /// The options or the samples.
+    #[error(transparent)]
+    Reducing(#[from] ReduceError),
+    /// The joints make no hierarchy.
+    #[error(transparent)]
+    Hierarchy(#[from] HierarchyError),
+    /// The clip refused its keys.
+    #[error(transparent)]
+    Keys(#[from] TrackError),
+    /// A bound is less than what f32 holds.
+    #[error(
+        "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \
+         f32: give a larger one"
+    )]
+    TooSmall {
+        /// The largest that was found.
+        found: f64,
+        /// What was asked for.
+        bound: f64,
+        /// `rad`, or `of the file's unit of length`.
+        unit: &'static str,
+    },
+}
+
+/// How often tolerances shrink; each time to nine tenths of what would have been enough, or less.
+const ROUNDS: usize = 60;
+
+/// Takes keys out of a clip.
+///
+/// # Errors
+/// When a bound is no number from 0, or less than f32 holds; when the joints make no hierarchy.
+pub fn reduce(
+    clip: &Motion,
+    engine: &Engine,
+    options: &ReduceOptions,
+) -> Result<Reduced, ReduceMotionError> {
+    for tolerance in [Some(options.angle), options.distance, Some(options.shell)] {
+        if let Some(tolerance) = tolerance.filter(|own| !(own.is_finite() && *own >= 0.0)) {
+            return Err(ReduceError::Tolerance { tolerance }.into());
+        }
+    }
+    let reduction = Reduction::new(clip, engine, options)?;
+    let joints = clip.set.track_count();
+    let mut tolerances = Tolerances {
+        angles: vec![options.angle; joints],
+        distances: vec![reduction.distance; joints],
+    };
+    let mut round = 0;
+    loop {
+        let reduced = reduction.attempt(&tolerances)?;
+        let found = reduction.measure(&reduced)?;
+        if !reduction.tighten(&found, &mut tolerances) {
+            return Ok(found.into_reduced(&reduction, reduced));
+        }
+        round += 1;
+        if round == ROUNDS {
+            return Err(found.too_small(&reduction));
+        }
+    }
+}
+
+/// How far the curve of each joint may be from what it is to be.
+struct Tolerances {
+    angles: Vec<f64>,
+    /// Of translations.
+    distances: Vec<f64>,
+}
+
+/// A clip and its samples.
+struct Reduction<'a> {
+    clip: &'a Motion,
+    engine: &'a Engine,
+    options: &'a ReduceOptions,
+    /// The bound of distances.
+    distance: f64,
+    times: Vec<f64>,
+    samples: Samples,
+    poses: Vec<WorldPose>,
+    /// The joints, each after its parent.
+    order: Vec<usize>,
+    parents: Vec<Option<usize>>,
+}
+
+/// How far each joint of a reduced clip is away at most, and each sample.
+struct Measured {
+    /// By joint: angle and distance.
+    joints: Vec<[f64; 2]>,
+    /// By sample.
+    samples: Vec<[f64; 2]>,
+    worst: [(usize, usize); 2],
+}
+
+impl<'a> Reduction<'a> {
+    fn new(
+        clip: &'a Motion,
+        engine: &'a Engine,
+        options: &'a ReduceOptions,
+    ) -> Result<Self, ReduceMotionError> {
+        let times = clip.key_times();
+        let samples = methods().sample(engine, clip, &Frames::at(times.clone()))?;
+        let joints = clip.set.track_count();
+        // Where poses in the world cannot be told, each track is what it is relative to its parent.
+        let hangs = clip.no_world.is_none() && !clip.is_world;
+        let parents: Vec<Option<usize>> = (0..joints)
+            .map(|joint| clip.skeleton.get(joint)?.parent.filter(|_| hangs))
+            .collect();
+        let poses = poses(clip, &samples)?;
+        let order = match hangs {
+            true => parents_first(clip, joints)?,
+            false => (0..joints).collect(),
+        };
+        let mut reduction = Self {
+            clip,
+            engine,
+            options,
+            distance: 0.0,
+            times,
+            samples,
+            poses,
+            order,
+            parents,
+        };
+        let reach = reduction.reach().max(1.0) + options.shell;
+        reduction.distance = options.distance.unwrap_or(options.angle.min(PI) * reach);
+        Ok(reduction)
+    }
+
+    /// The length of the longest chain of joints from a root, at rest or at the first sample.
+    fn reach(&self) -> f64 {
+        let mut lengths = vec![0.0f64; self.parents.len()];
+        for &joint in &self.order {
+            if let Some(parent) = self.parents[joint] {
+                let own = self.samples.translations.get(joint).copied();
+                let own = own.unwrap_or_else(|| self.clip.rest(Channel::Translation, joint));
+                lengths[joint] = lengths[parent] + f64::from(own.length());
+            }
+        }
+        lengths.into_iter().fold(0.0, f64::max)
+    }
+
+    /// How far a clip is from the samples, as `eval` evaluates it.
+    fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
+        let frames = Frames::at(self.times.clone());
+        let samples = methods().sample(self.engine, reduced, &frames)?;
+        let poses = poses(reduced, &samples)?;
+        let joints = self.parents.len();
+        let mut measured = Measured {
+            joints: vec![[0.0; 2]; joints],
+            samples: vec![[0.0; 2]; self.times.len()],
+            worst: [(0, 0); 2],
+        };
+        let mut largest = [-1.0; 2];
+        for (place, (wanted, found)) in self.poses.iter().zip(&poses).enumerate() {
+            let (sample, joint) = (place / joints, place % joints);
+            let [a, b] = [wanted, found].map(|pose| pose.rotation.as_dquat());
+            let step = a.conjugate() * b;
+            let angle = 2.0 * step.xyz().length().atan2(step.w.abs());
+            let moved = found.position.as_dvec3() - wanted.position.as_dvec3();
+            let mut distance = moved.length();
+            if self.options.shell > 0.0 {
+                for axis in DVec3::AXES.map(|axis| axis * self.options.shell) {
+                    for point in [axis, -axis] {
+                        distance = distance.max((moved + (b * point - a * point)).length());
+                    }
+                }
+            }
+            for (kind, error) in [angle, distance].into_iter().enumerate() {
+                let error = if error.is_nan() { f64::INFINITY } else { error };
+                let joints = &mut measured.joints[joint][kind];
+                *joints = joints.max(error);
+                let samples = &mut measured.samples[sample][kind];
+                *samples = samples.max(error);
+                if error > largest[kind] {
+                    (largest[kind], measured.worst[kind]) = (error, (joint, sample));
+                }
+            }
+        }
+        Ok(measured)
+    }
+
+    /// Shrinks the tolerances where bounds do not hold; whether any does not.
+    fn tighten(&self, found: &Measured, tolerances: &mut Tolerances) -> bool {
+        let mut factors = vec![1.0f64; self.parents.len()];
+        for (joint, &[angle, distance]) in found.joints.iter().enumerate() {
+            // To what would have been enough, and a little less; never to next to nothing at once.
+            let part = |bound: f64, error: f64| (0.95 * bound / error).clamp(0.3, 0.95);
+            if angle > self.options.angle {
+                factors[joint] = factors[joint].min(part(self.options.angle, angle));
+            }
+            if distance > self.distance {
+                let part = part(self.distance, distance);
+                let mut above = Some(joint);
+                while let Some(own) = above {
+                    factors[own] = factors[own].min(part);
+                    above = self.parents[own];
+                }
+            }
+        }
+        for (joint, &factor) in factors.iter().enumerate() {
+            tolerances.angles[joint] *= factor;
+            tolerances.distances[joint] *= factor;
+        }
+        factors.iter().any(|&factor| factor < 1.0)
+    }
+}
+
+impl Measured {
+    fn into_reduced(self, reduction: &Reduction<'_>, clip: Motion) -> Reduced {
+        Reduced {
+            keys: [reduction.clip, &clip].map(Motion::key_count),
+            clip,
+            times: reduction.times.clone(),
+            bounds: [reduction.options.angle, reduction.distance],
+            errors: self.samples,
+            worst: self.worst,
+        }
+    }
+
+    fn too_small(&self, reduction: &Reduction<'_>) -> ReduceMotionError {
+        let largest = |kind: usize| self.joints.iter().map(|own| own[kind]).fold(0.0, f64::max);
+        let bound = reduction.options.angle;
+        match largest(0) > bound {
+            true => ReduceMotionError::TooSmall {
+                found: largest(0),
+                bound,
+                unit: "rad",
+            },
+            false => ReduceMotionError::TooSmall {
+                found: largest(1),
+                bound: reduction.distance,
+                unit: "of the file's unit of length",
+            },
+        }
+    }
+}
+
+/// Poses in the world, or relative to the parents where those cannot be told.
+fn poses(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
+    if clip.no_world.is_none() {
+        return world(clip, samples);
+    }
+    let each = samples.rotations.iter().enumerate();
+    Ok(each
+        .map(|(place, &rotation)| WorldPose {
+            position: samples.translations.get(place).copied().unwrap_or_default(),
+            rotation,
+        })
+        .collect())
+}
+
+/// Every channel as its sampler says.
+fn methods() -> ChannelMethods<'static> {
+    ChannelMethods {
+        method: None,
+        with: &|method: Method| Interpolation::from(method),
+    }
+}
