@@ -53,6 +53,7 @@ fn outcome(read: Result<Loaded, Diagnostic>) -> u64 {
         translations: &[],
         scales: &[],
         notes: &[],
+        of_own_keys: false,
     };
     let mut written = Vec::new();
     write_npz(&[sampled], &MotionOptions::default(), &mut written).expect("memory takes it");

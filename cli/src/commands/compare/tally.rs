@@ -55,7 +55,9 @@ mod tests {
     #[test]
     fn the_first_of_the_largest_is_named() {
         let mut tally = Tally::default();
-        [1.0, 3.0, 0.0, 3.0, 1.0].map(|value| tally.add(value));
+        for value in [1.0, 3.0, 0.0, 3.0, 1.0] {
+            tally.add(value);
+        }
         let spread = tally.times(10.0);
         assert_eq!(
             (spread.mean, spread.largest, spread.rms, tally.place),
