@@ -14,6 +14,7 @@ mod motion;
 mod original;
 mod outside;
 mod poses;
+mod reduce;
 mod speed;
 mod spirv;
 mod stream;

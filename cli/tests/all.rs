@@ -15,6 +15,7 @@ mod json;
 mod motion;
 mod peers;
 mod plot;
+mod reduce;
 mod render;
 mod route;
 mod travel;

@@ -62,13 +62,22 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
 /// tracks.
 ///
 /// # Errors
-/// When there are not three numbers for each joint of the clip, which is then unchanged.
+/// When there are not three numbers for each joint of the clip, or joints besides roots have translations
+/// of their own; the clip is then unchanged.
 pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsError> {
     let joints = clip.skeleton.len();
     let (offsets, rest) = numbers.as_chunks::<3>();
     if joints == 0 || offsets.len() != joints || !rest.is_empty() {
         let numbers = numbers.len();
-        return Err(OffsetsError { numbers, joints });
+        return Err(OffsetsError::Numbers { numbers, joints });
+    }
+    let moves = |joint: &usize| {
+        let hangs = clip.skeleton[*joint].parent.is_some();
+        hangs && clip.set.vector_keys(Channel::Translation, *joint).is_some()
+    };
+    if let Some(joint) = (0..joints).find(moves) {
+        let name = clip.set.track_name(joint);
+        return Err(OffsetsError::Moved { joint, name });
     }
     for (joint, &[x, y, z]) in clip.skeleton.iter_mut().zip(offsets) {
         joint.rest.translation = DVec3::new(x, y, z).as_vec3();
@@ -79,12 +88,24 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
 
 /// Why a skeleton's joints cannot be placed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{numbers} numbers of offsets for {joints} joints; three are wanted for each, x y z")]
-pub struct OffsetsError {
-    /// How many numbers there are.
-    pub numbers: usize,
-    /// How many joints the clip has.
-    pub joints: usize,
+#[non_exhaustive]
+pub enum OffsetsError {
+    /// Every joint has three.
+    #[error("{numbers} numbers of offsets for {joints} joints; three are wanted for each, x y z")]
+    Numbers {
+        /// How many numbers there are.
+        numbers: usize,
+        /// How many joints the clip has.
+        joints: usize,
+    },
+    /// Translations say where a joint is.
+    #[error("joint {joint} (`{name}`) has translations of its own, which say where it is")]
+    Moved {
+        /// The first such joint, from 0.
+        joint: usize,
+        /// Its name.
+        name: String,
+    },
 }
 
 #[cfg(test)]

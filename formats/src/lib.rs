@@ -10,6 +10,7 @@ pub mod bvh;
 pub mod csv;
 pub mod dat;
 mod decimal;
+mod dense;
 pub mod diagnostic;
 pub mod format;
 pub mod generate;

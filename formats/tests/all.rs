@@ -13,6 +13,7 @@ mod gltf_times;
 mod gltf_values;
 mod npz;
 mod readme;
+mod reduce;
 mod support;
 mod table_options;
 #[cfg(feature = "parquet")]

@@ -177,7 +177,12 @@ impl Set<'_> {
             detail,
         };
         let stride = self.samples - 1 + 2 * radius;
-        let each = (limit / stride).max(1);
+        // Between rows that are smoothed at once the kernel runs over what lies beyond their ends too:
+        // more than the rows themselves where it is wider than they are long.
+        let each = match 2 * radius > self.samples {
+            true => 1,
+            false => (limit / stride).max(1),
+        };
         for first in (0..self.tracks).step_by(each) {
             let rows: Vec<Row<'_>> = (first..self.tracks.min(first + each))
                 .map(|track| self.row(track))

@@ -6,121 +6,102 @@ use glam::DVec4;
 use crate::reduce::value::Value;
 use crate::reduce::{ReducedKeys, Task};
 
-/// The search for the longest intervals.
-pub(crate) struct Intervals<'a, T> {
-    task: &'a Task<'a, T>,
-    is_cubic: bool,
+/// The places of the keys of intervals that are as long as possible: the farthest sample from each key
+/// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down
+/// between the two, so that each sample is looked at about `log n` times. A neighbour is always
+/// reached: there is no sample in between.
+pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+    let last = samples - 1;
+    let mut places = vec![0];
+    while let Some(&from) = places.last().filter(|&&from| from < last) {
+        let mut reached = from + 1;
+        let mut refused = last + 1;
+        let mut step = 2;
+        while reached < last {
+            let to = (from + step).min(last);
+            if !fits(from, to) {
+                refused = to;
+                break;
+            }
+            reached = to;
+            step *= 2;
+        }
+        while reached + 1 < refused {
+            let middle = usize::midpoint(reached, refused);
+            match fits(from, middle) {
+                true => reached = middle,
+                false => refused = middle,
+            }
+        }
+        places.push(reached);
+    }
+    places
 }
 
-/// An interval that is near to all samples within it.
-struct Found<T> {
-    to: usize,
-    error: f64,
-    /// The tangents at its start and its end, over the whole interval.
-    tangents: [T; 2],
-}
-
-impl<'a, T: Value> Intervals<'a, T> {
-    pub(crate) fn new(task: &'a Task<'a, T>, is_cubic: bool) -> Self {
-        Self { task, is_cubic }
+impl<T: Value> Task<'_, T> {
+    /// Whether all samples within an interval are near.
+    pub(crate) fn fits(&self, from: usize, to: usize, is_cubic: bool) -> bool {
+        self.error(from, to, is_cubic)
+            .is_some_and(|error| error <= self.tolerance)
     }
 
-    pub(crate) fn keys(&self) -> ReducedKeys<T> {
-        let Task { times, samples, .. } = *self.task;
-        let last = samples.len() - 1;
+    /// The keys at some places, with the tangents of cubics.
+    pub(crate) fn keys_at(&self, places: &[usize], is_cubic: bool) -> ReducedKeys<T> {
         let mut found = ReducedKeys {
-            places: vec![0],
-            keys: vec![samples[0]],
+            keys: places.iter().map(|&place| self.samples[place]).collect(),
             ..ReducedKeys::default()
         };
         let mut arriving = T::default();
-        while let Some(&from) = found.places.last().filter(|&&from| from < last) {
-            let interval = self.longest(from);
-            let seconds = times[interval.to] - times[from];
-            let [leaving, next] = interval
-                .tangents
-                .map(|tangent| T::of_numbers(tangent.numbers() / seconds));
-            found.tangents.push([arriving, leaving]);
-            arriving = next;
-            found.error = found.error.max(interval.error);
-            found.places.push(interval.to);
-            found.keys.push(samples[interval.to]);
+        for pair in places.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            let error = self.interval(from, to, is_cubic, f64::INFINITY);
+            found.error = found.error.max(error.unwrap_or(f64::INFINITY));
+            if is_cubic {
+                let seconds = self.times[to] - self.times[from];
+                let tangents = self.tangents(from, to);
+                let [leaving, next] = tangents.map(|own| T::of_numbers(own / seconds));
+                found.tangents.push([arriving, leaving]);
+                arriving = next;
+            }
         }
-        found.tangents.push([arriving, T::default()]);
-        if !self.is_cubic {
-            found.tangents.clear();
+        if is_cubic {
+            found.tangents.push([arriving, T::default()]);
         }
+        found.places = places.to_vec();
         found
     }
 
-    /// The longest interval from a sample. Its length is doubled until it is too far away, and then
-    /// halved down between the two.
-    fn longest(&self, from: usize) -> Found<T> {
-        let last = self.task.samples.len() - 1;
-        // A neighbour is always reached: there is no sample in between.
-        let mut best = self.interval(from, from + 1).unwrap_or(Found {
-            to: from + 1,
-            error: 0.0,
-            tangents: [T::default(); 2],
-        });
-        let mut step = 2;
-        let mut refused = last + 1;
-        while best.to < last {
-            let to = (from + step).min(last);
-            match self.interval(from, to) {
-                Some(found) => best = found,
-                None => {
-                    refused = to;
-                    break;
-                }
-            }
-            step *= 2;
-        }
-        while best.to + 1 < refused {
-            let middle = usize::midpoint(best.to, refused);
-            match self.interval(from, middle) {
-                Some(found) => best = found,
-                None => refused = middle,
-            }
-        }
-        best
+    fn error(&self, from: usize, to: usize, is_cubic: bool) -> Option<f64> {
+        self.interval(from, to, is_cubic, self.tolerance)
     }
 
-    fn interval(&self, from: usize, to: usize) -> Option<Found<T>> {
-        let Task {
-            times,
-            samples,
-            tolerance,
-        } = *self.task;
+    /// The largest distance of the samples within an interval; nothing where it is over `most`.
+    fn interval(&self, from: usize, to: usize, is_cubic: bool, most: f64) -> Option<f64> {
+        let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from], samples[to]);
         let part = |place: usize| (times[place] - times[from]) / (times[to] - times[from]);
-        let tangents = match self.is_cubic {
+        let tangents = match is_cubic {
             true => self.tangents(from, to),
             false => [DVec4::ZERO; 2],
         };
         let mut error = 0.0f64;
         for (place, &sample) in samples.iter().enumerate().take(to).skip(from + 1) {
-            let curve = match self.is_cubic {
+            let curve = match is_cubic {
                 true => {
                     let [a, b, c, d] = hermite(part(place));
-                    let numbers =
-                        start.numbers() * a + tangents[0] * b + end.numbers() * c + tangents[1] * d;
-                    T::nearest(numbers)
+                    let ends = start.numbers() * a + end.numbers() * c;
+                    T::nearest(ends + tangents[0] * b + tangents[1] * d)
                 }
                 false => start.towards(end, part(place)),
             };
             let apart = sample.apart(curve);
             // What is no number is not near.
-            if apart.is_nan() || apart > tolerance {
+            if apart.is_nan() || apart > most {
                 return None;
             }
             error = error.max(apart);
         }
-        Some(Found {
-            to,
-            error,
-            tangents: tangents.map(T::of_numbers),
-        })
+        Some(error)
     }
 
     /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their
@@ -128,7 +109,7 @@ impl<'a, T: Value> Intervals<'a, T> {
     fn tangents(&self, from: usize, to: usize) -> [DVec4; 2] {
         /// As a part of the weight of a sample.
         const STRAIGHT: f64 = 1e-6;
-        let Task { times, samples, .. } = *self.task;
+        let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from].numbers(), samples[to].numbers());
         let straight = end - start;
         let (mut aa, mut ab, mut bb) = (STRAIGHT, 0.0, STRAIGHT);

@@ -16,7 +16,7 @@ mod value;
 use glam::{DQuat, DVec3};
 
 use crate::reduce::inserted::inserted;
-use crate::reduce::intervals::Intervals;
+use crate::reduce::intervals::longest;
 use crate::reduce::value::Value;
 
 /// The curve that joins the keys that stay.
@@ -105,13 +105,7 @@ pub fn reduce_rotations(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<DQuat>, ReduceError> {
-    let mut own: Vec<DQuat> = samples.to_vec();
-    for place in 0..own.len() {
-        let unit = own[place].normalize();
-        let continues = place == 0 || own[place - 1].dot(unit) >= 0.0;
-        own[place] = if continues { unit } else { -unit };
-    }
-    reduced(times, &own, tolerance, curve)
+    reduced(times, &continued(samples), tolerance, curve)
 }
 
 /// As [`reduce_rotations`], for translations or scales; the tolerance is a distance.
@@ -127,11 +121,147 @@ pub fn reduce_vectors(
     reduced(times, samples, tolerance, curve)
 }
 
+/// Keys of several channels at the same times: every sample of each is within its tolerance. For files
+/// that hold all tracks at the same times.
+///
+/// # Errors
+/// As of [`reduce_rotations`].
+pub fn reduce_together(
+    times: &[f64],
+    rotations: &[(Vec<DQuat>, f64)],
+    vectors: &[(Vec<DVec3>, f64)],
+    curve: ReducedCurve,
+) -> Result<ReducedTogether, ReduceError> {
+    let turned: Vec<Vec<DQuat>> = rotations.iter().map(|own| continued(&own.0)).collect();
+    let tolerances = rotations.iter().map(|own| own.1);
+    let turning = turned.iter().zip(tolerances);
+    let turning: Vec<Task<'_, DQuat>> = turning
+        .map(|(samples, tolerance)| Task::new(times, samples, tolerance))
+        .collect::<Result<_, _>>()?;
+    let moving: Vec<Task<'_, DVec3>> = (vectors.iter())
+        .map(|(samples, tolerance)| Task::new(times, samples, *tolerance))
+        .collect::<Result<_, _>>()?;
+    if times.is_empty() {
+        return Ok(ReducedTogether::default());
+    }
+    let is_still = turning.iter().all(|task| task.still().is_some())
+        && moving.iter().all(|task| task.still().is_some());
+    let is_cubic = curve == ReducedCurve::GltfCubic;
+    let by_intervals = |is_cubic| {
+        longest(times.len(), |from, to| {
+            turning.iter().all(|task| task.fits(from, to, is_cubic))
+                && moving.iter().all(|task| task.fits(from, to, is_cubic))
+        })
+    };
+    let places = match curve {
+        _ if is_still => vec![0],
+        ReducedCurve::BesselOverhauser => {
+            inserted(times.len(), by_intervals(true), &|keys, intervals| {
+                let turning = turning
+                    .iter()
+                    .map(|task| task.worst_of_each(keys, intervals.clone()));
+                let moving = moving
+                    .iter()
+                    .map(|task| task.worst_of_each(keys, intervals.clone()));
+                let further = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
+                let all = turning.chain(moving);
+                let all =
+                    all.reduce(|a, b| a.into_iter().zip(b).map(|(a, b)| further(a, b)).collect());
+                all.unwrap_or_default()
+            })
+        }
+        _ => by_intervals(is_cubic),
+    };
+    Ok(ReducedTogether {
+        rotations: turning
+            .iter()
+            .map(|task| task.keys(&places, curve))
+            .collect(),
+        vectors: moving
+            .iter()
+            .map(|task| task.keys(&places, curve))
+            .collect(),
+    })
+}
+
+/// The keys of several channels, all at the same places.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct ReducedTogether {
+    /// Of each channel of rotations.
+    pub rotations: Vec<ReducedKeys<DQuat>>,
+    /// Of each channel of vectors.
+    pub vectors: Vec<ReducedKeys<DVec3>>,
+}
+
+/// Unit quaternions, each with the sign that continues the one before it.
+fn continued(samples: &[DQuat]) -> Vec<DQuat> {
+    let mut own: Vec<DQuat> = samples.to_vec();
+    for place in 0..own.len() {
+        let unit = own[place].normalize();
+        let continues = place == 0 || own[place - 1].dot(unit) >= 0.0;
+        own[place] = if continues { unit } else { -unit };
+    }
+    own
+}
+
 /// Samples that have been checked, and how near to them the curve has to be.
 pub(crate) struct Task<'a, T> {
     pub(crate) times: &'a [f64],
     pub(crate) samples: &'a [T],
     pub(crate) tolerance: f64,
+}
+
+impl<'a, T: Value> Task<'a, T> {
+    fn new(times: &'a [f64], samples: &'a [T], tolerance: f64) -> Result<Self, ReduceError> {
+        if samples.len() != times.len() {
+            return Err(ReduceError::Lengths {
+                samples: samples.len(),
+                times: times.len(),
+            });
+        }
+        if !(tolerance >= 0.0 && tolerance.is_finite()) {
+            return Err(ReduceError::Tolerance { tolerance });
+        }
+        if let Some(place) = samples.iter().position(|sample| !sample.is_finite()) {
+            return Err(ReduceError::Sample { place });
+        }
+        let increases = |place: usize| place == 0 || times[place - 1] < times[place];
+        if let Some(place) = (0..times.len()).find(|&i| !(times[i].is_finite() && increases(i))) {
+            let time = times[place];
+            return Err(ReduceError::Time { place, time });
+        }
+        Ok(Self {
+            times,
+            samples,
+            tolerance,
+        })
+    }
+
+    /// How far the samples are from the first one, if that is near to all.
+    fn still(&self) -> Option<f64> {
+        let first = *self.samples.first()?;
+        let apart = self.samples.iter().map(|own| own.apart(first));
+        let farthest = apart.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+        (farthest <= self.tolerance).then_some(farthest)
+    }
+
+    fn keys(&self, places: &[usize], curve: ReducedCurve) -> ReducedKeys<T> {
+        match curve {
+            _ if places.len() < 2 => ReducedKeys {
+                places: places.to_vec(),
+                keys: places.iter().map(|&place| self.samples[place]).collect(),
+                tangents: match curve {
+                    ReducedCurve::GltfCubic => vec![[T::default(); 2]; places.len()],
+                    _ => Vec::new(),
+                },
+                error: self.still().unwrap_or(f64::INFINITY),
+            },
+            ReducedCurve::BesselOverhauser => self.bessel_keys_at(places),
+            ReducedCurve::Linear => self.keys_at(places, false),
+            ReducedCurve::GltfCubic => self.keys_at(places, true),
+        }
+    }
 }
 
 fn reduced<T: Value>(
@@ -140,49 +270,20 @@ fn reduced<T: Value>(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<T>, ReduceError> {
-    if samples.len() != times.len() {
-        return Err(ReduceError::Lengths {
-            samples: samples.len(),
-            times: times.len(),
-        });
-    }
-    if !(tolerance >= 0.0 && tolerance.is_finite()) {
-        return Err(ReduceError::Tolerance { tolerance });
-    }
-    if let Some(place) = samples.iter().position(|sample| !sample.is_finite()) {
-        return Err(ReduceError::Sample { place });
-    }
-    let increases = |place: usize| place == 0 || times[place - 1] < times[place];
-    if let Some(place) = (0..times.len()).find(|&i| !(times[i].is_finite() && increases(i))) {
-        let time = times[place];
-        return Err(ReduceError::Time { place, time });
-    }
-    let Some(&first) = samples.first() else {
+    let task = Task::new(times, samples, tolerance)?;
+    if samples.is_empty() {
         return Ok(ReducedKeys::default());
-    };
-    let task = Task {
-        times,
-        samples,
-        tolerance,
-    };
-    let still = samples
-        .iter()
-        .map(|own| own.apart(first))
-        .fold(0.0, f64::max);
-    if still <= tolerance {
-        return Ok(ReducedKeys {
-            places: vec![0],
-            keys: vec![first],
-            tangents: match curve {
-                ReducedCurve::GltfCubic => vec![[T::default(); 2]],
-                _ => Vec::new(),
-            },
-            error: still,
-        });
     }
-    Ok(match curve {
-        ReducedCurve::Linear => Intervals::new(&task, false).keys(),
-        ReducedCurve::GltfCubic => Intervals::new(&task, true).keys(),
-        ReducedCurve::BesselOverhauser => inserted(&task),
-    })
+    let is_cubic = curve == ReducedCurve::GltfCubic;
+    let by_intervals = |is_cubic| longest(samples.len(), |from, to| task.fits(from, to, is_cubic));
+    let places = match curve {
+        _ if task.still().is_some() => vec![0],
+        ReducedCurve::BesselOverhauser => {
+            inserted(samples.len(), by_intervals(true), &|keys, intervals| {
+                task.worst_of_each(keys, intervals)
+            })
+        }
+        _ => by_intervals(is_cubic),
+    };
+    Ok(task.keys(&places, curve))
 }

@@ -35,8 +35,8 @@ impl OwnKeys {
     /// `sampler` is nothing where the clip says nothing of its tracks, and nothing inside where the
     /// track rests.
     fn of_rotations(clip: &Motion, track: usize, sampler: Option<Option<Sampler>>) -> Option<Self> {
-        let sampler = sampler.unwrap_or(Some(Sampler::Linear))?;
         let own = clip.set.get(track)?;
+        let sampler = lasting(sampler.unwrap_or(Some(Sampler::Linear))?, own.times);
         let mut values = Vec::new();
         let mut before: Option<Quat> = None;
         for (place, &key) in own.keys.iter().enumerate() {
@@ -67,8 +67,8 @@ impl OwnKeys {
         channel: Channel,
         sampler: Option<Option<Sampler>>,
     ) -> Option<Self> {
-        let sampler = sampler.unwrap_or(Some(Sampler::Linear))?;
         let own = clip.set.vector_keys(channel, track)?;
+        let sampler = lasting(sampler.unwrap_or(Some(Sampler::Linear))?, own.times);
         let mut values = Vec::new();
         for (place, key) in own.keys.iter().enumerate() {
             match sampler {
@@ -89,5 +89,13 @@ impl OwnKeys {
             values,
             sampler,
         })
+    }
+}
+
+/// glTF's cubics have two keys at least; one key lasts, whatever joins keys.
+fn lasting(sampler: Sampler, times: &[f64]) -> Sampler {
+    match (sampler, times.len()) {
+        (Sampler::Cubic, 0 | 1) => Sampler::Linear,
+        _ => sampler,
     }
 }

@@ -1,7 +1,9 @@
 //! The keys of a clip for given tolerances, joint after joint.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::reduce::{ReduceError, ReducedCurve, ReducedKeys, reduce_rotations, reduce_vectors};
+use tumble::reduce::{
+    ReduceError, ReducedCurve, ReducedKeys, reduce_rotations, reduce_together, reduce_vectors,
+};
 use tumble::{Channel, Frames, Layout, TrackError, TrackSet};
 
 use crate::motion::{Channels, Motion, Sampler};
@@ -22,29 +24,65 @@ impl Reduction<'_> {
     /// The clip with keys for these tolerances.
     pub(super) fn attempt(&self, tolerances: &Tolerances) -> Result<Motion, ReduceMotionError> {
         let joints = self.parents.len();
-        let mut rotations: Vec<Option<ReducedKeys<DQuat>>> = vec![None; joints];
+        let mut reduced = Motion {
+            set: TrackSet::new(),
+            channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
+            skeleton: self.clip.skeleton.clone(),
+            name: self.clip.name.clone(),
+            no_world: self.clip.no_world.clone(),
+            ..*self.clip
+        };
+        if self.options.together {
+            self.push_together(&mut reduced, tolerances)?;
+            return Ok(reduced);
+        }
+        let rotations = self.rotations(tolerances)?;
+        for (joint, keys) in rotations.into_iter().enumerate() {
+            self.push(&mut reduced, joint, &keys)?;
+            for channel in CHANNELS {
+                let Some((wanted, tolerance)) = self.vectors(channel, joint, tolerances) else {
+                    continue;
+                };
+                let sampler = self.sampler(joint).of(channel);
+                let keys = match sampler {
+                    Some(Sampler::Step) => steps(&wanted),
+                    _ => reduce_vectors(&self.times, &wanted, tolerance, self.options.curve)?,
+                };
+                self.push_vectors(&mut reduced, joint, channel, &keys)?;
+            }
+        }
+        Ok(reduced)
+    }
+
+    /// The keys of each joint's rotations, each joint after its parent.
+    fn rotations(
+        &self,
+        tolerances: &Tolerances,
+    ) -> Result<Vec<ReducedKeys<DQuat>>, ReduceMotionError> {
+        let joints = self.parents.len();
+        let mut rotations = vec![ReducedKeys::default(); joints];
         // How each joint is turned in the world after the reduction, `[joint][sample]`.
         let mut turned: Vec<Vec<DQuat>> = vec![Vec::new(); joints];
         for &joint in &self.order {
             let parent = self.parents[joint];
+            let sampler = self.sampler(joint).rotation;
+            // What steps or rests stays as it is; all else makes up for what its parent has become.
             let wanted: Vec<DQuat> = match parent {
-                None => self
-                    .of_joint(&self.samples.rotations, joint)
-                    .iter()
-                    .map(|own| own.as_dquat())
-                    .collect(),
-                Some(parent) => {
+                Some(parent) if !matches!(sampler, None | Some(Sampler::Step)) => {
                     let own = self.poses.iter().skip(joint).step_by(joints);
-                    let above = turned[parent].iter();
-                    above
-                        .zip(own)
+                    let pairs = turned[parent].iter().zip(own);
+                    pairs
                         .map(|(above, own)| above.conjugate() * own.rotation.as_dquat())
                         .collect()
                 }
+                _ => self.local(joint),
             };
-            let tolerance = (tolerances.angles[joint] - ROUNDING).max(0.0);
+            let tolerance = tolerances.angle(joint);
             let keys = self.rotation_keys(joint, &wanted, tolerance)?;
-            let local = self.evaluated(&keys, self.sampler(joint).rotation)?;
+            let local = match sampler {
+                None => wanted,
+                Some(_) => self.evaluated(&keys, sampler)?,
+            };
             turned[joint] = match parent {
                 None => local,
                 Some(parent) => {
@@ -54,21 +92,86 @@ impl Reduction<'_> {
                         .collect()
                 }
             };
-            rotations[joint] = Some(keys);
+            rotations[joint] = keys;
         }
-        let mut reduced = Motion {
-            set: TrackSet::new(),
-            channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
-            skeleton: self.clip.skeleton.clone(),
-            name: self.clip.name.clone(),
-            no_world: self.clip.no_world.clone(),
-            ..*self.clip
+        Ok(rotations)
+    }
+
+    /// Pushes all joints with keys at the same times.
+    fn push_together(
+        &self,
+        reduced: &mut Motion,
+        tolerances: &Tolerances,
+    ) -> Result<(), ReduceMotionError> {
+        let joints = self.parents.len();
+        let samplers = (0..joints).map(|joint| self.sampler(joint));
+        let steps = |own: &Channels| {
+            [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Step))
         };
-        for (joint, keys) in rotations.into_iter().flatten().enumerate() {
-            self.push(&mut reduced, joint, keys)?;
-            self.push_vectors(&mut reduced, joint, tolerances)?;
+        if let Some(joint) = samplers.into_iter().position(|own| steps(&own)) {
+            let name = self.clip.set.track_name(joint);
+            return Err(ReduceMotionError::Steps { joint, name });
         }
-        Ok(reduced)
+        let keyed: Vec<usize> = (0..joints)
+            .filter(|&joint| self.sampler(joint).rotation.is_some())
+            .collect();
+        let rotations: Vec<(Vec<DQuat>, f64)> = keyed
+            .iter()
+            .map(|&joint| (self.local(joint), tolerances.angle(joint)))
+            .collect();
+        let mut moved = Vec::new();
+        let mut vectors = Vec::new();
+        for joint in 0..joints {
+            for channel in CHANNELS {
+                if let Some(own) = self.vectors(channel, joint, tolerances) {
+                    moved.push((joint, channel));
+                    vectors.push(own);
+                }
+            }
+        }
+        let curve = self.options.curve;
+        let mut found = reduce_together(&self.times, &rotations, &vectors, curve)?;
+        let last = self.times.len().saturating_sub(1);
+        for keys in &mut found.rotations {
+            lengthen(keys, last);
+        }
+        let mut keys = found.rotations.into_iter();
+        for joint in 0..joints {
+            let own = match keyed.contains(&joint) {
+                true => keys.next().unwrap_or_default(),
+                false => ReducedKeys::default(),
+            };
+            self.push(reduced, joint, &own)?;
+        }
+        for ((joint, channel), keys) in moved.into_iter().zip(&found.vectors) {
+            self.push_vectors(reduced, joint, channel, keys)?;
+        }
+        Ok(())
+    }
+
+    /// A joint's rotations relative to its parent.
+    fn local(&self, joint: usize) -> Vec<DQuat> {
+        let own = self.of_joint(&self.samples.rotations, joint);
+        own.iter().map(|own| own.as_dquat()).collect()
+    }
+
+    /// The samples of a channel that has keys, and how near its curve has to be.
+    fn vectors(
+        &self,
+        channel: Channel,
+        joint: usize,
+        tolerances: &Tolerances,
+    ) -> Option<(Vec<DVec3>, f64)> {
+        self.clip.set.vector_keys(channel, joint)?;
+        let (samples, tolerance) = match channel {
+            Channel::Translation => (&self.samples.translations, tolerances.distances[joint]),
+            // A scale moves what hangs on the joint as far as an angle of that size would.
+            Channel::Scale => (&self.samples.scales, tolerances.angles[joint]),
+        };
+        let wanted = self.of_joint(samples, joint);
+        let wanted: Vec<DVec3> = wanted.iter().map(|own| own.as_dvec3()).collect();
+        let size = wanted.iter().map(|own| own.length()).fold(0.0, f64::max);
+        (!wanted.is_empty()).then_some((wanted, (tolerance - size * VECTOR_ROUNDING).max(0.0)))
     }
 
     fn rotation_keys(
@@ -82,19 +185,12 @@ impl Reduction<'_> {
             _ => reduce_rotations(&self.times, wanted, tolerance, self.options.curve)?,
         };
         // A clip lasts as long as its keys: one joint at least has a key at its end.
-        let last = self.times.len().saturating_sub(1);
-        let is_first = self.order.first() == Some(&joint);
-        Ok(match keys.places[..] {
-            [only] if is_first && last > only && self.sampler(joint).rotation.is_some() => {
-                let value = keys.keys[0];
-                let mut both = keys;
-                both.places.push(last);
-                both.keys.push(value);
-                both.tangents = both.tangents.repeat(2);
-                both
-            }
-            _ => keys,
-        })
+        let is_keyed = |joint: &&usize| self.sampler(**joint).rotation.is_some();
+        let mut keys = keys;
+        if self.order.iter().find(is_keyed) == Some(&joint) {
+            lengthen(&mut keys, self.times.len().saturating_sub(1));
+        }
+        Ok(keys)
     }
 
     /// The rotations of keys at all samples, as the engine evaluates them.
@@ -160,19 +256,14 @@ impl Reduction<'_> {
         &self,
         reduced: &mut Motion,
         joint: usize,
-        keys: ReducedKeys<DQuat>,
+        keys: &ReducedKeys<DQuat>,
     ) -> Result<(), TrackError> {
-        let name = self
-            .clip
-            .set
-            .get(joint)
-            .and_then(|track| track.name)
-            .unwrap_or_default();
+        let own = self.clip.set.get(joint);
+        let name = own.and_then(|track| track.name).unwrap_or_default();
         match self.sampler(joint).rotation {
-            Some(_) => push_rotations(&mut reduced.set, name, &self.times, &keys),
+            Some(_) => push_rotations(&mut reduced.set, name, &self.times, keys),
             // It rests, at its one key.
             None => {
-                let own = self.clip.set.get(joint);
                 let (times, keys) = own.map_or((&[][..], &[][..]), |own| (own.times, own.keys));
                 reduced.set.push(name, times, keys)
             }
@@ -183,48 +274,39 @@ impl Reduction<'_> {
         &self,
         reduced: &mut Motion,
         joint: usize,
-        tolerances: &Tolerances,
-    ) -> Result<(), ReduceMotionError> {
-        let channels = [
-            (
-                Channel::Translation,
-                &self.samples.translations,
-                self.sampler(joint).translation,
-            ),
-            (
-                Channel::Scale,
-                &self.samples.scales,
-                self.sampler(joint).scale,
-            ),
-        ];
-        for (channel, samples, sampler) in channels {
-            if self.clip.set.vector_keys(channel, joint).is_none() || samples.is_empty() {
-                continue;
-            }
-            let wanted = self.of_joint(samples, joint);
-            let wanted: Vec<DVec3> = wanted.iter().map(|own| own.as_dvec3()).collect();
-            let size = wanted.iter().map(|own| own.length()).fold(0.0, f64::max);
-            let tolerance = match channel {
-                Channel::Translation => tolerances.distances[joint],
-                // A scale moves what hangs on the joint as far as an angle of that size would.
-                Channel::Scale => tolerances.angles[joint],
-            };
-            let tolerance = (tolerance - size * VECTOR_ROUNDING).max(0.0);
-            let keys = match sampler {
-                Some(Sampler::Step) => steps(&wanted),
-                _ => reduce_vectors(&self.times, &wanted, tolerance, self.options.curve)?,
-            };
-            let times: Vec<f64> = keys.places.iter().map(|&place| self.times[place]).collect();
-            let values: Vec<Vec3> = keys.keys.iter().map(|own| own.as_vec3()).collect();
-            let tangents = keys.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
-            let tangents: Vec<[Vec3; 2]> = tangents.collect();
-            let set = &mut reduced.set;
-            match channel {
-                Channel::Translation => set.set_translations(joint, &times, &values, &tangents)?,
-                Channel::Scale => set.set_scales(joint, &times, &values, &tangents)?,
-            }
+        channel: Channel,
+        keys: &ReducedKeys<DVec3>,
+    ) -> Result<(), TrackError> {
+        let times: Vec<f64> = keys.places.iter().map(|&place| self.times[place]).collect();
+        let values: Vec<Vec3> = keys.keys.iter().map(|own| own.as_vec3()).collect();
+        let tangents = keys.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
+        let tangents: Vec<[Vec3; 2]> = tangents.collect();
+        let set = &mut reduced.set;
+        match channel {
+            Channel::Translation => set.set_translations(joint, &times, &values, &tangents),
+            Channel::Scale => set.set_scales(joint, &times, &values, &tangents),
         }
-        Ok(())
+    }
+}
+
+impl Tolerances {
+    /// How far the rotation of a joint may be from the curve in f64.
+    fn angle(&self, joint: usize) -> f64 {
+        (self.angles[joint] - ROUNDING).max(0.0)
+    }
+}
+
+/// The channels of vectors.
+const CHANNELS: [Channel; 2] = [Channel::Translation, Channel::Scale];
+
+/// Gives a channel that stands still a key at the last sample too.
+fn lengthen(keys: &mut ReducedKeys<DQuat>, last: usize) {
+    if let ([only], &[value]) = (&keys.places[..], &keys.keys[..])
+        && *only < last
+    {
+        keys.places.push(last);
+        keys.keys.push(value);
+        keys.tangents = keys.tangents.repeat(2);
     }
 }
 

@@ -30,6 +30,9 @@ pub struct ReduceOptions {
     pub distance: Option<f64>,
     /// Points so far from each joint, along its axes, stay within the distance too.
     pub shell: f64,
+    /// All joints have keys at the same times, as most formats hold them; else each channel at times of
+    /// its own, as glTF does.
+    pub together: bool,
 }
 
 /// A reduced clip, and how far it is from the samples.
@@ -66,6 +69,17 @@ pub enum ReduceMotionError {
     /// The clip refused its keys.
     #[error(transparent)]
     Keys(#[from] TrackError),
+    /// Keys at the same times are joined by curves.
+    #[error(
+        "joint {joint} (`{name}`) holds each key until the next one, so that its keys stay at their own \
+         times; write .glb"
+    )]
+    Steps {
+        /// The first such joint, from 0.
+        joint: usize,
+        /// Its name.
+        name: String,
+    },
     /// A bound is less than what f32 holds.
     #[error(
         "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \

@@ -34,9 +34,8 @@ use crate::messages::words;
 The keys of the input are the samples (or the frames of --fps). At each of them every joint stays
 within the angle of --tolerance and the distance of --distance: in the world where the input has a
 skeleton, else each track for itself. That it does is found by evaluating the keys that stay. glTF
-holds keys of each joint at times of their own; other formats hold all joints at the same times, so
-that they take tracks whose keys do not differ in time. A GLB or glTF that is written as one keeps
-all else that it holds.
+holds keys of each channel at times of their own; other formats hold all joints at the same times,
+which are more keys. A GLB or glTF that is written as one keeps all else that it holds.
 
 Examples:
   tumble reduce walk.bvh --tolerance 0.1deg -o walk.glb
@@ -192,7 +191,8 @@ impl Arguments {
         let names: Vec<String> = clips.iter().map(own).collect();
         let mut all = Vec::new();
         for (clip, name) in clips.iter().zip(&names) {
-            all.push(self.reduced(engine, name, clip)?);
+            let together = clip.is_world || !target.format().takes(FormatOption::OwnKeys);
+            all.push(self.reduced(engine, (name, clip), together)?);
         }
         if let (Some(place), [reduced]) = (plot, &*all) {
             picture::draw(&input::file_name(path), reduced, place)?;
@@ -223,7 +223,12 @@ impl Arguments {
         Ok((evaluated, told))
     }
 
-    fn reduced(&self, engine: &Engine, name: &str, clip: &Motion) -> Result<Reduced, Failure> {
+    fn reduced(
+        &self,
+        engine: &Engine,
+        (name, clip): (&str, &Motion),
+        together: bool,
+    ) -> Result<Reduced, Failure> {
         let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
         let failed = |error: ReduceMotionError| match error {
             ReduceMotionError::Evaluating(error) => Failure::evaluating(name, &error),
@@ -252,6 +257,7 @@ impl Arguments {
             angle: self.tolerance.to_radians(),
             distance: self.distance,
             shell: self.shell,
+            together,
         };
         reduce(&clip, engine, &options).map_err(failed)
     }
@@ -272,10 +278,8 @@ impl Arguments {
         for reduced in reduced {
             samples.push(match has_own_keys && !reduced.clip.is_world {
                 true => ends(engine, name, &reduced.clip)?,
-                false => keyed(&reduced.clip).map_err(|error| {
-                    let message = format!("{name}: {error}; or write .glb, which holds them");
-                    Failure::new(ALL_INPUTS, message)
-                })?,
+                false => keyed(&reduced.clip)
+                    .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?,
             });
         }
         let notes = [

@@ -1,0 +1,208 @@
+//! `tumble reduce`, by running it.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{root, run, sample_folder, succeed};
+
+/// A joint that turns and moves smoothly, and one on it.
+fn walk(place: &Path) {
+    let mut text = String::from(
+        "HIERARCHY\nROOT hip\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation \
+         Xrotation Yrotation\n JOINT knee\n {\n  OFFSET 0 -0.5 0\n  CHANNELS 3 Zrotation Xrotation \
+         Yrotation\n  End Site\n  {\n   OFFSET 0 -0.5 0\n  }\n }\n}\nMOTION\nFrames: 121\nFrame Time: \
+         0.0166667\n",
+    );
+    for i in 0..121 {
+        let t = f64::from(i) * 0.05;
+        text += &format!(
+            "{} 1 {} {} 5 0 {} 0 0\n",
+            t,
+            0.2 * (t * 2.0).sin(),
+            30.0 * t.sin(),
+            -20.0 * (t * 1.5).cos()
+        );
+    }
+    fs::write(place.join("walk.bvh"), text).unwrap();
+}
+
+#[test]
+fn a_walk_gets_few_keys_and_compares() {
+    let folder = sample_folder();
+    let place = folder.path();
+    walk(place);
+    for (curve, most) in [("linear", 180), ("cubic", 30)] {
+        let line = [
+            "reduce",
+            "walk.bvh",
+            "-o",
+            "walk.glb",
+            "--overwrite",
+            "--curve",
+            curve,
+        ];
+        let told = succeed(
+            place,
+            &[&line[..], &["--json", "--plot", "errors.svg"]].concat(),
+        );
+        assert!(told.words.contains("363 → "), "{}", told.words);
+        let json: Value = serde_json::from_slice(&told.out).unwrap();
+        let clip = &json[0];
+        assert_eq!(
+            (clip["keys_before"].as_u64(), clip["samples"].as_u64()),
+            (Some(363), Some(121))
+        );
+        let keys = clip["keys_after"].as_u64().unwrap();
+        assert!(keys <= most, "{curve}: {keys} keys");
+        let largest = clip["angle"]["largest"].as_f64().unwrap();
+        let bound = clip["angle"]["bound"].as_f64().unwrap();
+        assert!(largest > 0.01 && largest <= bound && (bound - 0.1).abs() < 1e-9);
+        // What was said holds, in the world, of the file.
+        let distance = clip["distance"]["bound"].as_f64().unwrap().to_string();
+        let bounds = ["--tolerance", "0.1001", "--distance", &distance];
+        let times = ["--fps", "60", "--end", "2"];
+        let line = ["compare", "walk.bvh", "walk.glb", "--world"];
+        succeed(place, &[&line[..], &bounds, &times].concat());
+        let svg = fs::read_to_string(place.join("errors.svg")).unwrap();
+        assert!(
+            svg.contains("largest angle of all joints") && svg.contains(&format!("→ {keys} keys"))
+        );
+    }
+}
+
+#[test]
+fn a_gltf_keeps_all_but_its_keys() {
+    let fox = root().join("../shared/data/gltf/Fox.glb");
+    if !fox.exists() {
+        eprintln!("{} is not there: nothing was reduced", fox.display());
+        return;
+    }
+    let folder = sample_folder();
+    let place = folder.path();
+    let fox = fox.to_str().unwrap();
+    let told = succeed(place, &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"]);
+    assert!(
+        told.words.contains("Survey: ") && told.words.contains("Run: "),
+        "{}",
+        told.words
+    );
+    let json = |file: &Path| -> Value {
+        let bytes = fs::read(file).unwrap();
+        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+    };
+    let (before, after) = (json(Path::new(fox)), json(&place.join("fox.glb")));
+    for kept in ["meshes", "materials", "skins", "nodes", "images", "scenes"] {
+        assert_eq!(before[kept], after[kept], "{kept}");
+    }
+    let samplers = after["animations"][0]["samplers"].as_array().unwrap();
+    let cubics = samplers
+        .iter()
+        .filter(|own| own["interpolation"] == "CUBICSPLINE")
+        .count();
+    assert!(cubics > 5, "{cubics} of {}", samplers.len());
+    let line = [
+        "compare",
+        fox,
+        "fox.glb",
+        "--world",
+        "--fps",
+        "24",
+        "--tolerance",
+        "0.11",
+    ];
+    succeed(place, &line);
+}
+
+#[test]
+fn a_chain_goes_back_into_dat() {
+    let folder = sample_folder();
+    let place = folder.path();
+    succeed(place, &["convert", "a.dat", "-o", "a.npz"]);
+    let line = [
+        "reduce",
+        "a.dat",
+        "-o",
+        "few.dat",
+        "--fps",
+        "100",
+        "--curve",
+        "bessel-overhauser",
+    ];
+    let told = succeed(place, &line);
+    assert!(told.words.contains("402 → "), "{}", told.words);
+    let text = fs::read_to_string(place.join("few.dat")).unwrap();
+    assert!(text.lines().count() < 60, "{text}");
+    succeed(
+        place,
+        &[
+            "compare",
+            "a.dat",
+            "few.dat",
+            "--fps",
+            "100",
+            "--tolerance",
+            "0.1001",
+        ],
+    );
+}
+
+#[test]
+fn what_cannot_be_reduced_is_refused() {
+    let folder = sample_folder();
+    let place = folder.path();
+    walk(place);
+    for (line, code, says) in [
+        (
+            &[
+                "reduce",
+                "walk.bvh",
+                "-o",
+                "a.glb",
+                "--curve",
+                "bessel-overhauser",
+            ][..],
+            2,
+            "glTF has no bessel",
+        ),
+        (
+            &["reduce", "walk.bvh", "-o", "a.glb", "--tolerance", "-3"],
+            2,
+            "no finite number from 0",
+        ),
+        (
+            &["reduce", "walk.bvh", "-o", "a.glb", "--tolerance", "1e-9"],
+            4,
+            "give a larger one",
+        ),
+        (&["reduce", "walk.bvh", "-o", "a.npy"], 2, "holds results"),
+        (
+            &["reduce", "walk.bvh", "-o", "a.npz", "--curve", "cubic"],
+            4,
+            "cubic spline",
+        ),
+        (
+            &[
+                "reduce", "walk.bvh", "a.dat", "-o", "all", "--to", "glb", "--plot", "a.svg",
+            ],
+            2,
+            "of one input",
+        ),
+    ] {
+        let run = run(place, line);
+        assert_eq!(run.code, code, "{line:?}: {}", run.words);
+        assert!(run.words.contains(says), "{line:?}: {}", run.words);
+    }
+    let left: Vec<_> = fs::read_dir(place)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    assert!(
+        !left
+            .iter()
+            .any(|name| name.to_str().unwrap().starts_with("a.glb")),
+        "{left:?}"
+    );
+}

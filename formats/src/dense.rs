@@ -1,0 +1,94 @@
+//! The keys of a clip as times and numbers, and clips whose keys are samples.
+
+use glam::{Quat, Vec3};
+use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackSet};
+
+use crate::motion::{Channels, Motion, Sampler};
+use crate::sample::ChannelMethods;
+
+impl Motion {
+    /// The times of all keys of all channels, in order, each once.
+    #[must_use]
+    pub fn key_times(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = Vec::new();
+        let mut last: Option<&[f64]> = None;
+        for list in self.key_lists() {
+            // Tracks mostly share their times.
+            if last != Some(list) {
+                times.extend_from_slice(list);
+                last = Some(list);
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// The clip with its samples at some frames as keys, joined by straight lines and arcs; steps stay
+    /// steps.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn sampled(&self, engine: &Engine, frames: &Frames) -> Result<Self, Error> {
+        let methods = ChannelMethods {
+            method: None,
+            with: &|method| Interpolation::from(method),
+        };
+        let samples = methods.sample(engine, self, frames)?;
+        let tracks = self.set.track_count();
+        let mut set = TrackSet::new();
+        for track in 0..tracks {
+            let own = |all: &[Vec3]| -> Vec<Vec3> {
+                all.iter().skip(track).step_by(tracks).copied().collect()
+            };
+            let name = self.set.get(track).and_then(|own| own.name);
+            let keys: Vec<Quat> = (samples.rotations.iter())
+                .skip(track)
+                .step_by(tracks)
+                .copied()
+                .collect();
+            set.push(name.unwrap_or_default(), &samples.times, &keys)?;
+            if self.set.vector_keys(Channel::Translation, track).is_some() {
+                set.set_translations(track, &samples.times, &own(&samples.translations), &[])?;
+            }
+            if self.set.vector_keys(Channel::Scale, track).is_some() {
+                set.set_scales(track, &samples.times, &own(&samples.scales), &[])?;
+            }
+        }
+        let line = |sampler| match sampler {
+            Some(Sampler::Cubic) => Some(Sampler::Linear),
+            other => other,
+        };
+        let channels = self.channels.iter().map(|own| Channels {
+            rotation: line(own.rotation),
+            translation: line(own.translation),
+            scale: line(own.scale),
+        });
+        Ok(Self {
+            set,
+            channels: channels.collect(),
+            name: self.name.clone(),
+            skeleton: self.skeleton.clone(),
+            no_world: self.no_world.clone(),
+            rate: None,
+            ..*self
+        })
+    }
+
+    /// The keys of all channels.
+    #[must_use]
+    pub fn key_count(&self) -> usize {
+        self.key_lists().map(<[f64]>::len).sum()
+    }
+
+    /// The key times of each channel that has keys.
+    fn key_lists(&self) -> impl Iterator<Item = &[f64]> {
+        let channels = [Channel::Translation, Channel::Scale];
+        (0..self.set.track_count()).flat_map(move |track| {
+            let vectors = channels.map(|channel| self.set.vector_keys(channel, track));
+            let own = self.set.get(track).map(|track| track.times);
+            let vectors = vectors.into_iter().flatten().map(|keys| keys.times);
+            own.into_iter().chain(vectors)
+        })
+    }
+}
