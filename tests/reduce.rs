@@ -170,6 +170,9 @@ fn what_needs_few_keys_gets_few() {
         leaving.distance(DVec3::new(0.0, -1.0, -2.0)) < 1e-3,
         "{leaving}"
     );
+    // What stands still has no tangents.
+    let found = reduce_rotations(&times, &still, 1e-6, ReducedCurve::GltfCubic).unwrap();
+    assert_eq!(found.tangents[0].map(|own| own.to_array()), [[0.0; 4]; 2]);
     // Either sign of a quaternion is the same rotation.
     let signs: Vec<DQuat> = even
         .iter()

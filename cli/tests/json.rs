@@ -72,7 +72,7 @@ fn every_command_prints_json_without_debug_text() {
         &["eval", "a.dat", "b.dat", "-o", "both"],
         &["compare", "a.dat", "b.dat"],
         &["compare", "a.npy", "a.npy.again"],
-        &["bench", "small", "--shrink", "10000", "--device", "cpu"],
+        &["bench", "small", "--shrink", "10000"],
     ];
     for line in lines {
         if line.contains(&"a.npy.again") {

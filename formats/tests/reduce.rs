@@ -190,7 +190,7 @@ fn steps_rests_and_scales_are_kept() {
         assert_eq!(set.track(3).keys, clip.set.track(3).keys);
         // Sizes grow evenly.
         assert_eq!(set.vector_keys(Channel::Scale, 0).unwrap().times.len(), 2);
-        assert!(reduced.keys[1] < reduced.keys[0] / 3, "{:?}", reduced.keys);
+        assert!(reduced.keys[1] < reduced.keys[0] / 2, "{:?}", reduced.keys);
     }
 }
 
@@ -224,7 +224,7 @@ fn keys_at_the_same_times_are_near_too() {
         let reduced = reduce(&clip, &engine, &options).unwrap();
         check(&clip, &reduced, &options);
         let times = reduced.clip.set.track(0).times;
-        assert!(times.len() < 60, "{curve:?}: {} keys", times.len());
+        assert!(times.len() < 89, "{curve:?}: {} keys", times.len());
         let moved = reduced
             .clip
             .set

@@ -51,7 +51,7 @@ impl<T: Value> Task<'_, T> {
             keys: places.iter().map(|&place| self.samples[place]).collect(),
             ..ReducedKeys::default()
         };
-        let mut arriving = T::default();
+        let mut arriving = T::zero();
         for pair in places.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             let error = self.interval(from, to, is_cubic, f64::INFINITY);
@@ -65,7 +65,7 @@ impl<T: Value> Task<'_, T> {
             }
         }
         if is_cubic {
-            found.tangents.push([arriving, T::default()]);
+            found.tangents.push([arriving, T::zero()]);
         }
         found.places = places.to_vec();
         found
@@ -79,19 +79,32 @@ impl<T: Value> Task<'_, T> {
     fn interval(&self, from: usize, to: usize, is_cubic: bool, most: f64) -> Option<f64> {
         let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from], samples[to]);
-        let part = |place: usize| (times[place] - times[from]) / (times[to] - times[from]);
+        let seconds = times[to] - times[from];
+        let part = |place: usize| (times[place] - times[from]) / seconds;
         let tangents = match is_cubic {
             true => self.tangents(from, to),
             false => [DVec4::ZERO; 2],
         };
+        let cubic = |part: f64| {
+            let [a, b, c, d] = hermite(part);
+            let ends = start.numbers() * a + end.numbers() * c;
+            T::nearest(ends + tangents[0] * b + tangents[1] * d)
+        };
+        // A cubic could pass all samples and stray between them. Neighbours are always joined.
+        if is_cubic && to > from + 1 {
+            for place in from..to {
+                let (middle, slack) = self.middle(place);
+                let curve = cubic(f64::midpoint(part(place), part(place + 1)));
+                let apart = middle.apart(curve);
+                if apart.is_nan() || apart > most + slack {
+                    return None;
+                }
+            }
+        }
         let mut error = 0.0f64;
         for (place, &sample) in samples.iter().enumerate().take(to).skip(from + 1) {
             let curve = match is_cubic {
-                true => {
-                    let [a, b, c, d] = hermite(part(place));
-                    let ends = start.numbers() * a + end.numbers() * c;
-                    T::nearest(ends + tangents[0] * b + tangents[1] * d)
-                }
+                true => cubic(part(place)),
                 false => start.towards(end, part(place)),
             };
             let apart = sample.apart(curve);
@@ -104,25 +117,46 @@ impl<T: Value> Task<'_, T> {
         Some(error)
     }
 
+    /// What lies half way between a sample and the next one, and how far it may be from there: samples say
+    /// as little as the difference between the straight way and the cubic through four of them.
+    fn middle(&self, place: usize) -> (T, f64) {
+        let own = |place: usize| self.samples[place.min(self.samples.len() - 1)];
+        let [a, b, c, d] = [place.saturating_sub(1), place, place + 1, place + 2].map(own);
+        let straight = b.towards(c, 0.5);
+        let [a, b, c, d] = [a, b, c, d].map(Value::numbers);
+        let smooth = T::nearest((b + c) * (9.0 / 16.0) - (a + d) / 16.0);
+        (straight.towards(smooth, 0.5), 0.5 * straight.apart(smooth))
+    }
+
     /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their
-    /// numbers. A small weight keeps them near the straight line where there are too few samples.
+    /// numbers. What lies half way between them counts a little: with few samples those alone tell too
+    /// little.
     fn tangents(&self, from: usize, to: usize) -> [DVec4; 2] {
-        /// As a part of the weight of a sample.
+        /// As parts of the weight of a sample.
         const STRAIGHT: f64 = 1e-6;
+        const MIDDLE: f64 = 1e-2;
         let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from].numbers(), samples[to].numbers());
         let straight = end - start;
         let (mut aa, mut ab, mut bb) = (STRAIGHT, 0.0, STRAIGHT);
         let (mut ar, mut br) = (straight * STRAIGHT, straight * STRAIGHT);
-        for place in from + 1..to {
-            let part = (times[place] - times[from]) / (times[to] - times[from]);
+        let seconds = times[to] - times[from];
+        let part = |place: usize| (times[place] - times[from]) / seconds;
+        let mut add = |part: f64, value: DVec4, weight: f64| {
             let [p0, a, p1, b] = hermite(part);
-            let rest = samples[place].numbers() - start * p0 - end * p1;
-            aa += a * a;
-            ab += a * b;
-            bb += b * b;
+            let rest = (value - start * p0 - end * p1) * weight;
+            aa += weight * a * a;
+            ab += weight * a * b;
+            bb += weight * b * b;
             ar += rest * a;
             br += rest * b;
+        };
+        for (place, sample) in samples.iter().enumerate().take(to).skip(from) {
+            if place > from {
+                add(part(place), sample.numbers(), 1.0);
+            }
+            let middle = f64::midpoint(part(place), part(place + 1));
+            add(middle, self.middle(place).0.numbers(), MIDDLE);
         }
         let determinant = aa * bb - ab * ab;
         [

@@ -7,7 +7,7 @@
 //! farthest away, until it is near everywhere, and then each that can be missed is taken out.
 //!
 //! All is computed in f64. Every sample is looked at, and none is farther from the curve than the
-//! tolerance; what an evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
+//! tolerance; cubics are looked at half way between samples too, so that they do not stray there; what an evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
 
 mod inserted;
 mod intervals;
@@ -252,7 +252,7 @@ impl<'a, T: Value> Task<'a, T> {
                 places: places.to_vec(),
                 keys: places.iter().map(|&place| self.samples[place]).collect(),
                 tangents: match curve {
-                    ReducedCurve::GltfCubic => vec![[T::default(); 2]; places.len()],
+                    ReducedCurve::GltfCubic => vec![[T::zero(); 2]; places.len()],
                     _ => Vec::new(),
                 },
                 error: self.still().unwrap_or(f64::INFINITY),
