@@ -11,6 +11,31 @@ use crate::tracks::set::Track;
 
 /// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
 /// takes. A bare [`Method`] has the default options.
+///
+/// ```
+/// use tumble::glam::Quat;
+/// use tumble::{Device, Ends, Engine, Frames, Interpolation, Path, Speed, Tcb, TrackSet, WrapMode, method};
+/// let mut set = TrackSet::new();
+/// let keys = [0.0, 0.8, 2.0, 0.0].map(Quat::from_rotation_z);
+/// set.push("wheel", &[0.0, 1.0, 2.0, 4.0], &keys)?;
+/// let looped = Interpolation {
+///     ends: Ends::Loop,       // the last key repeats the first
+///     after: WrapMode::Loop,  // and behind it the track starts again
+///     path: Path::Shortest,
+///     speed: Speed::AsKeyed,
+///     ..Interpolation::from(method::CATMULL_ROM)
+/// };
+/// let engine = Engine::new(Device::Cpu)?;
+/// let found = engine.evaluate(&set, looped, &Frames::at(vec![1.0, 5.0]))?;
+/// assert_eq!(found.get(0, 0), found.get(0, 1));
+///
+/// // Kochanek-Bartels with a tension of 1 stands still at its keys.
+/// let tcb = Tcb { tension: 1.0, continuity: 0.0, bias: 0.0 };
+/// let still = Interpolation { tcb, ..Interpolation::from(method::KOCHANEK_BARTELS) };
+/// let near = engine.evaluate(&set, still, &Frames::at(vec![1.0, 1.001]))?;
+/// assert!(near.as_quats()[0].angle_between(near.as_quats()[1]) < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interpolation {
     /// The method.

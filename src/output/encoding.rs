@@ -267,6 +267,17 @@ representations! {
 }
 
 /// What some representations leave open; see [`Encoding::with`].
+///
+/// ```
+/// use tumble::{Encoding, EncodingOptions, MatrixOrder};
+/// let options = EncodingOptions { order: MatrixOrder::ColumnMajor, sequence: "ZXY".parse()? };
+/// let matrices = Encoding::KINDS.into_iter().find(|kind| kind.name() == "matrix").unwrap();
+/// let columns = matrices.with(options);
+/// let mut bytes = vec![0; columns.bytes()];
+/// columns.encode(&[[0.0, 0.0, 0.0, 1.0]], &mut bytes)?;
+/// assert_eq!(columns.decode(&bytes)?, [0.0, 0.0, 0.0, 1.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EncodingOptions {
     /// How matrices lie in memory.

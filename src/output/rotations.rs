@@ -168,6 +168,17 @@ impl<T> Samples<T> {
 impl Rotations {
     /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order.
     ///
+    /// ```
+    /// use tumble::{Device, Engine, Layout, Rotations, Smoothing, SmoothingKernel};
+    /// // Two tracks of three samples, from a network or a tracker.
+    /// let given = [[0.0, 0.0, 0.0, 1.0]; 6];
+    /// let rotations = Rotations::of(&given, 2, Layout::TrackMajor)?;
+    /// let calm = Smoothing::new(SmoothingKernel::Gaussian(2.0));
+    /// let smooth = Engine::new(Device::Cpu)?.smooth(&rotations, &calm)?;
+    /// assert_eq!(smooth.as_arrays(), given);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// When their number is not a multiple of the tracks', or there is not the memory.
     pub fn of<R: Rotation>(

@@ -6,6 +6,25 @@ use crate::curve::options::Ends;
 use crate::method::vector_method::VectorMethod;
 
 /// How the bodies of a set follow their paths, which are the tracks' translations.
+///
+/// ```
+/// use tumble::glam::{DVec3, Vec3};
+/// use tumble::{Device, Direction, Engine, Follow, Frame, Frames, Layout, PathSpeed, TrackSet};
+/// let mut set = TrackSet::new();
+/// let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
+/// set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
+/// let follow = Follow {
+///     speed: PathSpeed::Eased { start: 0.2, end: 0.2 },
+///     direction: Direction::Point(DVec3::new(4.0, 3.0, 0.0)),
+///     frame: Frame::Fixed,
+///     axes: ["z".parse()?, "y".parse()?],
+///     ..Follow::default()
+/// };
+/// let engine = Engine::new(Device::Cpu)?;
+/// let found = engine.follow(&set, &follow, &Frames::fps(30), Layout::TrackMajor)?;
+/// assert_eq!(found.positions.get(0, 0), Some(Vec3::ZERO));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Follow {
     /// The curve through the points.

@@ -46,10 +46,24 @@ pub struct VectorKeys<'a> {
 }
 
 impl TrackSet {
-    /// Gives a track translation keys, [`Vec3`] or `[f32; 3]`. Their `times` are seconds, strictly increasing, and may
-    /// differ from the rotations' times. `tangents` (arriving, leaving; units per second) are used
-    /// by [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic) and
-    /// may be empty.
+    /// Gives a track translation keys, [`Vec3`] or `[f32; 3]`. Their `times` are seconds, strictly
+    /// increasing, and may differ from the rotations' times. `tangents` (arriving, leaving; units per
+    /// second) are used by [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic)
+    /// and may be empty.
+    ///
+    /// ```
+    /// use tumble::glam::{Quat, Vec3};
+    /// use tumble::{Channel, Device, Engine, Frames, Layout, TrackSet, VectorMethod, method};
+    /// let mut set = TrackSet::new();
+    /// set.push("hip", &[0.0], &[Quat::IDENTITY])?;
+    /// set.set_translations(0, &[0.0, 2.0], &[[0.0, 1.0, 0.0], [4.0, 1.0, 0.0]], &[])?;
+    /// let (channel, how) = (Channel::Translation, VectorMethod::Linear);
+    /// let frames = Frames::fps(1);
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let moved = engine.vectors(&set, channel, how, method::SLERP, &frames, Layout::TrackMajor)?;
+    /// assert_eq!(moved.get(0, 1), Some(Vec3::new(2.0, 1.0, 0.0)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// When there is no such track, the lengths differ, or a number is not finite.
