@@ -13,8 +13,9 @@ use tumble_formats::keys::Duplicates;
 use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 
 use crate::clip::{Clip, Source, counted};
-use crate::errors::{guarded, input, of_diagnostic, of_track, warn};
+use crate::errors::{input, of_diagnostic, of_track, warn};
 use crate::options::{frame_rate, one_of};
+use crate::run::interruptible;
 
 /// The clips of a file, by their places or names.
 ///
@@ -205,24 +206,23 @@ pub(crate) fn load(
     if let Some(scale) = scale.filter(|scale| !scale.is_finite() || *scale <= 0.0) {
         return Err(input(format!("scale: {scale} is not a number over 0")));
     }
-    let mut loaded = py.detach(|| {
-        guarded(|| {
-            let read = match format {
-                Some(format) => format.open(&path, &options),
-                None => Format::open_detected(&path, &options),
-            };
-            let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
-            if scale.is_some() || turn.is_some() {
-                let turn = DQuat::from_rotation_x(turn.unwrap_or(0.0));
-                for clip in &mut loaded.clips {
-                    *clip = adjust(clip, scale.unwrap_or(1.0), turn)
-                        .map_err(|error| of_track(&error))?;
-                }
-                // What is kept of the file has its own units and axes.
-                loaded.document = None;
+    let file = path.clone();
+    let mut loaded = interruptible(py, move || {
+        let read = match format {
+            Some(format) => format.open(&file, &options),
+            None => Format::open_detected(&file, &options),
+        };
+        let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+        if scale.is_some() || turn.is_some() {
+            let turn = DQuat::from_rotation_x(turn.unwrap_or(0.0));
+            for clip in &mut loaded.clips {
+                *clip =
+                    adjust(clip, scale.unwrap_or(1.0), turn).map_err(|error| of_track(&error))?;
             }
-            Ok(loaded)
-        })
+            // What is kept of the file has its own units and axes.
+            loaded.document = None;
+        }
+        Ok(loaded)
     })?;
     if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
         return Err(of_diagnostic(first));

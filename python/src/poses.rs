@@ -1,5 +1,7 @@
 //! Whole poses: translations, rotations and scales, relative to the parents or in the world.
 
+use std::sync::Arc;
+
 use glam::{Quat, Vec3};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
@@ -11,8 +13,9 @@ use tumble_formats::world::world;
 
 use crate::clip::Clip;
 use crate::engine::Engine;
-use crate::errors::{guarded, input, of_engine};
+use crate::errors::{input, of_engine};
 use crate::options::{Request, Samples as Wanted};
+use crate::run::interruptible;
 
 /// Translations, rotations and scales relative to the parents.
 pub(crate) fn local<'py>(
@@ -52,9 +55,10 @@ pub(crate) fn in_world<'py>(
     let py = clip.py();
     let (samples, tracks) = samples(engine, clip, options)?;
     let motion = &clip.get().motion;
-    let poses = py
-        .detach(|| guarded(|| world(motion, &samples).map_err(|error| input(error.to_string()))))?;
-    let count = samples.times.len();
+    let (count, motion) = (samples.times.len(), Arc::clone(motion));
+    let poses = interruptible(py, move || {
+        world(&motion, &samples).map_err(|error| input(error.to_string()))
+    })?;
     let positions = poses.iter().flat_map(|it| it.position.to_array());
     let rotations = poses.iter().flat_map(|it| it.rotation.to_array());
     PyTuple::new(
@@ -81,16 +85,15 @@ fn samples(
     let (frames, count) = wanted.resolved(&motion.set)?;
     let tracks = motion.set.track_count();
     let engine = engine.engine(tracks * count)?;
-    let samples = clip.py().detach(|| {
-        guarded(|| {
-            let methods = ChannelMethods {
-                method: request.method,
-                with: &request.with(Quantity::Rotation),
-            };
-            methods
-                .sample(&engine, motion, &frames)
-                .map_err(|error| of_engine(&error))
-        })
+    let motion = Arc::clone(motion);
+    let samples = interruptible(clip.py(), move || {
+        let methods = ChannelMethods {
+            method: request.method,
+            with: &request.with(Quantity::Rotation),
+        };
+        methods
+            .sample(&engine, &motion, &frames)
+            .map_err(|error| of_engine(&error))
     })?;
     Ok((samples, tracks))
 }

@@ -1,11 +1,14 @@
 //! Evaluation into memory, in windows between which Ctrl-C is seen.
 
 use std::ops::Range;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Speed, TrackSet};
 
-use crate::errors::of_engine;
+use crate::errors::{guarded, of_engine};
 
 /// The longest that a window may take one thread, nanoseconds.
 const WINDOW: f64 = 1e8;
@@ -33,6 +36,35 @@ pub(crate) struct Job<'a> {
 )]
 pub(crate) fn check_signals() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
+}
+
+/// How long Ctrl-C may go unseen.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Does work that cannot be stopped, without the GIL. Ctrl-C does not wait for it: it goes on to its end
+/// by itself, and nobody gets its result.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> PyResult<T> + Send + 'static,
+) -> PyResult<T> {
+    py.detach(|| {
+        let (sender, receiver) = mpsc::sync_channel(1);
+        let thread = std::thread::Builder::new().name("tumble".to_owned());
+        thread.spawn(move || {
+            let _ = sender.send(guarded(work)); // nobody listens after Ctrl-C
+        })?;
+        loop {
+            match receiver.recv_timeout(PATIENCE) {
+                Ok(found) => return found,
+                Err(RecvTimeoutError::Timeout) => check_signals()?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err(
+                        "internal error: a thread ended early",
+                    ));
+                }
+            }
+        }
+    })
 }
 
 impl Job<'_> {

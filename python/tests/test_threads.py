@@ -85,24 +85,42 @@ def test_one_output_is_not_written_by_two(long, rng):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
-def test_ctrl_c_ends_a_long_evaluation():
-    script = """
-        import signal, sys, numpy as np, tumble
-        # Shells start what runs in the background with the signal ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        times = np.arange(2000.0)
-        keys = np.random.default_rng(1).normal(size=(200, 2000, 4))
-        keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
-        clip = tumble.Clip(times, keys)
-        print("ready", flush=True)
-        try:
-            # Minutes of work.
-            clip.evaluate(fps=1000, method="c2", speed="constant", end=10.0)
-        except KeyboardInterrupt:
-            print("interrupted", flush=True)
-            print(clip.evaluate(at=0.0).shape, flush=True)
-    """
-    command = [sys.executable, "-c", textwrap.dedent(script)]
+EVALUATE = """
+    times = np.arange(2000.0)
+    keys = np.random.default_rng(1).normal(size=(200, 2000, 4))
+    keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
+    clip = tumble.Clip(times, keys)
+    # Minutes of work.
+    def long():
+        clip.evaluate(fps=1000, method="c2", speed="constant", end=10.0)
+"""
+
+POSES = """
+    keys = np.zeros((60, 2, 4))
+    keys[..., 3] = 1.0
+    clip = tumble.Clip([0.0, 600.0], keys)
+    # Some seconds of work in one piece, again and again.
+    def long():
+        while True:
+            tumble.Engine("cpu").poses(clip, fps=1000)
+"""
+
+
+@pytest.mark.parametrize("work", [EVALUATE, POSES])
+def test_ctrl_c_ends_long_work(work):
+    script = f"""
+import signal, sys, numpy as np, tumble
+# Shells start what runs in the background with the signal ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+{textwrap.dedent(work)}
+print("ready", flush=True)
+try:
+    long()
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    print(clip.evaluate(at=0.0).shape[-1], flush=True)
+"""
+    command = [sys.executable, "-c", script]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         # A child that does not hear the signal ends, and the test fails instead of waiting.
@@ -114,7 +132,7 @@ def test_ctrl_c_ends_a_long_evaluation():
         child.send_signal(signal.SIGINT)
         assert child.stdout.readline() == "interrupted\n"
         waited = time.perf_counter() - sent
-        assert child.stdout.readline() == "(200, 4)\n", "the clip can be used again"
+        assert child.stdout.readline() == "4\n", "the clip can be used again"
         assert child.wait(timeout=60) == 0
         late.cancel()
     assert waited < 20, f"{waited:.1f} s after Ctrl-C"
