@@ -37,6 +37,9 @@ pub(crate) struct Sampling {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    /// Start at 0 s where the first key is later, as players of glTF do: it is held until then
+    #[arg(long, conflicts_with_all = ["times", "start"])]
+    from_zero: bool,
 }
 
 /// The samples asked for, before the tracks are known.
@@ -45,6 +48,8 @@ pub(crate) enum Samples {
         rate: FrameRate,
         start: Option<f64>,
         end: Option<f64>,
+        /// Start at 0 where the first key is later.
+        from_zero: bool,
     },
     Times(Vec<f64>),
 }
@@ -71,6 +76,7 @@ impl Sampling {
             rate: self.fps,
             start: self.start,
             end: self.end,
+            from_zero: self.from_zero,
         })
     }
 }
@@ -90,7 +96,20 @@ impl Samples {
     /// The samples for one set; says when they pass its keys.
     pub(crate) fn of(&self, set: &TrackSet, name: &str) -> Frames {
         match self {
-            Self::Rate { rate, start, end } => in_frames(*rate, *start, *end, set, name),
+            Self::Rate {
+                rate,
+                end,
+                from_zero: true,
+                ..
+            } => {
+                let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+                let end = end.unwrap_or(last);
+                warn_beyond(first, end, set, name);
+                Frames::rate(*rate).between(first.min(0.0), end)
+            }
+            Self::Rate {
+                rate, start, end, ..
+            } => in_frames(*rate, *start, *end, set, name),
             Self::Times(times) => {
                 let start = times.iter().copied().fold(f64::INFINITY, f64::min);
                 let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);

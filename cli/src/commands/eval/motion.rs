@@ -79,12 +79,13 @@ impl Job<'_> {
                 rate,
                 start: None,
                 end: None,
+                from_zero: false,
             },
         ) = (self.loaded.document.clone(), self.samples)
         else {
             return Err(Failure::usage(format!(
                 "{name}: the animations of a file that is kept keep their lengths; leave out \
-                 --times, --start and --end, or write another format"
+                 --times, --start, --end and --from-zero, or write another format"
             )));
         };
         let at = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);

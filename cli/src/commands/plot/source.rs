@@ -34,10 +34,11 @@ impl<'a> Source<'a> {
         samples: &Samples,
     ) -> Result<Self, Failure> {
         let mut frames = samples.of(set, &name);
-        if let (Samples::Rate { start, end, .. }, Some((first, last))) = (samples, set.time_span())
+        if let Samples::Rate { .. } = samples
+            && let Some(span) = set.time_span()
         {
             // A box alone has the frames of the whole set.
-            frames = frames.between(start.unwrap_or(first), end.unwrap_or(last));
+            frames = frames.spanning(span);
         }
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
