@@ -206,3 +206,32 @@ fn what_cannot_be_reduced_is_refused() {
         "{left:?}"
     );
 }
+
+/// Channels at times of their own, and cubics with their tangents, go from glTF to glTF as they are.
+#[test]
+fn convert_keeps_cubics_and_times_of_channels() {
+    let folder = sample_folder();
+    let place = folder.path();
+    walk(place);
+    succeed(
+        place,
+        &["reduce", "walk.bvh", "-o", "cubic.glb", "--curve", "cubic"],
+    );
+    succeed(place, &["convert", "cubic.glb", "-o", "again.glb"]);
+    let bits = ["--tolerance", "0", "--distance", "0"];
+    let told = succeed(
+        place,
+        &[&["compare", "cubic.glb", "again.glb"][..], &bits].concat(),
+    );
+    assert!(
+        String::from_utf8(told.out)
+            .unwrap()
+            .contains("largest 0.000e0°")
+    );
+    let refused = run(place, &["convert", "cubic.glb", "-o", "again.bvh"]);
+    assert!(
+        refused.code == 4 && refused.words.contains("other times"),
+        "{}",
+        refused.words
+    );
+}

@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackSet};
 
 use crate::motion::{Channels, Motion, Sampler};
-use crate::sample::ChannelMethods;
+use crate::sample::{ChannelMethods, Samples};
 
 impl Motion {
     /// The times of all keys of all channels, in order, each once.
@@ -73,6 +73,22 @@ impl Motion {
             rate: None,
             ..*self
         })
+    }
+
+    /// The samples at the first and the last key alone, for formats that write the clip's own keys
+    /// ([`Sampled::of_own_keys`](crate::motion::Sampled::of_own_keys)) in their place.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn ends(&self, engine: &Engine) -> Result<Samples, Error> {
+        let (first, last) = self.set.time_span().unwrap_or_default();
+        let mut times = vec![first, last];
+        times.dedup();
+        let methods = ChannelMethods {
+            method: None,
+            with: &|method| Interpolation::from(method),
+        };
+        methods.sample(engine, self, &Frames::at(times))
     }
 
     /// The keys of all channels.

@@ -135,11 +135,29 @@ fn write(
     started: Instant,
     target: &Target,
 ) -> Result<Evaluated, Failure> {
-    let keys: Result<Vec<Samples>, _> = clips.iter().map(|clip| keyed(clip)).collect();
-    let keys = keys.map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
+    // A format that has keys of each channel at times of their own keeps them, where channels differ.
+    let has_own_keys = target.format().takes(FormatOption::OwnKeys);
+    let mut keys: Vec<(Samples, bool)> = Vec::new();
+    for clip in clips {
+        keys.push(match keyed(clip) {
+            Ok(samples) => (samples, false),
+            Err(_) if has_own_keys && !clip.is_world => {
+                let engine = Engine::new(Device::Cpu);
+                let ends = engine.and_then(|engine| clip.ends(&engine));
+                (
+                    ends.map_err(|error| Failure::evaluating(name, &error))?,
+                    true,
+                )
+            }
+            Err(error) => return Err(Failure::new(ALL_INPUTS, format!("{name}: {error}"))),
+        });
+    }
     let notes = [("input", name.to_owned())];
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&keys))
-        .map(|(clip, keys)| keys.of(clip, clip.rate, &notes))
+        .map(|(clip, (samples, of_own_keys))| Sampled {
+            of_own_keys: *of_own_keys,
+            ..samples.of(clip, clip.rate, &notes)
+        })
         .collect();
     let write = target.format().write_motion;
     let written = target.write_motion(|out| match write {
@@ -149,7 +167,7 @@ fn write(
     let told = format!(
         "{name}: {}, {} in {} → {target}",
         words::count(clips.len(), "clip"),
-        words::count(keys.iter().map(|keys| keys.times.len()).sum(), "time"),
+        words::count(clips.iter().map(|clip| clip.key_count()).sum(), "key"),
         words::duration(started.elapsed()),
     );
     Ok(Evaluated {

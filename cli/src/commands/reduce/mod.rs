@@ -9,13 +9,12 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
-use tumble::{Device, Engine, FrameRate, Frames, Interpolation, Method};
+use tumble::{Device, Engine, FrameRate, Frames};
 use tumble_formats::Loaded;
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
-use tumble_formats::sample::{ChannelMethods, Samples};
 
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
@@ -277,7 +276,10 @@ impl Arguments {
         let mut samples = Vec::new();
         for reduced in reduced {
             samples.push(match has_own_keys && !reduced.clip.is_world {
-                true => ends(engine, name, &reduced.clip)?,
+                true => reduced
+                    .clip
+                    .ends(engine)
+                    .map_err(|error| Failure::evaluating(name, &error))?,
                 false => keyed(&reduced.clip)
                     .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?,
             });
@@ -341,18 +343,4 @@ fn is_cubic(clip: &Motion) -> bool {
         [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Cubic))
     };
     clip.channels.iter().any(has)
-}
-
-/// The samples at a clip's first and last time: its own keys are written in their place.
-fn ends(engine: &Engine, name: &str, clip: &Motion) -> Result<Samples, Failure> {
-    let (first, last) = clip.set.time_span().unwrap_or_default();
-    let mut times = vec![first, last];
-    times.dedup();
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method: Method| Interpolation::from(method),
-    };
-    methods
-        .sample(engine, clip, &Frames::at(times))
-        .map_err(|error| Failure::evaluating(name, &error))
 }
