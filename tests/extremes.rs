@@ -487,7 +487,7 @@ fn small_things(any: &mut Any) {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 3000,
+        cases: 1200,
         failure_persistence: None,
         ..ProptestConfig::default()
     })]

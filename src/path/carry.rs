@@ -23,6 +23,10 @@ const TOLERANCE: f64 = 3e-10;
 /// No piece is shorter.
 const SHORTEST: f64 = 1e-12;
 
+/// A stretch has no more pieces: where numbers are so large or so near that none ever fits, they stay as
+/// they are.
+const MOST_PIECES: usize = 1 << 14;
+
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
 /// k and degree j, 0 beyond the last degree.
 struct Chebyshev {
@@ -65,7 +69,8 @@ pub(crate) fn carry(route: &Route, stretch: &Stretch, start: DQuat) -> (Vec<Piec
     while let Some((from, to)) = waiting.pop() {
         let (mut piece, fits, [first, last]) = Piece::new(route, stretch, from, to);
         let middle = 0.5 * (from + to);
-        if !fits && to - from > SHORTEST && from < middle && middle < to {
+        let is_finest = to - from <= SHORTEST || pieces.len() + waiting.len() >= MOST_PIECES;
+        if !fits && !is_finest && from < middle && middle < to {
             waiting.extend([(middle, to), (from, middle)]);
             continue;
         }

@@ -141,7 +141,9 @@ fn refined(slope: &Polynomial, from: f64, to: f64, whole: f64, halvings: u32) ->
     let middle = 0.5 * (from + to);
     let halves = [gauss(slope, from, middle), gauss(slope, middle, to)];
     let sum = halves[0] + halves[1];
-    if halvings == 0 || (sum - whole).abs() <= 1e-14 * slope.size() {
+    let differs = (sum - whole).abs() > 1e-14 * slope.size();
+    // What overflows is no number, and halving it finds none.
+    if halvings == 0 || !differs {
         return sum;
     }
     refined(slope, from, middle, halves[0], halvings - 1)

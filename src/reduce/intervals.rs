@@ -93,7 +93,9 @@ impl<T: Value> Task<'_, T> {
         // A cubic could pass all samples and stray between them. Neighbours are always joined.
         if is_cubic && to > from + 1 {
             for place in from..to {
-                let (middle, slack) = self.middle(place);
+                // Samples say as little as the difference between the two.
+                let [straight, smooth] = self.middle(place);
+                let (middle, slack) = (straight.towards(smooth, 0.5), 0.5 * straight.apart(smooth));
                 let curve = cubic(f64::midpoint(part(place), part(place + 1)));
                 let apart = middle.apart(curve);
                 if apart.is_nan() || apart > most + slack {
@@ -117,15 +119,21 @@ impl<T: Value> Task<'_, T> {
         Some(error)
     }
 
-    /// What lies half way between a sample and the next one, and how far it may be from there: samples say
-    /// as little as the difference between the straight way and the cubic through four of them.
-    fn middle(&self, place: usize) -> (T, f64) {
-        let own = |place: usize| self.samples[place.min(self.samples.len() - 1)];
-        let [a, b, c, d] = [place.saturating_sub(1), place, place + 1, place + 2].map(own);
-        let straight = b.towards(c, 0.5);
-        let [a, b, c, d] = [a, b, c, d].map(Value::numbers);
-        let smooth = T::nearest((b + c) * (9.0 / 16.0) - (a + d) / 16.0);
-        (straight.towards(smooth, 0.5), 0.5 * straight.apart(smooth))
+    /// What may lie half way between a sample and the next one: on the straight way, and on the cubic
+    /// through the four samples around (the parabola through three, at an end).
+    fn middle(&self, place: usize) -> [T; 2] {
+        let samples = self.samples;
+        let straight = samples[place].towards(samples[place + 1], 0.5);
+        let own = |place: usize| samples.get(place).map(|sample| sample.numbers());
+        let [b, c] = [place, place + 1].map(|place| samples[place].numbers());
+        let before = place.checked_sub(1).and_then(own);
+        let smooth = match (before, own(place + 2)) {
+            (Some(a), Some(d)) => (b + c) * (9.0 / 16.0) - (a + d) / 16.0,
+            (None, Some(d)) => b * (3.0 / 8.0) + c * (3.0 / 4.0) - d / 8.0,
+            (Some(a), None) => c * (3.0 / 8.0) + b * (3.0 / 4.0) - a / 8.0,
+            (None, None) => (b + c) / 2.0,
+        };
+        [straight, T::nearest(smooth)]
     }
 
     /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their
@@ -156,7 +164,7 @@ impl<T: Value> Task<'_, T> {
                 add(part(place), sample.numbers(), 1.0);
             }
             let middle = f64::midpoint(part(place), part(place + 1));
-            add(middle, self.middle(place).0.numbers(), MIDDLE);
+            add(middle, self.middle(place)[1].numbers(), MIDDLE);
         }
         let determinant = aa * bb - ab * ab;
         [
