@@ -210,6 +210,8 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::evaluate`]; also when the quantity is the rotation.
+    #[doc(alias = "angular velocity")]
+    #[doc(alias = "angular acceleration")]
     pub fn rates(
         &self,
         set: &TrackSet,

@@ -291,7 +291,7 @@ pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
 }
 
 /// The tracks of one method as a set, and their places in the clip; `None` where these are all.
-type OwnSet = (Method, TrackSet, Option<Vec<usize>>);
+pub(crate) type OwnSet = (Method, TrackSet, Option<Vec<usize>>);
 
 /// The sets of a clip by their methods.
 pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<OwnSet>> {

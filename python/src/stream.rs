@@ -11,7 +11,7 @@ use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;
 use crate::errors::{guarded, input, of_engine};
-use crate::evaluate::uniform;
+use crate::evaluate::{OwnSet, sets, uniform};
 use crate::options::Request;
 use crate::output::{array, filled};
 use crate::run::Job;
@@ -21,17 +21,30 @@ use crate::run::Job;
 pub(crate) struct Chunks {
     engine: Engine,
     motion: Arc<Motion>,
-    interpolation: Interpolation,
-    frames: Frames,
     samples: usize,
     order: Order,
     layout: Layout,
-    /// Prepared once, where chunks have some samples of a track and not all.
-    clip: Option<tumble::Clip>,
+    source: Source,
     /// Rows and columns that a chunk has at most; rows are tracks or frames, as the layout has it.
     each: (usize, usize),
     /// The row and the column where the next chunk starts.
     next: Mutex<(usize, usize)>,
+}
+
+/// How the rotations of a chunk are made.
+enum Source {
+    /// Tracks that one method interpolates, prepared for each chunk.
+    Tracks(Interpolation, Frames),
+    /// Tracks that have been prepared: all of them by one method, or those of each method.
+    Prepared(Vec<Group>),
+}
+
+/// Tracks that one method interpolates.
+struct Group {
+    clip: tumble::Clip,
+    frames: Frames,
+    /// Their places among all tracks, increasing; nothing where they are all.
+    tracks: Option<Vec<usize>>,
 }
 
 /// A part of a result, contiguous in the whole.
@@ -43,7 +56,6 @@ pub(crate) struct Chunk {
 }
 
 impl Chunks {
-    /// Of a clip that one method interpolates.
     pub(crate) fn new(
         engine: Engine,
         motion: &Arc<Motion>,
@@ -57,36 +69,36 @@ impl Chunks {
                 "chunk: give the number of rotations of a piece, over 0",
             ));
         }
-        let Some(method) = uniform(motion, request) else {
-            return Err(input(
-                "the tracks of this clip are interpolated by different methods; name one with \
-                 `method` to stream it",
-            ));
-        };
-        let interpolation = request.with(Quantity::Rotation)(method);
         let columns = match layout {
             Layout::TrackMajor => samples,
             Layout::FrameMajor => motion.set.track_count(),
         };
         let each = ((chunk / columns.max(1)).max(1), columns.min(chunk));
         let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
-        let clip = match is_prepared {
-            true => Some(
-                engine
-                    .upload(&motion.set, interpolation)
-                    .map_err(|error| of_engine(&error))?,
-            ),
-            false => None,
+        let with = request.with(Quantity::Rotation);
+        let source = match uniform(motion, request) {
+            Some(method) if !is_prepared => Source::Tracks(with(method), frames),
+            _ => {
+                let wanted = request.samples()?;
+                let group = |(method, set, tracks): OwnSet| -> PyResult<Group> {
+                    let clip = engine.upload(&set, with(method));
+                    Ok(Group {
+                        clip: clip.map_err(|error| of_engine(&error))?,
+                        frames: wanted.frames(&motion.set, tracks.as_deref())?,
+                        tracks,
+                    })
+                };
+                let groups = sets(motion, request)?.into_iter().map(group);
+                Source::Prepared(groups.collect::<PyResult<_>>()?)
+            }
         };
         Ok(Self {
             engine,
             motion: Arc::clone(motion),
-            interpolation,
-            frames,
             samples,
             order,
             layout,
-            clip,
+            source,
             each,
             next: Mutex::new((0, 0)),
         })
@@ -138,12 +150,23 @@ impl Chunks {
         filled(&array, |numbers| {
             guarded(|| {
                 let bytes = bytemuck::cast_slice_mut(&mut *numbers);
-                match &self.clip {
-                    Some(clip) => clip
-                        .evaluate_part_into(&self.frames, self.layout, part, Encoding::F32, bytes)
-                        .map_err(|error| of_engine(&error)),
-                    None => self.job().tracks(part.0, bytes),
-                }?;
+                match &self.source {
+                    Source::Tracks(interpolation, frames) => Job {
+                        engine: &self.engine,
+                        set: &self.motion.set,
+                        interpolation: *interpolation,
+                        frames,
+                        samples: self.samples,
+                        layout: self.layout,
+                        encoding: Encoding::F32,
+                    }
+                    .tracks(part.0, bytes)?,
+                    Source::Prepared(groups) => {
+                        for group in groups {
+                            group.write(self.layout, part.clone(), bytes)?;
+                        }
+                    }
+                }
                 if self.order == Order::Wxyz {
                     for quaternion in numbers.as_chunks_mut().0 {
                         *quaternion = self.order.of_xyzw(*quaternion);
@@ -166,17 +189,40 @@ impl Chunks {
     }
 }
 
-impl Chunks {
-    fn job(&self) -> Job<'_> {
-        Job {
-            engine: &self.engine,
-            set: &self.motion.set,
-            interpolation: self.interpolation,
-            frames: &self.frames,
-            samples: self.samples,
-            layout: self.layout,
-            encoding: Encoding::F32,
+impl Group {
+    /// Writes its own of some tracks and samples into the bytes of them all.
+    fn write(
+        &self,
+        layout: Layout,
+        (tracks, samples): (Range<usize>, Range<usize>),
+        bytes: &mut [u8],
+    ) -> PyResult<()> {
+        let part = |tracks, bytes: &mut [u8]| {
+            let part = (tracks, samples.clone());
+            self.clip
+                .evaluate_part_into(&self.frames, layout, part, Encoding::F32, bytes)
+                .map_err(|error| of_engine(&error))
+        };
+        let Some(all) = &self.tracks else {
+            return part(tracks, bytes);
+        };
+        let [first, end] =
+            [tracks.start, tracks.end].map(|own| all.partition_point(|&it| it < own));
+        let own = &all[first..end];
+        let size = Encoding::F32.bytes();
+        let mut found = vec![0; own.len() * samples.len() * size];
+        part(first..end, &mut found)?;
+        for (place, &track) in own.iter().enumerate() {
+            for sample in 0..samples.len() {
+                let from = layout.index(place, sample, own.len(), samples.len());
+                let to = layout.index(track - tracks.start, sample, tracks.len(), samples.len());
+                if let (Some(from), Some(to)) = (from, to) {
+                    let (from, to) = (from * size, to * size);
+                    bytes[to..to + size].copy_from_slice(&found[from..from + size]);
+                }
+            }
         }
+        Ok(())
     }
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from conftest import unit
@@ -211,6 +213,21 @@ def test_streams_are_the_whole(clip, engine):
             assert np.array_equal(found, whole)
     first = next(iter(engine.stream(clip, fps=1000, order="wxyz")))
     assert np.array_equal(np.roll(first.rotations, -1, axis=-1), clip.evaluate(fps=1000))
+
+
+def test_streams_of_mixed_samplers_are_the_whole(tmp_path, engine):
+    made = Path(__file__).parents[3] / "shared" / "data" / "gltf" / "interpolation_test.gltf"
+    if not made.exists():
+        pytest.skip(f"{made} is not there")
+    for clip in tumble.load(made).clips:
+        for layout in ["track", "frame"]:
+            whole = clip.evaluate(fps=240, layout=layout)
+            for chunk in [7, 300, 1 << 20]:
+                found = np.full_like(whole, np.nan)
+                for part in engine.stream(clip, fps=240, chunk=chunk, layout=layout):
+                    place = (part.tracks, part.frames)
+                    found[place if layout == "track" else place[::-1]] = part.rotations
+                assert np.array_equal(found, whole)
 
 
 def test_verification(clip, engine):

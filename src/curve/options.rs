@@ -91,6 +91,8 @@ impl Path {
 /// The curve in the first and in the last segment, where a neighbouring key is missing. Two keys
 /// alone are joined by slerp, whatever the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[doc(alias = "boundary condition")]
+#[doc(alias = "end condition")]
 pub enum Ends {
     /// The parabola through the last three keys: constant velocity stays constant
     /// to the very ends.

@@ -47,6 +47,9 @@ impl Engine {
     /// # Errors
     /// When the three are not of the same tracks and samples, the skeleton or the inverse bind
     /// matrices are of other tracks, or there is not the memory.
+    #[doc(alias = "skinning")]
+    #[doc(alias = "model space")]
+    #[doc(alias = "object space")]
     pub fn local_to_model(
         &self,
         local: &Transforms,

@@ -73,6 +73,7 @@ impl Engine {
     /// # Errors
     /// When the shapes differ, there is not one reference for each track, the weight lies
     /// outside, or the device fails.
+    #[doc(alias = "additive")]
     pub fn add(
         &self,
         base: &Rotations,

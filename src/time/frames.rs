@@ -157,6 +157,7 @@ impl Frames {
 
     /// Explicit times, seconds, the same for every track, in any order.
     #[must_use]
+    #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
         Self {
             request: Request::Shared(Arc::new(times)),

@@ -12,6 +12,10 @@ use crate::tracks::check::LATEST;
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[doc(alias = "pre-infinity")]
+#[doc(alias = "post-infinity")]
+#[doc(alias = "extrapolation")]
+#[doc(alias = "loop")]
 pub enum WrapMode {
     /// The end value is held.
     #[default]
