@@ -52,6 +52,10 @@ pub(crate) struct Found {
 
 /// The angle between two rotations, radians, whatever their norms are.
 pub(crate) fn angle(a: DQuat, b: DQuat) -> f64 {
+    // Products of equal numbers are rounded, and leave a little.
+    if a == b || a == -b {
+        return 0.0;
+    }
     let step = a.conjugate() * b;
     let angle = 2.0 * step.xyz().length().atan2(step.w.abs());
     debug_assert!(angle.is_nan() || (0.0..=TAU / 2.0 + 1e-9).contains(&angle));
