@@ -34,7 +34,7 @@ pub(crate) struct Chunks {
 /// How the rotations of a chunk are made.
 enum Source {
     /// Tracks that one method interpolates, prepared for each chunk.
-    Tracks(Interpolation, Frames),
+    Tracks(Box<Interpolation>, Frames),
     /// Tracks that have been prepared: all of them by one method, or those of each method.
     Prepared(Vec<Group>),
 }
@@ -77,7 +77,7 @@ impl Chunks {
         let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
         let with = request.with(Quantity::Rotation);
         let source = match uniform(motion, request) {
-            Some(method) if !is_prepared => Source::Tracks(with(method), frames),
+            Some(method) if !is_prepared => Source::Tracks(Box::new(with(method)), frames),
             _ => {
                 let wanted = request.samples()?;
                 let group = |(method, set, tracks): OwnSet| -> PyResult<Group> {
@@ -154,7 +154,7 @@ impl Chunks {
                     Source::Tracks(interpolation, frames) => Job {
                         engine: &self.engine,
                         set: &self.motion.set,
-                        interpolation: *interpolation,
+                        interpolation: **interpolation,
                         frames,
                         samples: self.samples,
                         layout: self.layout,
