@@ -84,7 +84,6 @@ def test_one_output_is_not_written_by_two(long, rng):
     assert refused > 0
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
 EVALUATE = """
     times = np.arange(2000.0)
     keys = np.random.default_rng(1).normal(size=(200, 2000, 4))
@@ -106,6 +105,7 @@ POSES = """
 """
 
 
+@pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
 @pytest.mark.parametrize("work", [EVALUATE, POSES])
 def test_ctrl_c_ends_long_work(work):
     script = f"""
