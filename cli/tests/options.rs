@@ -169,7 +169,7 @@ fn prepare(place: &Path) {
     let write = |name: &str, text: &str| std::fs::write(place.join(name), text).unwrap();
     write("walk.bvh", &bvh());
     write("keys.dat", &dat());
-    write("times.txt", "0.11\n0.52\n0.97\n1.61\n");
+    write("times.txt", "0.11\n0.31\n0.52\n0.97\n1.61\n");
     write("offsets.txt", "0 0 0\n0 -1 0\n");
     write("list.txt", "");
     let run = |line: &[&str]| {
