@@ -108,8 +108,8 @@ fn a_captured_walk_is_near_everywhere() {
     for (curve, distance, shell, most) in [
         (ReducedCurve::Linear, Some(0.0202), 0.0, 64_136),
         (ReducedCurve::Linear, None, 0.0, 53_000),
-        (ReducedCurve::GltfCubic, Some(0.0202), 0.0, 18_000),
-        (ReducedCurve::GltfCubic, Some(0.05), 3.0, 18_000),
+        (ReducedCurve::GltfCubic, Some(0.0202), 0.0, 23_000),
+        (ReducedCurve::GltfCubic, Some(0.05), 3.0, 23_000),
     ] {
         let options = ReduceOptions {
             distance,
