@@ -13,6 +13,18 @@ use crate::tracks::signs::Signs;
 /// vectors, `x y z` and 0 in the place of `w`, by the derivatives of the formula. On a key they are
 /// those of the segment after it, on the last key those of the last segment; outside the keys they
 /// are 0 while the end value is held.
+///
+/// ```
+/// use tumble::glam::{Quat, Vec3};
+/// use tumble::{Axes, Device, Engine, Frames, Interpolation, Layout, Quantity, TrackSet, method};
+/// let mut set = TrackSet::new();
+/// set.push("wheel", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_z(1.0)])?;
+/// let quantity = Quantity::Velocity(Axes::Body);
+/// let how = Interpolation { quantity, ..method::SLERP.into() };
+/// let found = Engine::new(Device::Cpu)?.rates(&set, how, &Frames::fps(1), Layout::TrackMajor)?;
+/// assert!(found.get(0, 0).unwrap().distance(Vec3::Z * 0.5) < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Quantity {
     /// The rotation, a unit quaternion.
