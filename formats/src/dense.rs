@@ -1,7 +1,7 @@
 //! The keys of a clip as times and numbers, and clips whose keys are samples.
 
 use glam::{Quat, Vec3};
-use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackSet};
+use tumble::{Channel, Engine, Error, Frames, TrackSet};
 
 use crate::motion::{Channels, Motion, Sampler};
 use crate::sample::{ChannelMethods, Samples};
@@ -30,10 +30,7 @@ impl Motion {
     /// # Errors
     /// As [`Engine::evaluate`].
     pub fn sampled(&self, engine: &Engine, frames: &Frames) -> Result<Self, Error> {
-        let methods = ChannelMethods {
-            method: None,
-            with: &|method| Interpolation::from(method),
-        };
+        let methods = ChannelMethods::AUTHORED;
         let samples = methods.sample(engine, self, frames)?;
         let tracks = self.set.track_count();
         let mut set = TrackSet::new();
@@ -84,10 +81,7 @@ impl Motion {
         let (first, last) = self.set.time_span().unwrap_or_default();
         let mut times = vec![first, last];
         times.dedup();
-        let methods = ChannelMethods {
-            method: None,
-            with: &|method| Interpolation::from(method),
-        };
+        let methods = ChannelMethods::AUTHORED;
         methods.sample(engine, self, &Frames::at(times))
     }
 

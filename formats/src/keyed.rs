@@ -59,7 +59,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
             return Err(KeyedError::TimesDiffer { track, name });
         }
         let own = clip.channel(track);
-        if [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Cubic)) {
+        if own.has(Sampler::Cubic) {
             return Err(KeyedError::Cubic { track, name });
         }
     }

@@ -74,6 +74,14 @@ pub struct Channels {
     pub scale: Option<Sampler>,
 }
 
+impl Channels {
+    /// Whether any of them has that sampler.
+    #[must_use]
+    pub fn has(self, sampler: Sampler) -> bool {
+        [self.rotation, self.translation, self.scale].contains(&Some(sampler))
+    }
+}
+
 /// How a channel is interpolated between its keys, as glTF 2.0 defines it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sampler {

@@ -33,6 +33,14 @@ pub struct Samples {
     pub scales: Vec<Vec3>,
 }
 
+impl ChannelMethods<'static> {
+    /// Every channel as its sampler says, with the default options.
+    pub const AUTHORED: Self = Self {
+        method: None,
+        with: &|method| Interpolation::from(method),
+    };
+}
+
 impl ChannelMethods<'_> {
     /// The one method for the rotations of all tracks; `None` where their samplers differ.
     #[must_use]

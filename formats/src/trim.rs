@@ -1,7 +1,7 @@
 //! A part of a clip, from one time to another.
 
 use glam::Vec3;
-use tumble::{Channel, Engine, Error, Frames, Interpolation, TrackError, TrackSet};
+use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet};
 
 use crate::grid::{Precision, fits};
 use crate::motion::Motion;
@@ -63,10 +63,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
             last,
         });
     }
-    let methods = ChannelMethods {
-        method: None,
-        with: &Interpolation::from,
-    };
+    let methods = ChannelMethods::AUTHORED;
     let cuts = methods.sample(engine, clip, &Frames::at(vec![start, end]))?;
     let tracks = set.track_count();
     let mut trimmed = TrackSet::new();
@@ -245,10 +242,7 @@ mod tests {
     fn largest(whole: &Motion, part: &Motion, from: f64, to: f64) -> (f64, f32) {
         let engine = Engine::new(Device::Cpu).unwrap();
         let frames = Frames::fps(60).between(from, to);
-        let methods = ChannelMethods {
-            method: None,
-            with: &Interpolation::from,
-        };
+        let methods = ChannelMethods::AUTHORED;
         let [a, b] = [whole, part].map(|clip| methods.sample(&engine, clip, &frames).unwrap());
         let angle =
             |(a, b): (&Quat, &Quat)| tumble::reference::angle_between(a.as_dquat(), b.as_dquat());

@@ -7,7 +7,8 @@ use tumble::reduce::{
 use tumble::{Channel, Frames, Layout, TrackError, TrackSet};
 
 use crate::motion::{Channels, Motion, Sampler};
-use crate::reduce::{ReduceMotionError, Reduction, Tolerances, methods};
+use crate::reduce::{ReduceMotionError, Reduction, Tolerances};
+use crate::sample::ChannelMethods;
 
 /// What an evaluation in f32 adds to an angle at most, radians.
 const ROUNDING: f64 = 4e-7;
@@ -105,10 +106,7 @@ impl Reduction<'_> {
     ) -> Result<(), ReduceMotionError> {
         let joints = self.parents.len();
         let samplers = (0..joints).map(|joint| self.sampler(joint));
-        let steps = |own: &Channels| {
-            [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Step))
-        };
-        if let Some(joint) = samplers.into_iter().position(|own| steps(&own)) {
+        if let Some(joint) = samplers.into_iter().position(|own| own.has(Sampler::Step)) {
             let name = self.clip.set.track_name(joint);
             return Err(ReduceMotionError::Steps { joint, name });
         }
@@ -206,7 +204,9 @@ impl Reduction<'_> {
             ..Channels::default()
         };
         one.channels.push(channels);
-        let method = methods().method_of(&one).unwrap_or(tumble::method::SLERP);
+        let method = ChannelMethods::AUTHORED
+            .method_of(&one)
+            .unwrap_or(tumble::method::SLERP);
         let frames = Frames::at(self.times.clone());
         let found = self
             .engine

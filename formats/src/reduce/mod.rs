@@ -12,7 +12,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use tumble::reduce::{ReduceError, ReducedCurve};
-use tumble::{Channel, Engine, Error, Frames, Interpolation, Method, TrackError};
+use tumble::reference::angle_between;
+use tumble::{Channel, Engine, Error, Frames, TrackError};
 
 use crate::motion::Motion;
 use crate::sample::{ChannelMethods, Samples};
@@ -170,7 +171,7 @@ impl<'a> Reduction<'a> {
         options: &'a ReduceOptions,
     ) -> Result<Self, ReduceMotionError> {
         let times = clip.key_times();
-        let samples = methods().sample(engine, clip, &Frames::at(times.clone()))?;
+        let samples = ChannelMethods::AUTHORED.sample(engine, clip, &Frames::at(times.clone()))?;
         let joints = clip.set.track_count();
         // Where poses in the world cannot be told, each track is what it is relative to its parent.
         let hangs = clip.no_world.is_none() && !clip.is_world;
@@ -214,7 +215,7 @@ impl<'a> Reduction<'a> {
     /// How far a clip is from the samples, as `eval` evaluates it.
     fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
         let frames = Frames::at(self.times.clone());
-        let samples = methods().sample(self.engine, reduced, &frames)?;
+        let samples = ChannelMethods::AUTHORED.sample(self.engine, reduced, &frames)?;
         let poses = poses(reduced, &samples)?;
         let joints = self.parents.len();
         let mut measured = Measured {
@@ -226,8 +227,7 @@ impl<'a> Reduction<'a> {
         for (place, (wanted, found)) in self.poses.iter().zip(&poses).enumerate() {
             let (sample, joint) = (place / joints, place % joints);
             let [a, b] = [wanted, found].map(|pose| pose.rotation.as_dquat());
-            let step = a.conjugate() * b;
-            let angle = 2.0 * step.xyz().length().atan2(step.w.abs());
+            let angle = angle_between(a, b);
             let moved = found.position.as_dvec3() - wanted.position.as_dvec3();
             let mut distance = moved.length();
             if self.options.shell > 0.0 {
@@ -319,12 +319,4 @@ fn poses(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyEr
             rotation,
         })
         .collect())
-}
-
-/// Every channel as its sampler says.
-fn methods() -> ChannelMethods<'static> {
-    ChannelMethods {
-        method: None,
-        with: &|method: Method| Interpolation::from(method),
-    }
 }

@@ -8,7 +8,7 @@ use std::thread;
 
 use fastrand::Rng;
 use glam::{Quat, Vec3};
-use tumble::{Device, Engine, FrameRate, Frames, Interpolation, TrackSet};
+use tumble::{Device, Engine, FrameRate, Frames, TrackSet};
 use tumble_formats::format::{MotionOptions, ReadOptions, WriteError};
 use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
 use tumble_formats::sample::{ChannelMethods, Samples};
@@ -136,10 +136,7 @@ fn place(joint: usize, frame: usize) -> Vec3 {
 fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result<Section, Failure> {
     let options = ReadOptions::default();
     let engine = Engine::new(Device::Cpu).map_err(|error| refused(&error))?;
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method| Interpolation::from(method),
-    };
+    let methods = ChannelMethods::AUTHORED;
     let read = |path: &Path| -> Result<Loaded, Failure> {
         format
             .open(path, &options)

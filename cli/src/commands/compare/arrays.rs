@@ -4,11 +4,11 @@ use std::path::Path;
 
 use glam::DQuat;
 use serde::Serialize;
+use tumble::reference::angle_between;
 use tumble_formats::npz::{Numbers, open_numbers};
 use tumble_formats::{Diagnostic, ReadOptions};
 
 use crate::arguments::input::name;
-use crate::commands::compare::clips::angle;
 use crate::commands::compare::tally::{Spread, Tally};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
@@ -62,7 +62,7 @@ impl Compared {
         }
         let turns = rotations(first).zip(rotations(second)).map(|(a, b)| {
             let mut tally = Tally::default();
-            a.zip(b).for_each(|(a, b)| tally.add(angle(a, b)));
+            a.zip(b).for_each(|(a, b)| tally.add(angle_between(a, b)));
             tally
         });
         let rows = &first.shape[..first.shape.len().saturating_sub(1)];

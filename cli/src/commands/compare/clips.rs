@@ -1,11 +1,11 @@
 //! Two clips, sampled at the same times.
 
 use std::collections::HashMap;
-use std::f64::consts::TAU;
 
-use glam::{DQuat, Quat, Vec3};
+use glam::{Quat, Vec3};
 use serde::Serialize;
-use tumble::{Channel, Engine, Frames, Interpolation, Method};
+use tumble::reference::angle_between;
+use tumble::{Channel, Engine, Frames};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::world;
@@ -50,18 +50,6 @@ pub(crate) struct Found {
     time: f64,
 }
 
-/// The angle between two rotations, radians, whatever their norms are.
-pub(crate) fn angle(a: DQuat, b: DQuat) -> f64 {
-    // Products of equal numbers are rounded, and leave a little.
-    if a == b || a == -b {
-        return 0.0;
-    }
-    let step = a.conjugate() * b;
-    let angle = 2.0 * step.xyz().length().atan2(step.w.abs());
-    debug_assert!(angle.is_nan() || (0.0..=TAU / 2.0 + 1e-9).contains(&angle));
-    angle
-}
-
 /// How clips are compared.
 pub(crate) struct Comparison<'a> {
     pub(crate) engine: &'a Engine,
@@ -103,7 +91,7 @@ impl Comparison<'_> {
             let (a, b) = (sampled[0].rotations[a], sampled[1].rotations[b]);
             let bits = |q: Quat| q.to_array().map(f32::to_bits);
             identical += u64::from(bits(a) == bits(b) || bits(a) == bits(-b));
-            turned.add(angle(a.as_dquat(), b.as_dquat()));
+            turned.add(angle_between(a.as_dquat(), b.as_dquat()));
         }
         let found = |tally: Tally, factor| {
             let place = tally.place as usize;
@@ -191,12 +179,7 @@ impl Comparison<'_> {
     /// All poses of a clip.
     fn poses(&self, name: &str, clip: &Motion, frames: &Frames) -> Result<Samples, Failure> {
         room::in_memory(name, &clip.set, frames, 7)?;
-        let with = |method: Method| Interpolation::from(method);
-        let methods = ChannelMethods {
-            method: None,
-            with: &with,
-        };
-        let mut samples = methods
+        let mut samples = ChannelMethods::AUTHORED
             .sample(self.engine, clip, frames)
             .map_err(|error| Failure::evaluating(name, &error))?;
         if self.in_world {

@@ -240,7 +240,7 @@ impl Arguments {
                 let sampled = clip.sampled(engine, &frames);
                 Cow::Owned(sampled.map_err(|error| Failure::evaluating(name, &error))?)
             }
-            None if is_cubic(&clip) => {
+            None if clip.channels.iter().any(|own| own.has(Sampler::Cubic)) => {
                 return Err(Failure::usage(format!(
                     "{name}: its keys are joined by cubics with tangents, so they are not its \
                      samples; give --fps"
@@ -336,11 +336,4 @@ impl Told {
             words::count(reduced.times.len(), "sample")
         )
     }
-}
-
-fn is_cubic(clip: &Motion) -> bool {
-    let has = |own: &tumble_formats::motion::Channels| {
-        [own.rotation, own.translation, own.scale].contains(&Some(Sampler::Cubic))
-    };
-    clip.channels.iter().any(has)
 }

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{
-    Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, Smoothing,
-    SmoothingEnds, SmoothingKernel, Vectors,
+    Engine, Error, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds, SmoothingKernel,
+    Vectors,
 };
 use tumble_formats::format::{MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};
@@ -208,10 +208,7 @@ fn smoothed(
     };
     let timeline = room::in_memory(name, &clip.set, &frames, 7)?;
     let rotations = clip.set.track_count() * timeline.len();
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method: Method| Interpolation::from(method),
-    };
+    let methods = ChannelMethods::AUTHORED;
     let tracks = clip.set.track_count();
     let work = |engine: &Engine| {
         let before = methods.sample(engine, clip, &frames)?;
