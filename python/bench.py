@@ -40,6 +40,16 @@ def unit(rng: np.random.Generator, *shape: int) -> np.ndarray[Any, np.dtype[np.f
     return (keys / np.linalg.norm(keys, axis=-1, keepdims=True)).astype(np.float32)
 
 
+def keys_of_the_example() -> np.ndarray[Any, np.dtype[np.float32]]:
+    """The keys of `examples/into_memory.rs`: how long slerp takes depends on how far keys turn."""
+    place = np.arange(TRACKS * KEYS, dtype=np.float32)
+    axes = np.stack([np.sin(place * 0.7), np.cos(place * 1.3), np.ones_like(place)], axis=-1)
+    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
+    half = place * 0.55
+    keys = np.concatenate([axes * np.sin(half)[:, None], np.cos(half)[:, None]], axis=-1)
+    return keys.astype(np.float32).reshape(TRACKS, KEYS, 4)
+
+
 def resident() -> int:
     """Bytes of memory that this process has."""
     gc.collect()
@@ -58,7 +68,7 @@ def rust() -> float:
 def main() -> None:
     rng = np.random.default_rng(1)
     times = np.linspace(0.0, 20.0, KEYS)
-    keys = unit(rng, TRACKS, KEYS)
+    keys = keys_of_the_example()
     clip, engine = tumble.Clip(times, keys), tumble.Engine("cpu")
     at = np.linspace(0.0, 20.0, FRAMES)
     fps = f"{FRAMES - 1}/20"

@@ -124,6 +124,37 @@ fn put(rows: &mut Components, lane: usize, value: [f32; 4]) {
     }
 }
 
+/// Whether any rotation is 0, without a branch for each.
+#[inline(always)]
+fn are_any_zero([x, y, z, w]: &Components) -> bool {
+    let mut found = 0;
+    for i in 0..LANES {
+        let is_zero = (x[i] == 0.0) & (y[i] == 0.0) & (z[i] == 0.0) & (w[i] == 0.0);
+        found |= u32::from(is_zero);
+    }
+    found != 0
+}
+
+impl Row<'_> {
+    /// The components of consecutive samples, at most [`LANES`] of them.
+    #[inline(always)]
+    fn load<L: Lanes>(&self, first: usize, count: usize, components: &mut Components) {
+        if self.stride == 1 && count == LANES {
+            let values = &self.values[self.first + first..][..LANES];
+            for lane in (0..LANES).step_by(L::COUNT) {
+                let loaded = L::load_rotations(&values[lane..]);
+                for (row, own) in components.iter_mut().zip(loaded) {
+                    own.store(&mut row[lane..][..L::COUNT]);
+                }
+            }
+        } else {
+            for lane in 0..count {
+                put(components, lane, self.get(first + lane));
+            }
+        }
+    }
+}
+
 /// Smooths consecutive samples of a row on the CPU.
 pub(crate) struct Block<'a> {
     pub(crate) pass: Pass<'a>,
@@ -145,34 +176,36 @@ impl Block<'_> {
     }
 
     #[inline(always)]
-    fn find_steps(&mut self) {
+    fn find_steps<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
         let (row, radius) = (self.row, self.pass.weights.len());
         let count = self.count + 2 * radius - 1;
         let rounded = count.next_multiple_of(LANES);
         for steps in self.steps.iter_mut() {
-            steps.resize(rounded, 0.0);
+            // The last sums read as many as the others.
+            steps.resize(rounded + LANES, 0.0);
         }
         let before = self.first as isize - radius as isize;
+        let (mut from, mut to): (Components, Components) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
         for lane in (0..rounded).step_by(LANES) {
-            let mut pairs: [Components; 2] = [[[0.0; LANES]; 4]; 2];
             let own = LANES.min(count - lane);
             let place = before + lane as isize;
-            let is_inside = place >= 0 && place + (own as isize) < row.count as isize;
-            for i in 0..own {
-                let place = place + i as isize;
-                let step = match is_inside {
-                    true => place as usize,
-                    false => self.pass.step_at(place, row.count),
-                };
-                for (end, values) in pairs.iter_mut().enumerate() {
-                    put(values, i, row.get(step + end));
+            if place >= 0 && place + (own as isize) < row.count as isize {
+                row.load::<L>(place as usize, own, &mut from);
+                row.load::<L>(place as usize + 1, own, &mut to);
+            } else {
+                for i in 0..own {
+                    let step = self.pass.step_at(place + i as isize, row.count);
+                    put(&mut from, i, row.get(step));
+                    put(&mut to, i, row.get(step + 1));
                 }
             }
-            let [from, to] = &pairs;
             let mut found: Components = [[0.0; LANES]; 4];
             for i in 0..LANES {
-                let step = pose_steps::pose(at(from, i), at(to, i), self.pass.are_rotations);
-                put(&mut found, i, step);
+                put(
+                    &mut found,
+                    i,
+                    pose_steps::pose(at(&from, i), at(&to, i), ARE_ROTATIONS),
+                );
             }
             for (steps, found) in self.steps.iter_mut().zip(&found) {
                 steps[lane..lane + LANES].copy_from_slice(found);
@@ -180,51 +213,69 @@ impl Block<'_> {
         }
     }
 
+    /// The weighted sums of the steps about samples, of which `lane` is the first.
     #[inline(always)]
-    fn find_values(&mut self) {
-        let (row, radius, weights) = (self.row, self.pass.weights.len(), self.pass.weights);
+    fn sums(&self, lane: usize) -> Components {
+        let radius = self.pass.weights.len();
+        let mut sums: Components = [[0.0; LANES]; 4];
+        for (sum, steps) in sums.iter_mut().zip(self.steps.iter()) {
+            for (m, weight) in self.pass.weights.iter().enumerate() {
+                let after = &steps[lane + radius + m..][..LANES];
+                let before = &steps[lane + radius - 1 - m..][..LANES];
+                for i in 0..LANES {
+                    sum[i] += (after[i] - before[i]) * weight;
+                }
+            }
+        }
+        sums
+    }
+
+    #[inline(always)]
+    fn find_values<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
+        let (row, radius) = (self.row, self.pass.weights.len());
+        let mut values: Components = [[0.0; LANES]; 4];
         for lane in (0..self.count).step_by(LANES) {
             let own = LANES.min(self.count - lane);
-            let mut values: Components = [[0.0; LANES]; 4];
-            for i in 0..own {
-                put(&mut values, i, row.get(self.first + lane + i));
-            }
-            let mut sums: Components = [[0.0; LANES]; 4];
-            for (sum, steps) in sums.iter_mut().zip(self.steps.iter()) {
-                for (m, weight) in weights.iter().enumerate() {
-                    let after = &steps[lane + radius + m..][..own];
-                    let before = &steps[lane + radius - 1 - m..][..own];
-                    if let (Some(after), Some(before)) =
-                        (after.first_chunk::<LANES>(), before.first_chunk::<LANES>())
-                    {
-                        for i in 0..LANES {
-                            sum[i] += (after[i] - before[i]) * weight;
-                        }
-                    } else {
-                        for (i, sum) in sum[..own].iter_mut().enumerate() {
-                            *sum += (after[i] - before[i]) * weight;
-                        }
-                    }
-                }
-            }
+            row.load::<L>(self.first + lane, own, &mut values);
+            let sums = self.sums(lane);
             let mut moved: Components = [[0.0; LANES]; 4];
             for i in 0..LANES {
-                let (value, sum) = (at(&values, i), at(&sums, i));
-                let value = pose_smooth::moved(value, sum, self.pass.are_rotations);
+                let value = pose_smooth::moved(at(&values, i), at(&sums, i), ARE_ROTATIONS);
                 put(&mut moved, i, value);
             }
-            for i in 0..own {
-                let mut value = at(&moved, i);
-                if self.pass.are_rotations && value == [0.0; 4] {
+            if ARE_ROTATIONS && are_any_zero(&moved) {
+                for i in 0..own {
+                    if at(&moved, i) != [0.0; 4] {
+                        continue;
+                    }
                     let place = (lane + i + radius) as isize;
-                    value = self
-                        .pass
-                        .turned_far(row.get(self.first + lane + i), |step| {
-                            let step = (place + step) as usize;
-                            [0, 1, 2].map(|c| self.steps[c][step])
-                        });
+                    let value = row.get(self.first + lane + i);
+                    let value = self.pass.turned_far(value, |step| {
+                        let step = (place + step) as usize;
+                        [0, 1, 2].map(|c| self.steps[c][step])
+                    });
+                    put(&mut moved, i, value);
                 }
-                self.output[self.place + (lane + i) * row.stride] = value;
+            }
+            if row.stride == 1 && own == LANES {
+                let output = &mut self.output[self.place + lane..][..LANES];
+                for (lane, output) in (0..)
+                    .step_by(L::COUNT)
+                    .zip(output.chunks_exact_mut(L::COUNT))
+                {
+                    let [x, y, z, w] = &moved;
+                    let components = [
+                        L::load(&x[lane..]),
+                        L::load(&y[lane..]),
+                        L::load(&z[lane..]),
+                        L::load(&w[lane..]),
+                    ];
+                    L::store_rotations(components, output);
+                }
+            } else {
+                for i in 0..own {
+                    self.output[self.place + (lane + i) * row.stride] = at(&moved, i);
+                }
             }
         }
     }
@@ -233,7 +284,12 @@ impl Block<'_> {
 impl InLanes for Block<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        self.find_steps();
-        self.find_values();
+        if self.pass.are_rotations {
+            self.find_steps::<L, true>();
+            self.find_values::<L, true>();
+        } else {
+            self.find_steps::<L, false>();
+            self.find_values::<L, false>();
+        }
     }
 }

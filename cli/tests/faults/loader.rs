@@ -14,19 +14,24 @@ pub(super) struct Loader {
     own: tempfile::TempDir,
 }
 
-/// A library that `cargo test` has built among the examples.
+/// A library that `cargo test` builds among the examples. Where only some tests were asked for it may be
+/// missing or old; building it then compiles the engine once more, for other features than all packages
+/// have together.
 pub(super) fn example(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
-    let profile = if folder.ends_with("release") {
-        "release"
-    } else {
-        "dev"
-    };
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--example", name, "--profile", profile])
-        .status();
-    assert!(built.unwrap().success(), "the example {name} builds");
-    folder.join(format!("examples/lib{name}.so"))
+    let library = folder.join(format!("examples/lib{name}.so"));
+    let source = crate::program::root().join(format!("cli/tests/{name}/lib.rs"));
+    let changed = |path: &Path| fs::metadata(path).and_then(|found| found.modified());
+    let is_current = changed(&library).is_ok_and(|built| built > changed(&source).unwrap());
+    if !is_current {
+        let is_release = folder.ends_with("release");
+        let profile = if is_release { "release" } else { "dev" };
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "--example", name, "--profile", profile])
+            .status();
+        assert!(built.unwrap().success(), "the example {name} builds");
+    }
+    library
 }
 
 impl Loader {

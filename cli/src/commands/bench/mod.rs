@@ -6,6 +6,7 @@ pub(crate) mod files;
 pub(crate) mod follow;
 pub(crate) mod naive;
 pub(crate) mod report;
+pub(crate) mod smooth;
 pub(crate) mod stream;
 pub(crate) mod workload;
 
@@ -53,12 +54,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut sections = Vec::new();
     for &kind in &arguments.workloads {
         let Some(workload) = kind.workload(arguments.shrink as usize) else {
-            words::note("measuring files …");
+            words::note(&format!("measuring {kind:?} …").to_lowercase());
             let turns = Turns {
                 rounds: arguments.rounds,
                 calls: 1,
             };
-            sections.extend(files::measure(arguments.shrink as usize, turns)?);
+            let shrink = arguments.shrink as usize;
+            sections.extend(match kind {
+                Kind::Smooth => smooth::measure(shrink, turns)?,
+                _ => files::measure(shrink, turns)?,
+            });
             continue;
         };
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {

@@ -25,7 +25,7 @@ pub(crate) struct Report {
 #[derive(Serialize)]
 pub(crate) struct Section {
     workload: Kind,
-    method: &'static str,
+    method: String,
     rotations: usize,
     /// Of the files, where files are read.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,6 +46,7 @@ const WRITING: [Ratio; 2] = [
     ("share_of_write_rate", "writing"),
     ("ratio_to_naive", "naive"),
 ];
+const COPYING: [Ratio; 1] = [("share_of_copying_rate", "copying")];
 const READING: [Ratio; 2] = [
     ("share_of_bytes_rate", "bytes"),
     ("share_of_reading_rate", "reading"),
@@ -119,9 +120,14 @@ impl Section {
         }
     }
 
+    /// `rows`: copying first.
+    pub(crate) fn of_smoothing(kernel: String, samples: usize, rows: Vec<Row>) -> Self {
+        Self::with(Kind::Smooth, kernel, samples, rows, &COPYING)
+    }
+
     fn with(
         workload: Kind,
-        method: &'static str,
+        method: impl Into<String>,
         rotations: usize,
         mut rows: Vec<Row>,
         ratios: &'static [Ratio],
@@ -135,7 +141,7 @@ impl Section {
         }
         Self {
             workload,
-            method,
+            method: method.into(),
             rotations,
             file_bytes: None,
             peak_memory_bytes: None,
@@ -146,7 +152,7 @@ impl Section {
 
     fn tell(&self, text: &mut String) {
         let workload = format!("{:?}", self.workload).to_lowercase();
-        let (method, rotations) = (self.method, self.rotations);
+        let (method, rotations) = (&self.method, self.rotations);
         let width = self.rows.iter().map(|row| row.name.chars().count()).max();
         let width = width.unwrap_or(0);
         let _ = write!(

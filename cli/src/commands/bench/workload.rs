@@ -33,6 +33,8 @@ pub(crate) enum Kind {
     Long,
     /// 100 000 paths of 6 points, 60 frames
     Follow,
+    /// 64 tracks of 1 000 000 samples, smoothed
+    Smooth,
     /// 8 GiB of rotations, written to a file in chunks
     Stream,
     /// 3000 clips of 22 joints and 240 frames in each motion format: read, resampled to 60 fps
@@ -44,7 +46,7 @@ pub(crate) const RATE: f64 = 60.0;
 
 impl Kind {
     /// Makes the workload with one `shrink`th of its tracks, or of its keys where
-    /// there is one track; none for files.
+    /// there is one track; none for files and for smoothing.
     pub(crate) fn workload(self, shrink: usize) -> Option<Workload> {
         let few = |count: usize| (count / shrink).max(1);
         Some(match self {
@@ -62,7 +64,7 @@ impl Kind {
             }
             Self::Crowd => crowd(few(1_000_000)),
             Self::Follow => follow::workload(few(100_000)),
-            Self::Files => return None,
+            Self::Files | Self::Smooth => return None,
         })
     }
 }
