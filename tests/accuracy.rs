@@ -1,7 +1,7 @@
 //! How far the engine is from the textbook, in radians, with stated bounds: slerp
 //! 6e-7 (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
 
-use crate::support::{Random, give_key_data, hostile_set};
+use crate::support::{Random, give_key_data, hostile_set, is_turn};
 use glam::{DQuat, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
@@ -186,8 +186,11 @@ fn accuracy_does_not_decay_along_a_day() {
     let times: Vec<f64> = (0..=86_400).map(f64::from).collect();
     let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
     set.push("", &times, &keys).unwrap();
-    for method in METHODS {
-        for fps in RATES {
+    for (i, method) in METHODS.into_iter().enumerate() {
+        for (j, fps) in RATES.into_iter().enumerate() {
+            if !is_turn(i, j, RATES.len()) {
+                continue;
+            }
             let frames = Frames::rate(rate(fps)).between(86_390.0, 86_400.0);
             assert_within_bounds(
                 &set,

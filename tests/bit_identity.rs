@@ -2,7 +2,7 @@
 //! frames, however the work is cut.
 
 use crate::support::{
-    Random, first_difference, give_key_data, hostile_set, vulkan_devices, vulkan_engines,
+    Random, first_difference, give_key_data, hostile_set, is_turn, vulkan_devices, vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
@@ -109,15 +109,18 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
         (Transfer::InPlace, Reads::TexelBuffers),
         (Transfer::Staged, Reads::TexelBuffers),
     ];
-    for (transfer, reads) in ways {
-        for memory in budgets {
+    for (way, (transfer, reads)) in ways.into_iter().enumerate() {
+        for (budget, memory) in budgets.into_iter().enumerate() {
             for device in vulkan_devices() {
                 let engine = engine(&device, |options| {
                     options.transfer = transfer;
                     options.reads = reads;
                     options.memory = memory;
                 });
-                for (method, expected) in METHODS.iter().zip(&expected) {
+                for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {
+                    if !is_turn(way + budget, i, 3) {
+                        continue;
+                    }
                     let what = format!("{method}, {transfer:?}, {memory:?} bytes");
                     let found = engine.evaluate(&set, *method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), &what);
@@ -195,6 +198,13 @@ fn arbitrary_times_have_the_same_bits() {
     sorted.sort_by(f64::total_cmp);
     let each: Vec<f64> = (0..200 * 50).map(|_| random.between(-3.0, 40.0)).collect();
     let requests = [Frames::at(times), Frames::at(sorted), Frames::at_each(each)];
+    let of_method = |method| {
+        let found = requests
+            .each_ref()
+            .map(|frames| cpu().evaluate(&set, method, frames));
+        found.map(Result::unwrap)
+    };
+    let expected = METHODS.map(of_method);
     for (memory, transfer) in [
         (None, Transfer::Automatic),
         (Some(100_000), Transfer::Staged),
@@ -203,9 +213,8 @@ fn arbitrary_times_have_the_same_bits() {
             options.memory = memory;
             options.transfer = transfer;
         }) {
-            for method in METHODS {
-                for frames in &requests {
-                    let expected = cpu().evaluate(&set, method, frames).unwrap();
+            for (method, expected) in METHODS.into_iter().zip(&expected) {
+                for (frames, expected) in requests.iter().zip(expected) {
                     let found = vulkan.evaluate(&set, method, frames).unwrap();
                     let what = format!("{method}, {memory:?} bytes");
                     assert_same_bits(expected.as_quats(), found.as_quats(), &what);
@@ -446,15 +455,17 @@ fn few_samples_of_many_keys_have_the_same_bits() {
     ];
     let engines = everywhere();
     let paths = [Path::Shortest, Path::AsAuthored];
-    for (method, path) in METHODS
-        .into_iter()
-        .flat_map(|m| paths.map(|path| (m, path)))
-    {
+    let pairs = METHODS.into_iter().enumerate();
+    let pairs = pairs.flat_map(|(m, method)| [0, 1].map(|p| (m + p, method, paths[p])));
+    for (round, method, path) in pairs {
         let interpolation = Interpolation {
             path,
             ..method.into()
         };
-        for frames in &requests {
+        for (place, frames) in requests.iter().enumerate() {
+            if !is_turn(round, place, 2) {
+                continue;
+            }
             let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
@@ -957,20 +968,24 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
     ] {
         engines.extend(vulkan_engines(change));
     }
-    for (method, outside) in [
+    let cases = [
         (method::SLERP, WrapMode::Hold),
         (method::SLERP, WrapMode::Extrapolate),
         (method::STEP, WrapMode::Hold),
         (method::CATMULL_ROM, WrapMode::Hold),
         (method::CATMULL_ROM, WrapMode::Extrapolate),
-    ] {
+    ];
+    for (round, (method, outside)) in cases.into_iter().enumerate() {
         let interpolation = Interpolation {
             before: outside,
             after: outside,
             ..method.into()
         };
         let expected = cpu().upload(&set, interpolation).unwrap();
-        for engine in &engines {
+        for (place, engine) in engines.iter().enumerate() {
+            if !is_turn(round, place, 2) {
+                continue;
+            }
             let clip = engine.upload(&set, interpolation).unwrap();
             for frames in &requests {
                 let device = engine.device_name();

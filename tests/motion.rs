@@ -1,7 +1,9 @@
 //! Angular velocities and accelerations: the derivatives of the formulas, near the
 //! reference's and with the same bits on every device.
 
-use crate::support::{Random, first_difference, give_key_data, hostile_set, vulkan_engines};
+use crate::support::{
+    Random, first_difference, give_key_data, hostile_set, is_turn, vulkan_engines,
+};
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::Curve;
 use tumble::{
@@ -130,8 +132,8 @@ fn the_same_bits_on_every_device() {
     for seed in 0..3 {
         let set = hostile_set(seed, 64);
         let frames = Frames::fps(30).between(-1.0, 20.0);
-        for method in METHODS {
-            for quantity in QUANTITIES {
+        for (i, method) in METHODS.into_iter().enumerate() {
+            for (j, quantity) in QUANTITIES.into_iter().enumerate() {
                 let interpolation = Interpolation {
                     quantity,
                     ..method.into()
@@ -140,7 +142,10 @@ fn the_same_bits_on_every_device() {
                 let expected = cpu.rates(&set, interpolation, &frames, layout).unwrap();
                 let expected: &[Quat] = bytemuck::cast_slice(expected.as_slice());
                 assert!(expected.iter().all(|q| q.is_finite()));
-                for vulkan in &engines {
+                for (place, vulkan) in engines.iter().enumerate() {
+                    if !is_turn(seed as usize + i + j, place, 2) {
+                        continue;
+                    }
                     let found = vulkan.rates(&set, interpolation, &frames, layout).unwrap();
                     let found: &[Quat] = bytemuck::cast_slice(found.as_slice());
                     let difference = first_difference(expected, found);

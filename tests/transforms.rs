@@ -1,7 +1,7 @@
 //! Translations and scales beside rotations: what the textbook says, with the same bits on
 //! every device.
 
-use crate::support::{Random, vulkan_engines};
+use crate::support::{Random, is_turn, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::VectorCurve;
 use tumble::{
@@ -143,8 +143,8 @@ fn the_same_bits_on_every_device() {
         .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
         .collect();
     let frames = Frames::fps(30).between(-5.0, 20.0);
-    for vectors in VectorMethod::ALL {
-        for (before, after) in sides.into_iter().zip(sides.into_iter().rev()) {
+    for (i, vectors) in VectorMethod::ALL.into_iter().enumerate() {
+        for (j, (before, after)) in sides.into_iter().zip(sides.into_iter().rev()).enumerate() {
             let interpolation = Interpolation {
                 before,
                 after,
@@ -156,7 +156,10 @@ fn the_same_bits_on_every_device() {
                     bits(&found.unwrap())
                 };
                 let expected = of(&cpu);
-                for vulkan in &engines {
+                for (place, vulkan) in engines.iter().enumerate() {
+                    if !is_turn(i + j, place, 2) {
+                        continue;
+                    }
                     assert!(of(vulkan) == expected, "{vectors}, {before:?}, {after:?}");
                 }
             }

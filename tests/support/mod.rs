@@ -34,6 +34,12 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     vulkan_devices().into_iter().flat_map(both).collect()
 }
 
+/// Whether the case at a place is tried in this round: the rounds of a test share its cases out, so that
+/// all are tried once in so many rounds. With `SOAK` set every round tries all.
+pub fn is_turn(round: usize, place: usize, rounds: usize) -> bool {
+    (round + place).is_multiple_of(rounds) || std::env::var_os("SOAK").is_some()
+}
+
 /// Mesa's software driver, by its manifest.
 pub fn lavapipe() -> Option<std::path::PathBuf> {
     let manifests = std::fs::read_dir("/usr/share/vulkan/icd.d").ok()?;

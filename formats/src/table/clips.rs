@@ -207,7 +207,7 @@ impl Clip<'_> {
             (Some(labels), None) => labels.clone(),
             (Some((codes, names)), Some(rows)) => {
                 let own = rows.iter().map(|&row| codes[row as usize]);
-                let (codes, own) = numbered(own);
+                let (codes, own) = numbered(own, |code| code as usize);
                 (
                     codes,
                     own.iter()

@@ -10,12 +10,13 @@ use crate::table::columns::{Numbers, Table, Values};
 pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
     match &table.columns[column].values {
         Values::Words { codes, words } => {
-            let (codes, own) = numbered(codes.iter().copied());
+            let (codes, own) = numbered(codes.iter().copied(), |code| code as usize);
             let names = own.iter().map(|&code| words[code as usize].clone());
             (codes, names.collect())
         }
         Values::Numbers(Numbers::Whole(numbers)) => {
-            let (codes, own) = numbered(numbers.iter().copied());
+            let place = |number| usize::try_from(number).unwrap_or(usize::MAX);
+            let (codes, own) = numbered(numbers.iter().copied(), place);
             (codes, own.iter().map(i64::to_string).collect())
         }
         // The plan asked for names.
@@ -26,15 +27,30 @@ pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
     }
 }
 
-/// Numbers the distinct values in the order in which they come up.
-pub(crate) fn numbered<T: Copy + Eq + Hash>(values: impl Iterator<Item = T>) -> (Vec<u32>, Vec<T>) {
-    let mut known: HashMap<T, u32> = HashMap::new();
+/// Numbers the distinct values in the order in which they come up. Those whose `place` is small are
+/// found in a list, which is quicker than a map.
+pub(crate) fn numbered<T: Copy + Eq + Hash>(
+    values: impl Iterator<Item = T>,
+    place: impl Fn(T) -> usize,
+) -> (Vec<u32>, Vec<T>) {
+    const SMALL: usize = 1 << 16;
+    let mut small: Vec<Option<u32>> = Vec::new();
+    let mut large: HashMap<T, u32> = HashMap::new();
     let mut own = Vec::new();
     let codes = values.map(|value| {
-        *known.entry(value).or_insert_with(|| {
+        let mut next = || {
             own.push(value);
             own.len() as u32 - 1
-        })
+        };
+        match place(value) {
+            place if place < SMALL => {
+                if place >= small.len() {
+                    small.resize(place + 1, None);
+                }
+                *small[place].get_or_insert_with(next)
+            }
+            _ => *large.entry(value).or_insert_with(&mut next),
+        }
     });
     (codes.collect(), own)
 }
