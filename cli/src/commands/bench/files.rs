@@ -16,7 +16,7 @@ use tumble_formats::{FORMATS, Format, Loaded};
 
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{RATE, walk};
-use crate::commands::bench::{Contestant, Turns, race};
+use crate::commands::bench::{Contestant, Part, Turns, race};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// Clips of the library, joints of its skeleton, and frames of a clip: a small human's walk of
@@ -149,16 +149,8 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
         }
         Ok(())
     };
-    let contestants = vec![
-        Contestant::new("reading the bytes", |_: &mut [Quat]| {
-            for path in paths {
-                let bytes = std::fs::read(path);
-                black_box(bytes.map_err(|error| {
-                    Failure::new(ALL_INPUTS, format!("{}: {error}", path.display()))
-                })?);
-            }
-            Ok(Vec::new())
-        }),
+    let mut contestants = vec![
+        Contestant::new("reading the bytes", |_: &mut [Quat]| read_bytes(paths)),
         Contestant::new("reading the clips", |_: &mut [Quat]| {
             for path in paths {
                 black_box(read(path)?);
@@ -183,6 +175,25 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
             Ok(Vec::new())
         }),
     ];
+    if cfg!(target_os = "linux") {
+        contestants.push(Contestant::new(
+            "the bytes, from the disk",
+            |_: &mut [Quat]| {
+                forget(paths);
+                read_bytes(paths)
+            },
+        ));
+        contestants.push(Contestant::new(
+            "the clips, from the disk",
+            |_: &mut [Quat]| {
+                forget(paths);
+                for path in paths {
+                    black_box(read(path)?);
+                }
+                Ok(Vec::new())
+            },
+        ));
+    }
     let rows = race(contestants, &mut [], turns)?;
     let bytes = paths.iter().filter_map(|path| path.metadata().ok());
     let frames = (FRAMES - 1) * RATE as usize / SOURCE_RATE as usize + 1;
@@ -190,6 +201,32 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
     let bytes = bytes.map(|file| file.len()).sum();
     Ok(Section::of_files(format.name, rotations, bytes, rows))
 }
+
+fn read_bytes(paths: &[PathBuf]) -> Result<Vec<Part>, Failure> {
+    for path in paths {
+        let bytes = std::fs::read(path);
+        let failure = |error| Failure::new(ALL_INPUTS, format!("{}: {error}", path.display()));
+        black_box(bytes.map_err(failure)?);
+    }
+    Ok(Vec::new())
+}
+
+/// Asks the system to drop what it keeps of the files in memory.
+#[cfg(target_os = "linux")]
+fn forget(paths: &[PathBuf]) {
+    use rustix::fs::{Advice, fadvise};
+    for file in paths
+        .iter()
+        .filter_map(|path| std::fs::File::open(path).ok())
+    {
+        // Only what has reached the disk can be dropped.
+        let _ = file.sync_data();
+        let _ = fadvise(&file, 0, None, Advice::DontNeed);
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn forget(_: &[PathBuf]) {}
 
 fn refused(error: &tumble::Error) -> Failure {
     crate::arguments::device::refused(error)
