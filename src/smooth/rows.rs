@@ -2,7 +2,7 @@
 
 use glam::DQuat;
 
-use crate::math::canonical::round_quat;
+use crate::math::canonical::{canonical, round_quat};
 use crate::math::quaternion::{exp, product, unit};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -281,12 +281,61 @@ impl Block<'_> {
     }
 }
 
+impl Block<'_> {
+    /// Smooths vectors that lie side by side: their components are smoothed alike, and need not be
+    /// taken apart.
+    #[inline(always)]
+    fn smooth_side_by_side(&mut self) {
+        const EACH: usize = 4 * LANES;
+        let (row, radius) = (self.row, self.pass.weights.len());
+        let values: &[f32] = bytemuck::cast_slice(&row.values[row.first..][..row.count]);
+        let count = self.count + 2 * radius - 1;
+        let before = self.first as isize - radius as isize;
+        let steps = &mut self.steps[0];
+        steps.resize(4 * count + EACH, 0.0);
+        // The steps that stand in the row, and those before its start and beyond its end.
+        let start = (-before).clamp(0, count as isize);
+        let end = (row.count as isize - 1 - before).clamp(start, count as isize);
+        let (start, end) = (start as usize, end as usize);
+        for i in (0..start).chain(end..count) {
+            let step = self.pass.step_at(before + i as isize, row.count);
+            let found = pose_steps::pose(row.get(step), row.get(step + 1), false);
+            steps[4 * i..][..4].copy_from_slice(&found);
+        }
+        if start < end {
+            let first = (before + start as isize) as usize;
+            let (from, to) = (&values[4 * first..], &values[4 * first + 4..]);
+            let inner = steps[4 * start..4 * end].iter_mut();
+            for ((step, from), to) in inner.zip(from).zip(to) {
+                *step = canonical(to - from);
+            }
+        }
+        let values = values[4 * self.first..].chunks(EACH);
+        let output = bytemuck::cast_slice_mut(&mut self.output[self.place..][..self.count]);
+        for (i, (output, values)) in output.chunks_mut(EACH).zip(values).enumerate() {
+            let mut sums = [0.0; EACH];
+            for (m, weight) in self.pass.weights.iter().enumerate() {
+                let after = &steps[EACH * i + 4 * (radius + m)..][..EACH];
+                let before = &steps[EACH * i + 4 * (radius - 1 - m)..][..EACH];
+                for j in 0..EACH {
+                    sums[j] += (after[j] - before[j]) * weight;
+                }
+            }
+            for ((output, own), sum) in output.iter_mut().zip(values).zip(&sums) {
+                *output = canonical(own + sum);
+            }
+        }
+    }
+}
+
 impl InLanes for Block<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         if self.pass.are_rotations {
             self.find_steps::<L, true>();
             self.find_values::<L, true>();
+        } else if self.row.stride == 1 {
+            self.smooth_side_by_side();
         } else {
             self.find_steps::<L, false>();
             self.find_values::<L, false>();
