@@ -86,7 +86,7 @@ impl Plan {
         if into != "files" {
             request.options += &format!(" into={into}");
         }
-        let (inputs, sizes) = match listed {
+        let (inputs, sizes): (Vec<Found>, Vec<u64>) = match listed {
             Some(listed) => {
                 let of_formats = listed
                     .into_iter()

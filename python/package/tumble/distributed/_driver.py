@@ -153,7 +153,7 @@ def evaluate(
     """Plans, evaluates and merges; see `tumble.distributed.evaluate`."""
     flags = ["--resume"] * resume + ["--overwrite"] * overwrite
     out = out.rstrip("/") if is_url(out) else os.path.abspath(out)
-    line = [*line, *flags]
+    line = [*flags, *line]  # a line may end with names behind `--`
     listed = None
     base = library
     if is_url(library):
@@ -181,9 +181,9 @@ def evaluate(
         )
         driver = _Driver(ray, job, plan, progress)
         driver.run()
-    merged = _merge(out)
-    failed = [Refusal(own["input"], own["message"]) for own in merged["failed"]]
-    return driver.report(merged["results"], failed)
+        merged = _merge(out)
+        failed = [Refusal(own["input"], own["message"]) for own in merged["failed"]]
+        return driver.report(merged["results"], failed)
 
 
 @contextlib.contextmanager

@@ -56,7 +56,7 @@ def run(job: Job, task: Task) -> Entry:
 
 @functools.lru_cache(maxsize=1)
 def _worker(line: tuple[str, ...], device: str) -> _tumble.Worker:
-    return _tumble.Worker([*line, "--device", device], 1)
+    return _tumble.Worker(["--device", device, *line], 1)
 
 
 def _node() -> str:
