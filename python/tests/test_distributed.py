@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import json
 import os
 import pathlib
@@ -29,8 +30,11 @@ import tumble
 import tumble.distributed
 from tumble.distributed import DistributedError, _job, _stores, evaluate
 
-ray = pytest.importorskip("ray")
-from ray.cluster_utils import Cluster  # noqa: E402
+if sys.platform != "linux":
+    pytest.skip("processes are found and killed as Linux has them", allow_module_level=True)
+# Ray is among the tests' requirements; where it has no wheel for a Python, CI is to say so.
+ray = importlib.import_module("ray") if "CI" in os.environ else pytest.importorskip("ray")
+Cluster = importlib.import_module("ray.cluster_utils").Cluster
 
 CLIPS = int(os.environ.get("CLIPS", "240"))
 KILLS = int(os.environ.get("KILLS", "4"))
@@ -238,26 +242,66 @@ def rename_inputs(out, before, after):
     manifest.write_text(manifest.read_text().replace(f'"input":"{before}', f'"input":"{after}'))
 
 
-def test_nodes_are_lost_and_added(machines, library):
+def test_nodes_are_lost(machines, library):
+    """In the middle, with all their processes."""
     for round in range(NODES):
         out = library / f"nodes{round}"
-        changes = threading.Thread(target=lambda: (time.sleep(0.4), machines.lose()))
-        changes.start()
+        losing = threading.Thread(target=machines.lose)
+        begun = []
+
+        def lose(progress, losing=losing, begun=begun):
+            if not begun and progress.inputs_done > CLIPS // 8:
+                begun.append(progress.inputs_done)
+                losing.start()
+
         report = evaluate(
-            library / "clips", out, fps=240, address=machines.address, shard_bytes="8KiB"
+            library / "clips", out, fps=240, address=machines.address, shard_bytes="8KiB", progress=lose
         )
-        changes.join()
+        losing.join()
+        assert begun[0] < CLIPS, "it was lost in the middle"
         assert (report.made, report.failed) == (CLIPS, [])
         rename_inputs(out, f"{library}/", "")
         assert_equal(library / "one", out)
         machines.nodes.append(machines.add())
 
 
+def test_a_node_that_is_added_works(machines, library, tmp_path):
+    """All others have other work to do."""
+    ray.init(address=machines.address, log_to_driver=False)
+
+    @ray.remote(num_cpus=1)
+    def hold(path):
+        pathlib.Path(path).touch()
+        time.sleep(600)
+
+    held = [tmp_path / f"held{i}" for i in range(2)]
+    holding = [hold.remote(str(path)) for path in held]
+    while not all(path.exists() for path in held):
+        time.sleep(0.05)
+    reports = []
+    evaluating = threading.Thread(
+        target=lambda: reports.append(evaluate(library / "clips", tmp_path / "out", fps=240))
+    )
+    evaluating.start()
+    added = machines.add()
+    evaluating.join(60)
+    assert (reports[0].made, reports[0].workers) == (CLIPS, 1)
+    for reference in holding:
+        ray.cancel(reference, force=True)
+    ray.shutdown()
+    machines.cluster.remove_node(added)
+    rename_inputs(tmp_path / "out", f"{library}/", "")
+    assert_equal(library / "one", tmp_path / "out")
+
+
 def test_drivers_are_killed(machines, library):
     out = library / "drivers"
+    stopped = 0
     line = command("clips", "drivers", "--resume", "--address", machines.address)
-    for round in range(DRIVERS):
-        stop = [signal.SIGKILL, signal.SIGINT, signal.SIGTERM][round % 3]
+    rounds = 0
+    while stopped < DRIVERS and rounds < 4 * DRIVERS:
+        rounds += 1
+        stop = [signal.SIGKILL, signal.SIGINT, signal.SIGTERM][stopped % 3]
         driver = subprocess.Popen(line, cwd=library, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 60
         done = len(list(out.glob("manifest.d/*.jsonl")))
@@ -267,12 +311,16 @@ def test_drivers_are_killed(machines, library):
             time.sleep(0.005)
         driver.send_signal(stop)
         words = driver.communicate(timeout=60)[1]
+        stopped += driver.returncode != 0
+        if driver.returncode == 0:
+            shutil.rmtree(out)  # it was quicker
         if stop != signal.SIGKILL and driver.returncode != 0:
             assert driver.returncode == 128 + stop, words
             assert "--resume goes on" in words
         if (out / "manifest.d").is_dir():
             check = tumble_program("check", out, code=8)
             assert "shards are done" in check.stderr
+    assert stopped == DRIVERS
     done = subprocess.run(line, cwd=library, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert_equal(library / "one", out)
@@ -281,7 +329,7 @@ def test_drivers_are_killed(machines, library):
 def test_inputs_that_fail_are_named(machines, library, tmp_path):
     """One kills its worker, one is refused, one is too large; all others are done."""
     clips = tmp_path / "clips"
-    for path in sorted((library / "clips").rglob("*.dat"))[:20]:
+    for path in sorted((library / "clips").rglob("*.dat"))[:7]:
         (clips / path.parent.name).mkdir(parents=True, exist_ok=True)
         shutil.copy(path, clips / path.parent.name / path.name)
     (clips / "bad.dat").write_text("# 2 3\n0 1 0 0\n")
@@ -295,7 +343,7 @@ def test_inputs_that_fail_are_named(machines, library, tmp_path):
     failed = {pathlib.Path(own.input).name: own.message for own in report.failed}
     assert set(failed) == {"bad.dat", "long.dat", "kills-its-worker.dat"}
     assert "ends the process" in failed["kills-its-worker.dat"]
-    assert report.exit_code == 3 and report.results == 20
+    assert report.exit_code == 3 and report.results == 7
     assert sorted(tree(tmp_path / "out")) == sorted(
         [f"{path.parent.name}/{path.stem}.npy" for path in clips.rglob("0*.dat")] + ["manifest.jsonl"]
     )
@@ -453,6 +501,15 @@ def test_a_driver_stops_where_no_machine_may_take_part(monkeypatch, library, tmp
     monkeypatch.setattr(_driver, "wheel", lambda: ("f" * 64, tumble.__version__))
     with pytest.raises(DistributedError, match="every machine has another wheel"):
         evaluate(library / "clips", tmp_path / "out", address=machines.address)
+
+
+def test_a_device_goes_by_its_uuid():
+    listed = json.loads(tumble_program("devices", "--json").stdout)["devices"]
+    assert listed, "lavapipe is there"
+    for device in listed:
+        assert tumble.Engine(f"uuid:{device['uuid']}").device == device["name"]
+    with pytest.raises(tumble.InputError, match="there is no device"):
+        tumble.Engine("uuid:00")
 
 
 def test_records_are_lines_of_json():

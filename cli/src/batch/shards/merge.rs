@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -90,8 +90,7 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
     }
     let mut lines = Vec::new();
     let path = folder.join(NAME);
-    let before = std::fs::read(&path).unwrap_or_default();
-    list(&before, 0, 0, &mut lines);
+    list_before(&path, &mut lines)?;
     let mut failed = Vec::new();
     for shard in 1..=stated.shards {
         let (bytes, refused, start) = read(folder, &stated, shard).ok_or_else(|| {
@@ -103,7 +102,7 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
     }
     let lines = one_each(lines)?;
     if !lines.is_empty() {
-        write(folder, &path, &before, &lines)?;
+        write(folder, &path, &lines)?;
     }
     let parents: BTreeSet<PathBuf> = (lines.iter())
         .filter_map(|line| folder.join(&line.output).parent().map(Path::to_owned))
@@ -136,17 +135,47 @@ fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     }
 }
 
+/// As much of a line as says whose it is.
+#[derive(Deserialize)]
+struct Owner {
+    output: String,
+}
+
+/// Lists the lines of the manifest before, which may be of a million results: one is in memory at a
+/// time.
+fn list_before(path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
+    let Ok(file) = File::open(path) else {
+        return Ok(()); // mostly there is none
+    };
+    let mut reader = BufReader::new(file);
+    let (mut line, mut start) = (Vec::new(), 0);
+    loop {
+        line.clear();
+        let length = reader.read_until(b'\n', &mut line).map_err(|error| {
+            let message = format!("{}: cannot be read: {error}", path.display());
+            Failure::new(ALL_INPUTS, message)
+        })?;
+        if length == 0 {
+            return Ok(());
+        }
+        let mut own = Vec::new();
+        list(&line, 0, 0, &mut own);
+        lines.extend(own.pop().map(|Line { output, .. }| Line {
+            output,
+            file: 0,
+            at: start..start + length,
+        }));
+        start += length;
+    }
+}
+
 /// Lists the lines of a file that are entries.
 fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<Line>) {
-    #[derive(Deserialize)]
-    struct Output {
-        output: String,
-    }
     let mut at = start;
     for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
         let end = at + line.len();
         if line.ends_with(b"\n")
-            && let Ok(Output { output }) = serde_json::from_slice(line)
+            && let Ok(Owner { output }) = serde_json::from_slice(line)
         {
             let at = at..end;
             lines.push(Line { output, file, at });
@@ -181,15 +210,28 @@ fn one_each(mut lines: Vec<Line>) -> Result<Vec<Line>, Failure> {
 }
 
 /// Writes the lines where they belong. Few files are in memory: the index of a million results is
-/// 80 MB, their lines are 700.
-fn write(folder: &Path, path: &Path, before: &[u8], lines: &[Line]) -> Result<(), Failure> {
+/// 130 MB, their lines are 500.
+fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);
     let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
+    let mut before = match lines.iter().any(|line| line.file == 0) {
+        true => Some(BufReader::new(File::open(path).map_err(failed)?)),
+        false => None,
+    };
+    let (mut at, mut one) = (0, Vec::new());
     for line in lines {
-        let bytes = match line.file {
-            0 => before,
-            shard => {
+        let text = match (line.file, &mut before) {
+            (0, Some(before)) => {
+                // Mostly it is the next one, which the reader has already.
+                let step = line.at.start as i64 - at;
+                before.seek_relative(step).map_err(failed)?;
+                one.resize(line.at.len(), 0);
+                before.read_exact(&mut one).map_err(failed)?;
+                at = line.at.end as i64;
+                &*one
+            }
+            (shard, _) => {
                 if !kept.contains_key(&shard) {
                     if kept.len() == KEPT {
                         kept.clear();
@@ -197,11 +239,10 @@ fn write(folder: &Path, path: &Path, before: &[u8], lines: &[Line]) -> Result<()
                     let bytes = std::fs::read(record::path(folder, shard)).map_err(failed)?;
                     kept.insert(shard, bytes);
                 }
-                &kept[&shard]
+                kept[&shard].get(line.at.clone()).unwrap_or_default()
             }
         };
         // What was replaced meanwhile by another attempt has the same entries, maybe at other places.
-        let text = bytes.get(line.at.clone()).unwrap_or_default();
         let is_whole =
             serde_json::from_slice::<Entry>(text).is_ok_and(|entry| entry.output == line.output);
         if !is_whole {

@@ -12,7 +12,7 @@ use tumble_formats::output::Output;
 use crate::arguments::gather::Found;
 use crate::arguments::input;
 use crate::batch::digest::Digest;
-use crate::batch::manifest::{self, Lines, kernels_sha256};
+use crate::batch::manifest::kernels_sha256;
 use crate::batch::shards::record;
 use crate::batch::{folder, place};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -165,7 +165,7 @@ impl Plan {
     /// A file under the name of a result, which no manifest names or nobody asked to go on with.
     fn stranger(&self, folder: &Path, resume: bool) -> Option<Failure> {
         let known: HashSet<String> = match resume {
-            true => known(folder),
+            true => record::names(folder),
             false => HashSet::new(),
         };
         let there = |name: &&String| !known.contains(*name) && folder.join(name).exists();
@@ -176,19 +176,6 @@ impl Plan {
             "{path}: exists; give --overwrite to replace it (--resume skips what is done)"
         )))
     }
-}
-
-/// The results, and the results of all clips of an input together, that a directory's manifests name.
-fn known(folder: &Path) -> HashSet<String> {
-    let mut known = HashSet::new();
-    let lines = std::fs::read(folder.join(manifest::NAME)).unwrap_or_default();
-    let mut entries = Lines::parse(&lines).entries;
-    entries.extend(record::entries(folder));
-    for (name, entry) in entries {
-        known.extend(entry.one_of.map(|(all, _)| all));
-        known.insert(name);
-    }
-    known
 }
 
 impl Stated {

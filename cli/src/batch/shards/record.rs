@@ -77,16 +77,38 @@ pub(crate) fn entries(folder: &Path) -> BTreeMap<String, Entry> {
     all
 }
 
+/// As much of a line as says whose it is.
+#[derive(Deserialize)]
+struct Owner {
+    output: String,
+    #[serde(default)]
+    one_of: Option<(String, usize)>,
+}
+
+/// The results, and the results of all clips of an input together, that a directory's manifests name.
+/// They may be a million: one line is in memory at a time.
+pub(crate) fn names(folder: &Path) -> HashSet<String> {
+    let shards = std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten();
+    let shards = shards.flatten().map(|file| file.path());
+    let mut known = HashSet::new();
+    for path in shards.chain([folder.join(manifest::NAME)]) {
+        let Ok(file) = File::open(path) else {
+            continue;
+        };
+        // A line that is no entry, such as that about the shard itself, has no output.
+        for line in BufReader::new(file).lines().map_while(Result::ok) {
+            if let Ok(Owner { output, one_of }) = serde_json::from_str(&line) {
+                known.insert(output);
+                known.extend(one_of.map(|(all, _)| all));
+            }
+        }
+    }
+    known
+}
+
 /// What manifests say of the results of one shard: the directory's, and the shard's own from an
 /// earlier time, which is the later word.
 pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> BTreeMap<String, Entry> {
-    /// As much of a line as says whose it is.
-    #[derive(Deserialize)]
-    struct Owner {
-        output: String,
-        #[serde(default)]
-        one_of: Option<(String, usize)>,
-    }
     let own: HashSet<&str> = names.iter().copied().collect();
     let mut found = BTreeMap::new();
     if let Ok(file) = File::open(folder.join(manifest::NAME)) {

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import importlib
 import json
 import os
+import platform
 import subprocess
 import tempfile
 import time
@@ -39,7 +39,7 @@ def run(job: Job, task: Task) -> Entry:
     """Evaluates a shard; what comes back is counts and failures."""
     started = time.monotonic()
     own = wheel()
-    told: Entry = {"node": _node(), "pid": os.getpid(), "host": os.uname().nodename}
+    told: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
     if own != job.wheel:
         return {**told, "other_wheel": f"tumble {own[1]}, kernels {own[0][:12]}"}
     try:
@@ -54,9 +54,19 @@ def run(job: Job, task: Task) -> Entry:
     return {**told, **outcome, "seconds": time.monotonic() - started}
 
 
-@functools.lru_cache(maxsize=1)
+# What a worker process keeps: its engine, by what it was opened for; the last manifest that it read;
+# which card has which UUID.
+_WORKERS: dict[tuple[tuple[str, ...], str], _tumble.Worker] = {}
+_MANIFESTS: dict[tuple[str, int | None], dict[str, list[str]]] = {}
+_UUIDS: dict[str, str] = {}
+
+
 def _worker(line: tuple[str, ...], device: str) -> _tumble.Worker:
-    return _tumble.Worker(["--device", device, *line], 1)
+    found = _WORKERS.get((line, device))
+    if found is None:
+        _WORKERS.clear()
+        found = _WORKERS[line, device] = _tumble.Worker(["--device", device, *line], 1)
+    return found
 
 
 def _node() -> str:
@@ -72,16 +82,18 @@ def _device(job: Job) -> str:
     return f"uuid:{_uuid(str(ray.get_gpu_ids()[0]))}"
 
 
-@functools.cache
 def _uuid(card: str) -> str:
+    """By NVIDIA's own tool, which comes with the driver; Ray may name cards by it already."""
     if card.startswith("GPU-"):
         return card.removeprefix("GPU-")
+    if card in _UUIDS:
+        return _UUIDS[card]
     query = ["nvidia-smi", f"--id={card}", "--query-gpu=uuid", "--format=csv,noheader"]
     try:
         found = subprocess.run(query, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError) as error:
         raise DistributedError(f"card {card}: its UUID is not known: {error}", DEVICE) from error
-    return found.stdout.strip().removeprefix("GPU-")
+    return _UUIDS.setdefault(card, found.stdout.strip().removeprefix("GPU-"))
 
 
 @contextlib.contextmanager
@@ -292,11 +304,13 @@ def _key(entry: Entry) -> tuple[str, int]:
     return (name if name.endswith(".parquet") else os.path.splitext(name)[0]), count
 
 
-@functools.lru_cache(maxsize=1)
 def _manifest(place: str, size: int | None) -> dict[str, list[str]]:
     """The lines of a merged manifest of that size, by what they are of."""
+    if (place, size) in _MANIFESTS:
+        return _MANIFESTS[place, size]
     found: dict[str, list[str]] = {}
     text = (read_text(store(place), "manifest.jsonl") or "") if size is not None else ""
     for line in lines_of(text):
         found.setdefault(_key(json.loads(line))[0], []).append(line)
-    return found
+    _MANIFESTS.clear()
+    return _MANIFESTS.setdefault((place, size), found)
