@@ -47,7 +47,8 @@ def evaluate(
 
     Inputs that are refused are in the report, the others are done. What ends everything, such as an
     output that cannot be written, is a `DistributedError`. After it, and after Ctrl-C, a second call
-    goes on with what is left.
+    goes on with what is left. A connection to Ray that is there is used, and left open: tasks that
+    it was given before such an end run to theirs.
     """
     paths = [local(library), local(out)]
     return _driver.evaluate(

@@ -63,7 +63,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    signal.signal(signal.SIGTERM, _terminate)
+    _stop_on_signals()
     values, flags, line = _split(arguments)
     if values["--into"] not in ("files", "parquet"):
         raise DistributedError(f"--into {values['--into']}: give files or parquet", USAGE)
@@ -87,6 +87,8 @@ def _run(arguments: list[str]) -> int:
         resume="--resume" in flags,
         overwrite="--overwrite" in flags,
         progress=watch,
+        # Ray has set its own when it started a node.
+        begin=_stop_on_signals,
     )
     watch.end()
     _tell(report)
@@ -94,6 +96,10 @@ def _run(arguments: list[str]) -> int:
         fields = {**dataclasses.asdict(report), "exit_code": report.exit_code}
         print(json.dumps(fields, indent=2))
     return report.exit_code
+
+
+def _stop_on_signals() -> None:
+    signal.signal(signal.SIGTERM, _terminate)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

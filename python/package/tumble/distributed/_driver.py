@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import itertools
 import json
 import os
 import tempfile
@@ -34,6 +35,9 @@ from tumble.distributed._stores import Store, objects, put_text, read_text, stor
 # So many tasks for each processor wait for one. With four, half a minute's work was with a machine
 # that went; with 32 no pause was seen.
 _IN_FLIGHT = 32
+
+# After so many of them is asked at once.
+_ASKED = 256
 
 # How often a task is tried on other workers, and then how often a shard is taken apart.
 _RETRIES = 3
@@ -149,8 +153,10 @@ def evaluate(
     resume: bool,
     overwrite: bool,
     progress: Callable[[Progress], None] | None,
+    begin: Callable[[], None] | None = None,
 ) -> Report:
-    """Plans, evaluates and merges; see `tumble.distributed.evaluate`."""
+    """Plans, evaluates and merges; see `tumble.distributed.evaluate`. `begin` is called when Ray is
+    there, before any work."""
     flags = ["--resume"] * resume + ["--overwrite"] * overwrite
     out = out.rstrip("/") if is_url(out) else os.path.abspath(out)
     line = [*flags, *line]  # a line may end with names behind `--`
@@ -180,6 +186,8 @@ def evaluate(
             wheel=wheel(),
         )
         driver = _Driver(ray, job, plan, progress)
+        if begin is not None:
+            begin()
         driver.run()
         merged = _merge(out)
         failed = [Refusal(own["input"], own["message"]) for own in merged["failed"]]
@@ -292,18 +300,16 @@ class _Driver:
         self._room = 0
 
     def run(self) -> None:
-        try:
-            while self._is_unfinished():
-                self._submit()
-                self._collect()
-                self._progress.seconds = time.monotonic() - self._started
-                self._progress.workers = len(self._workers)
-                if self._tell is not None:
-                    self._tell(self._progress)
-        finally:
-            # What was not waited for stops; shards that are done have said so.
-            for reference in self._running:
-                self._ray.cancel(reference, force=False)
+        # Where this ends early, closing the connection ends the tasks, and shards that are done have
+        # said so. They are not cancelled: Ray 2.60 aborts a driver whose task ends as it is cancelled
+        # ("Tried to complete task that was not pending").
+        while self._is_unfinished():
+            self._submit()
+            self._collect()
+            self._progress.seconds = time.monotonic() - self._started
+            self._progress.workers = len(self._workers)
+            if self._tell is not None:
+                self._tell(self._progress)
 
     def report(self, results: int, failed: list[Refusal]) -> Report:
         return Report(
@@ -372,12 +378,16 @@ class _Driver:
             raise DistributedError(message, USAGE)
 
     def _collect(self) -> None:
-        waiting = list(self._running)
-        if not waiting:
+        if not self._running:
             return
-        ready, rest = self._ray.wait(waiting, num_returns=1, timeout=0.5, fetch_local=False)
+        # Asking after thousands at once takes longer than they do, and the oldest mostly end first.
+        oldest = list(itertools.islice(self._running, _ASKED))
+        ready, rest = self._ray.wait(oldest, num_returns=1, timeout=0.05, fetch_local=False)
         if ready and rest:
             ready += self._ray.wait(rest, num_returns=len(rest), timeout=0, fetch_local=False)[0]
+        if not ready:
+            every = list(self._running)
+            ready, _ = self._ray.wait(every, num_returns=1, timeout=0.5, fetch_local=False)
         crashes = (
             self._ray.exceptions.WorkerCrashedError,
             self._ray.exceptions.NodeDiedError,
