@@ -13,7 +13,7 @@ cargo build --quiet --workspace --lib --test cost
 
 requirements=python/tests/requirements.txt
 if ! cmp -s "$requirements" "$environment/requirements.txt"; then
-    echo "installing NumPy, SciPy, pytest, mypy and matplotlib into $environment" >&2
+    echo "installing NumPy, SciPy, Ray, moto, pytest, mypy and matplotlib into $environment" >&2
     rm -rf "$environment"
     if ! { python3 -m venv "$environment" &&
         "$environment/bin/pip" install --quiet --disable-pip-version-check \

@@ -66,6 +66,16 @@ impl Device {
         }
     }
 
+    /// Vulkan's `deviceUUID`, as 32 hexadecimal digits with dashes: the same in every process on the
+    /// machine, and for NVIDIA's cards the one that NVML tells. Nothing for the CPU.
+    #[must_use]
+    pub fn uuid(&self) -> Option<String> {
+        match self {
+            Self::Cpu => None,
+            Self::Vulkan(device) => Some(device.info().uuid.clone()),
+        }
+    }
+
     /// Its name: the driver's, or `CPU`.
     #[must_use]
     pub fn name(&self) -> &str {

@@ -21,12 +21,15 @@ pub struct Refused {
     pub message: String,
     /// What was asked for is at fault, rather than a device or the system.
     pub is_usage: bool,
+    /// The program's exit code.
+    pub code: u8,
 }
 
 impl From<Failure> for Refused {
     fn from(failure: Failure) -> Self {
         Self {
             is_usage: matches!(failure.code, exit::USAGE | exit::ALL_INPUTS),
+            code: failure.code,
             message: failure.into_message(),
         }
     }
@@ -74,6 +77,7 @@ pub fn devices() -> Result<Vec<Device>, Refused> {
     probe::devices().map_err(|error| Refused {
         message: error.to_string(),
         is_usage: false,
+        code: exit::DEVICE,
     })
 }
 
@@ -99,6 +103,7 @@ pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
     let engine = Engine::auto_for(rotations).map_err(|error| Refused {
         message: error.to_string(),
         is_usage: false,
+        code: exit::DEVICE,
     })?;
     Ok(Some(engine))
 }
@@ -125,6 +130,7 @@ pub fn page(
     let parsed = Options::try_parse_from(fixed.iter().chain(options)).map_err(|error| Refused {
         message: error.to_string(),
         is_usage: true,
+        code: exit::USAGE,
     })?;
     Ok(parsed.view.html(path, clips, box_length)?)
 }

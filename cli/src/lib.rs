@@ -10,6 +10,7 @@ mod batch;
 mod commands;
 pub mod host;
 mod messages;
+pub mod shards;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,7 @@ Examples:
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
   tumble eval walks -o results                 a directory of files; --resume goes on
   tumble check results                         are its bits still what they were?
+  tumble merge results                         shards of many processes become one manifest
   tumble verify chain.dat                      device = CPU, and both against f64
   tumble route hill.obj --from 0,0,0 --to 9,5,0 -o way.csv
   tumble view chain.dat --open                 see the boxes turn

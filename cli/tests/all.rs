@@ -18,6 +18,7 @@ mod plot;
 mod reduce;
 mod render;
 mod route;
+mod shards;
 mod travel;
 mod validation;
 mod view;
@@ -32,3 +33,5 @@ mod browser;
 mod program;
 #[path = "../../tests/support/mod.rs"]
 mod support;
+#[path = "support/tree.rs"]
+mod tree;

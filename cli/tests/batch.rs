@@ -1,36 +1,13 @@
 //! Batches: many inputs, failures among them, kills, and the manifest that proves what
 //! is there.
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use crate::program::{command, finish, run, sample_folder, succeed};
 use crate::support::Random;
-
-/// Every file below a directory, by its way there.
-fn tree(directory: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut pending = vec![directory.to_owned()];
-    while let Some(next) = pending.pop() {
-        for entry in fs::read_dir(next).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                pending.push(path);
-            } else {
-                let name = path.strip_prefix(directory).unwrap();
-                found.insert(name.to_str().unwrap().to_owned(), fs::read(&path).unwrap());
-            }
-        }
-    }
-    found
-}
-
-fn names(directory: &Path) -> Vec<String> {
-    tree(directory).into_keys().collect()
-}
+use crate::tree::{names, tree};
 
 #[test]
 fn directories_patterns_and_lists_name_inputs() {

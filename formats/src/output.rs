@@ -99,6 +99,19 @@ pub fn remove_abandoned(directory: &Path) {
     }
 }
 
+/// Removes the temporary files in a directory that were created with that mark, whether or not they
+/// are locked: locks do not reach other machines.
+pub fn remove_marked(directory: &Path, mark: &str) {
+    let prefix = format!("{PREFIX}{mark}");
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(&prefix) && name.ends_with(SUFFIX) {
+            let _ = fs::remove_file(entry.path()); // the next run tries again
+        }
+    }
+}
+
 impl Output {
     /// Opens a temporary file beside `path`, after every check that can be made
     /// before any work; `-` is standard output.
@@ -106,6 +119,20 @@ impl Output {
     /// # Errors
     /// An [`OutputError`]; nothing has been touched then.
     pub fn create(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
+        Self::create_marked(path, overwrite, inputs, "")
+    }
+
+    /// As [`Output::create`], with a mark in the temporary file's name that [`remove_marked`] knows
+    /// it by.
+    ///
+    /// # Errors
+    /// An [`OutputError`]; nothing has been touched then.
+    pub fn create_marked(
+        path: &Path,
+        overwrite: bool,
+        inputs: &[PathBuf],
+        mark: &str,
+    ) -> Result<Self, OutputError> {
         let path = path.to_owned();
         if path.as_os_str() == "-" {
             let writer = Sink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
@@ -114,7 +141,8 @@ impl Output {
         check_target(&path, overwrite, inputs)?;
         let parent = parent(&path);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(PREFIX).suffix(SUFFIX);
+        let prefix = format!("{PREFIX}{mark}");
+        builder.prefix(&prefix).suffix(SUFFIX);
         #[cfg(unix)]
         {
             // As `File::create` does: readable by all, less the umask.
@@ -147,6 +175,32 @@ impl Output {
             Sink::File { temporary, .. } => Some(temporary.get_ref().path()),
             Sink::Standard(_) => None,
         }
+    }
+
+    /// Hands everything to the system and gives the buffer's memory back, for files that wait for
+    /// others before they get their names.
+    ///
+    /// # Errors
+    /// When the system refuses what was still in the buffer.
+    pub fn settle(self) -> Result<Self, OutputError> {
+        let Self { path, writer } = self;
+        let writer = match writer {
+            Sink::File {
+                temporary,
+                overwrite,
+            } => {
+                let file = temporary.into_inner().map_err(|e| OutputError::Write {
+                    path: path.clone(),
+                    source: e.into_error(),
+                })?;
+                Sink::File {
+                    temporary: BufWriter::with_capacity(0, file),
+                    overwrite,
+                }
+            }
+            standard @ Sink::Standard(_) => standard,
+        };
+        Ok(Self { path, writer })
     }
 
     /// Writes out everything and gives the file its name.
@@ -285,6 +339,23 @@ mod tests {
         assert_eq!(left.len(), 2);
         assert!(left.contains(&".tumble-notes".to_owned()));
         assert!(left.contains(&own.to_str().unwrap().to_owned()));
+    }
+
+    #[test]
+    fn marked_files_are_removed_by_their_mark() {
+        let directory = tempfile::tempdir().unwrap();
+        let create = |mark| {
+            let path = directory.path().join("out");
+            let output = Output::create_marked(&path, false, &[], mark).unwrap();
+            let temporary = output.temporary_path().unwrap().to_owned();
+            (output.settle().unwrap(), temporary)
+        };
+        let (_one, first) = create("shard1-");
+        let (two, second) = create("shard2-");
+        remove_marked(directory.path(), "shard1-");
+        assert!(!first.exists() && second.exists());
+        two.commit().unwrap();
+        assert_eq!(names(directory.path()), ["out"]);
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod poses;
 mod program;
 mod run;
 mod save;
+mod shards;
 mod stream;
 mod verify;
 
@@ -40,6 +41,8 @@ mod _tumble {
     use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]
     use crate::save::save;
+    #[pymodule_export]
+    use crate::shards::{Plan, Worker, inputs_of, kernels_sha256, merge};
     #[pymodule_export]
     use crate::stream::{Chunk, Chunks};
     #[pymodule_export]

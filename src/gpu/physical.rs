@@ -27,6 +27,8 @@ pub struct DeviceInfo {
     pub vendor_id: u32,
     /// The vendor's number for the device.
     pub device_id: u32,
+    /// Vulkan's `deviceUUID`: 32 hexadecimal digits with dashes.
+    pub uuid: String,
     /// Bytes that a kernel can see of one buffer.
     pub max_storage_buffer_range: u64,
     /// Bytes of the largest allocation.
@@ -142,7 +144,10 @@ impl PhysicalDevice {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut imported = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
-        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance);
+        let mut id = vk::PhysicalDeviceIDProperties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut maintenance)
+            .push_next(&mut id);
         let borrows = has(ext::external_memory_host::NAME);
         if borrows {
             all = all.push_next(&mut imported);
@@ -181,6 +186,7 @@ impl PhysicalDevice {
             api_version: version(properties.api_version),
             vendor_id: properties.vendor_id,
             device_id: properties.device_id,
+            uuid: uuid(id.device_uuid),
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
             max_memory_allocation_size: maintenance.max_memory_allocation_size,
             max_compute_work_group_invocations: limits.max_compute_work_group_invocations,
@@ -265,6 +271,13 @@ fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {
         vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
         _ => DeviceKind::Other,
     }
+}
+
+/// As RFC 9562 writes it.
+fn uuid(bytes: [u8; 16]) -> String {
+    let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    let parts = [0..8, 8..12, 12..16, 16..20, 20..32];
+    parts.map(|part| &digits[part]).join("-")
 }
 
 fn version(version: u32) -> String {

@@ -11,6 +11,7 @@ use tumble::{
 };
 
 use crate::arguments::given::Given;
+use crate::arguments::named_device::named;
 use crate::batch::output::{Ended, Sink};
 use crate::commands::probe;
 use crate::messages::exit::{DEVICE, Failure, NO_VULKAN};
@@ -23,7 +24,8 @@ const CHUNK: usize = 1 << 20;
 pub(crate) struct DeviceArguments {
     /// auto (the CPU for fewer than 2^20 rotations and where there is no graphics card, else the
     /// fastest by a measured probe), first (Vulkan device that is exact, else the CPU), cpu, vulkan,
-    /// or a device by its index or part of its name (`tumble devices`); the bits are the same
+    /// or a device by its index, part of its name or uuid:UUID (`tumble devices`); the bits are the
+    /// same
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: Choice,
     /// Use the device that --device names although its self-tests fail: its bits may differ from
@@ -47,7 +49,7 @@ enum Choice {
     Cpu,
     /// The first Vulkan device that is exact.
     Vulkan,
-    /// An index in the list of devices, or part of a name.
+    /// An index in the list of devices, part of a name, or a UUID.
     Named(String),
 }
 
@@ -128,6 +130,11 @@ impl DeviceArguments {
             memory: options.memory,
             threads: options.threads,
         }
+    }
+
+    /// So many threads of the CPU.
+    pub(crate) fn set_threads(&mut self, threads: Option<usize>) {
+        self.threads = threads;
     }
 
     /// The device of a command line, which says nothing of a device that is not used.
@@ -339,66 +346,7 @@ impl Opened {
     }
 }
 
-/// The device meant, of those that `tumble devices` lists: by index, by its whole
-/// name, by part of its name, in this order (a card may be called by a number).
-fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> {
-    if devices.is_empty() {
-        return Err(no_vulkan(&VulkanError::NoDevice));
-    }
-    if let Some(device) = given
-        .parse()
-        .ok()
-        .and_then(|index: usize| devices.get(index))
-    {
-        return Ok(device.clone());
-    }
-    let part = given.to_lowercase();
-    let matching = |matches: &dyn Fn(&str) -> bool| -> Vec<&Device> {
-        devices
-            .iter()
-            .filter(|device| matches(&device.name().to_lowercase()))
-            .collect()
-    };
-    let whole = matching(&|name| name == part);
-    let found = if whole.is_empty() {
-        matching(&|name| name.contains(&part))
-    } else {
-        whole
-    };
-    let list = listing(devices);
-    match *found {
-        [one] => Ok(one.clone()),
-        [] => {
-            let known = devices
-                .iter()
-                .map(Device::name)
-                .chain(["auto", "first", "cpu", "vulkan"]);
-            let hint = words::nearest(given, known)
-                .map(|near| format!("; did you mean `{near}`?"))
-                .unwrap_or_default();
-            Err(Failure::usage(format!(
-                "there is no device `{given}`{hint}\n{list}"
-            )))
-        }
-        _ => Err(Failure::usage(format!(
-            "`{given}` could be several devices; give more of the name, or the index\n{list}"
-        ))),
-    }
-}
-
-fn listing(devices: &[Device]) -> String {
-    let lines: Vec<String> = devices
-        .iter()
-        .enumerate()
-        .map(|(index, device)| format!("  {index}  {}", device.name()))
-        .collect();
-    format!(
-        "  there are: auto, first, cpu, vulkan, and\n{}",
-        lines.join("\n")
-    )
-}
-
-fn no_vulkan(error: &VulkanError) -> Failure {
+pub(super) fn no_vulkan(error: &VulkanError) -> Failure {
     Failure::new(NO_VULKAN, format!("no Vulkan device: {error}"))
 }
 

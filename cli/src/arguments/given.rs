@@ -19,7 +19,7 @@ pub(crate) struct Given {
 /// Options that decide over no byte of a result: which inputs and outputs there are, what may be
 /// read and replaced, who computes, and what is said. Times may come from standard input, so that
 /// who reads them says what they are.
-const SILENT: [&str; 14] = [
+const SILENT: [&str; 16] = [
     "allow_inexact",
     "device",
     "explain_route",
@@ -33,6 +33,8 @@ const SILENT: [&str; 14] = [
     "paths",
     "pipes",
     "resume",
+    "shard",
+    "shard_bytes",
     "times",
 ];
 

@@ -96,6 +96,11 @@ impl Inputs {
         Ok(gathered)
     }
 
+    /// What the command line names.
+    pub(crate) fn given(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
     /// As [`Inputs::gather`], the paths alone.
     pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
         Ok(self.gather(standard_input_taken)?.paths())

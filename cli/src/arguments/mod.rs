@@ -5,6 +5,7 @@ pub(crate) mod gather;
 pub(crate) mod given;
 pub(crate) mod input;
 pub(crate) mod interpolation;
+mod named_device;
 pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;

@@ -8,7 +8,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::{Format, Loaded};
 
 use crate::arguments::gather::Gathered;
-use crate::arguments::input::{Inputs, clip_name, name, several, tell_warnings};
+use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings};
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::place::Place;
 use crate::batch::run::{Batch, Done, Evaluated};
@@ -42,6 +42,31 @@ impl Results {
         let place = Place::new(file, self.overwrite, &inputs)?;
         place.try_out()?;
         Ok(Some(place))
+    }
+
+    /// The directory of results, for those who evaluate shards of them.
+    pub(crate) fn folder(&self) -> Result<&Path, Failure> {
+        match self.out.as_deref() {
+            Some(out) if !is_standard(out) => Ok(out),
+            _ => Err(Failure::usage(
+                "shards need a directory for their results: -o DIRECTORY",
+            )),
+        }
+    }
+
+    /// The format that was asked for.
+    pub(crate) fn format(&self) -> Option<&'static Format> {
+        self.format
+    }
+
+    /// Whether results that are done are skipped.
+    pub(crate) fn is_resumed(&self) -> bool {
+        self.resume
+    }
+
+    /// Whether results that are there are replaced.
+    pub(crate) fn overwrites(&self) -> bool {
+        self.overwrite
     }
 
     /// Where each input's result goes. Everything that can be refused is refused here, before any
@@ -82,13 +107,15 @@ impl Results {
     ) -> Result<(), Failure> {
         let Plan { targets, manifest } = plan;
         let jobs: Vec<(PathBuf, Target)> = files.paths().into_iter().zip(targets).collect();
-        if let Some(manifest) = manifest {
+        if let Some(mut manifest) = manifest {
             let batch = Batch {
                 read,
                 options,
                 resume: self.resume,
             };
-            return batch.run(&jobs, manifest, work);
+            let outcome = batch.run(&jobs, &mut manifest, work);
+            manifest.finish()?;
+            return outcome;
         }
         for_each(&jobs, |(path, target)| {
             let loaded = busy(&format!("reading {}", name(path)), || read(path))?;

@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::output::Output;
 
 use crate::batch::digest;
+use crate::batch::place::Written;
+use crate::batch::run::Records;
+use crate::batch::shards::{plan::Stated, record};
 use crate::messages::exit::{Failure, OUTPUT};
 
 /// Its name in the directory.
@@ -95,11 +98,14 @@ pub(crate) struct Manifest {
     added: BTreeMap<String, Entry>,
     /// The file, to whose end lines are added; locked.
     journal: File,
+    /// There are shards, whose lines become part of it.
+    has_shards: bool,
 }
 
 impl Manifest {
-    /// Opens a directory's manifest, or begins one.
-    pub(crate) fn open(folder: &Path) -> Result<Self, Failure> {
+    /// Opens a directory's manifest, or begins one. `has_shards`: what shards have made is the
+    /// batch's too, and their lines become lines of the manifest.
+    pub(crate) fn open(folder: &Path, has_shards: bool) -> Result<Self, Failure> {
         let path = folder.join(NAME);
         let failed = |error: io::Error| Failure::writing(&path.display().to_string(), &error);
         let mut journal = File::options()
@@ -125,11 +131,16 @@ impl Manifest {
             journal.set_len(whole as u64).map_err(failed)?;
             journal.seek(SeekFrom::End(0)).map_err(failed)?;
         }
+        let mut previous = Lines::parse(&bytes[..whole]).entries;
+        if has_shards {
+            previous.extend(record::entries(folder));
+        }
         Ok(Self {
             folder: folder.to_owned(),
-            previous: Arc::new(Lines::parse(&bytes[..whole]).entries),
+            previous: Arc::new(previous),
             added: BTreeMap::new(),
             journal,
+            has_shards,
         })
     }
 
@@ -137,14 +148,6 @@ impl Manifest {
     /// then not a stranger's.
     pub(crate) fn knows(&self, output: &str) -> bool {
         self.previous.contains_key(output) || of_clips(&self.previous, output).next().is_some()
-    }
-
-    /// What it said when it was opened.
-    pub(crate) fn previous(&self) -> Previous {
-        Previous {
-            folder: self.folder.clone(),
-            entries: Arc::clone(&self.previous),
-        }
     }
 
     /// Adds a line, in one piece.
@@ -165,7 +168,7 @@ impl Manifest {
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let path = self.folder.join(NAME);
         if self.is_empty() {
-            return Ok(());
+            return self.forget_shards();
         }
         let mut output =
             Output::create(&path, true, &[]).map_err(|error| Failure::output(&error))?;
@@ -175,11 +178,34 @@ impl Manifest {
             let written = output.write_all(line(entry).as_bytes());
             written.map_err(|error| self.failed(&error))?;
         }
-        output.commit().map_err(|error| Failure::output(&error))
+        output.commit().map_err(|error| Failure::output(&error))?;
+        self.forget_shards()
+    }
+
+    /// The manifest has their lines.
+    fn forget_shards(&self) -> Result<(), Failure> {
+        match self.has_shards {
+            true => Stated::remove(&self.folder),
+            false => Ok(()),
+        }
     }
 
     fn failed(&self, error: &io::Error) -> Failure {
         Failure::writing(&self.folder.join(NAME).display().to_string(), error)
+    }
+}
+
+impl Records for Manifest {
+    fn previous(&self) -> Previous {
+        Previous {
+            folder: self.folder.clone(),
+            entries: Arc::clone(&self.previous),
+        }
+    }
+
+    fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure> {
+        self.add(entry)?;
+        written.commit()
     }
 }
 
@@ -193,12 +219,27 @@ impl Drop for Manifest {
 }
 
 /// What a manifest said before the batch.
+#[derive(Clone)]
 pub(crate) struct Previous {
     folder: PathBuf,
     entries: Arc<BTreeMap<String, Entry>>,
 }
 
 impl Previous {
+    pub(crate) fn new(folder: &Path, entries: BTreeMap<String, Entry>) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            entries: Arc::new(entries),
+        }
+    }
+
+    /// What it names in the place of an output: that, or the results of the clips that it would hold.
+    pub(crate) fn results_of<'a>(&'a self, output: &'a str) -> impl Iterator<Item = &'a Entry> {
+        let one = self.entries.get(output);
+        let clips = of_clips(&self.entries, output).filter(move |_| one.is_none());
+        one.into_iter().chain(clips.map(|(entry, _)| entry))
+    }
+
     /// Whether the output, or the outputs of all clips that it would hold, are there, whole, and
     /// the results of the same request.
     pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
@@ -232,7 +273,8 @@ fn of_clips<'a>(
     })
 }
 
-fn line(entry: &Entry) -> String {
+/// An entry as a line.
+pub(crate) fn line(entry: &Entry) -> String {
     serde_json::to_string(entry).expect("strings and numbers") + "\n"
 }
 
@@ -259,9 +301,9 @@ mod tests {
     #[test]
     fn a_line_cut_short_is_forgotten_and_the_next_is_whole() {
         let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path()).unwrap();
+        let mut manifest = Manifest::open(place.path(), false).unwrap();
         assert!(
-            Manifest::open(place.path()).is_err(),
+            Manifest::open(place.path(), false).is_err(),
             "two batches in one directory"
         );
         manifest.add(entry("b", "1")).unwrap();
@@ -272,7 +314,7 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         bytes.truncate(bytes.len() - 5);
         std::fs::write(&path, &bytes).unwrap();
-        let mut manifest = Manifest::open(place.path()).unwrap();
+        let mut manifest = Manifest::open(place.path(), false).unwrap();
         assert_eq!(manifest.previous["b"].output_sha256, "1");
         manifest.add(entry("b", "4")).unwrap();
         manifest.finish().unwrap();
@@ -283,11 +325,11 @@ mod tests {
     #[test]
     fn what_is_done_is_what_is_there_and_was_asked_for() {
         let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path()).unwrap();
+        let mut manifest = Manifest::open(place.path(), false).unwrap();
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
         manifest.finish().unwrap();
-        let manifest = Manifest::open(place.path()).unwrap().previous();
+        let manifest = Manifest::open(place.path(), false).unwrap().previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");
         std::fs::write(place.path().join("a"), "abc").unwrap();
         assert!(manifest.is_done("a", "1", "o"));

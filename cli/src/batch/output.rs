@@ -1,10 +1,9 @@
 //! Results of evaluations: where they go, planned and checked before any work, and
 //! how they are written.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
@@ -13,12 +12,12 @@ use tumble_formats::Diagnostic;
 use tumble_formats::format::{
     Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
-use tumble_formats::output::remove_abandoned;
 
-use crate::arguments::gather::{Found, Gathered};
+use crate::arguments::gather::Gathered;
 use crate::arguments::input;
+use crate::batch::folder;
 use crate::batch::manifest::Manifest;
-use crate::batch::place::{self, Place, Written};
+use crate::batch::place::{Place, Written};
 use crate::batch::room;
 use crate::batch::stream::Stream;
 use crate::messages::exit::Failure;
@@ -79,7 +78,7 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
                 "several inputs need a directory for their results: -o DIRECTORY",
             ));
         }
-        _ => in_folder(inputs, out, wish)?,
+        _ => folder::in_folder(inputs, out, wish)?,
     };
     // The surest check is to try; they are all in one directory.
     if let Some(target) = plan.targets.first() {
@@ -89,7 +88,10 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
 }
 
 /// The format asked for, else the one that the name says.
-fn choose(path: &Path, format: Option<&'static Format>) -> Result<&'static Format, Failure> {
+pub(crate) fn choose(
+    path: &Path,
+    format: Option<&'static Format>,
+) -> Result<&'static Format, Failure> {
     let named = if input::is_standard(path) {
         Format::writable().next()
     } else {
@@ -105,7 +107,7 @@ fn choose(path: &Path, format: Option<&'static Format>) -> Result<&'static Forma
 }
 
 /// The format of results that a file's name tells.
-fn of(path: &Path) -> Option<&'static Format> {
+pub(crate) fn of(path: &Path) -> Option<&'static Format> {
     Format::of(path).filter(|format| format.is_writable())
 }
 
@@ -130,89 +132,8 @@ pub(crate) fn out_help() -> String {
     )
 }
 
-/// A file in `folder` for each input, named after it; below it, where the input lay below
-/// a directory.
-fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, Failure> {
-    let shown = folder.display();
-    if !folder.is_dir() && (folder.exists() || of(folder).is_some()) {
-        return Err(Failure::usage(format!(
-            "{shown}: several inputs need a directory for their results, not one file"
-        )));
-    }
-    let format = choose(Path::new("-"), wish.format)?;
-    let sources: HashSet<PathBuf> = (inputs.files.iter())
-        .filter_map(|found| found.path.canonicalize().ok())
-        .collect();
-    let mut owners: HashMap<PathBuf, &Path> = HashMap::new();
-    let mut names = Vec::new();
-    for Found { path, below } in &inputs.files {
-        let name = name_for(format, path, below);
-        let target = folder.join(&name);
-        if let Some(other) = owners.insert(target.clone(), path) {
-            return Err(Failure::usage(format!(
-                "{} and {} would both write {}; give their directory, whose tree is kept, or \
-                 evaluate them into different directories",
-                input::name(other),
-                input::name(path),
-                target.display()
-            )));
-        }
-        if target
-            .canonicalize()
-            .is_ok_and(|target| sources.contains(&target))
-        {
-            let target = target.display();
-            return Err(Failure::usage(format!(
-                "{target}: is an input; give another directory"
-            )));
-        }
-        let Some(name) = name.to_str() else {
-            let message = "its name is not UTF-8, and a manifest could not name it; rename it";
-            let input = input::name(path);
-            return Err(Failure::usage(format!("{input}: {message}")));
-        };
-        names.push(name.to_owned());
-    }
-    place::folder(folder)?;
-    let parents: BTreeSet<PathBuf> = (names.iter())
-        .filter_map(|name| folder.join(name).parent().map(Path::to_owned))
-        .collect();
-    for parent in &parents {
-        std::fs::create_dir_all(parent)
-            .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
-        if wish.resume {
-            remove_abandoned(parent);
-        }
-    }
-    let manifest = Manifest::open(folder)?;
-    let target = |name: String| {
-        let overwrite = wish.overwrite || wish.resume && manifest.knows(&name);
-        let place = Place::new(&folder.join(&name), overwrite, &[]).map_err(|failure| {
-            if manifest.knows(&name) {
-                failure.hinted(" (--resume skips what is done)")
-            } else {
-                failure
-            }
-        })?;
-        Ok(Target::new(place.hashed(), format, name))
-    };
-    let targets = names.into_iter().map(target).collect::<Result<_, _>>()?;
-    let manifest = Some(manifest);
-    Ok(Plan { targets, manifest })
-}
-
-/// `walk.dat` becomes `walk.npy`, where it lies.
-fn name_for(format: &Format, input: &Path, below: &Path) -> PathBuf {
-    let below = if input::is_standard(input) {
-        Path::new("stdin")
-    } else {
-        below
-    };
-    below.with_extension(format.name)
-}
-
 impl Target {
-    fn new(place: Place, format: &'static Format, name: String) -> Self {
+    pub(crate) fn new(place: Place, format: &'static Format, name: String) -> Self {
         Self {
             place,
             format,

@@ -21,6 +21,8 @@ pub(crate) struct Place {
     inputs: Vec<PathBuf>,
     /// Its bytes are hashed as they are written.
     hashed: bool,
+    /// In the name of its temporary file.
+    mark: String,
 }
 
 /// A file that is whole, and has not got its name yet. Dropped before
@@ -32,6 +34,15 @@ pub(crate) struct Written {
 }
 
 impl Written {
+    /// Gives its buffer back, for files that get their names together with others.
+    pub(crate) fn settle(self) -> Result<Self, Failure> {
+        let output = self.output.settle();
+        Ok(Self {
+            output: output.map_err(|error| Failure::output(&error))?,
+            ..self
+        })
+    }
+
     pub(crate) fn commit(self) -> Result<(), Failure> {
         self.output
             .commit()
@@ -50,6 +61,7 @@ impl Place {
             overwrite,
             inputs: inputs.to_vec(),
             hashed: false,
+            mark: String::new(),
         })
     }
 
@@ -58,6 +70,7 @@ impl Place {
         let place = Self::new(path, self.overwrite, &self.inputs)?;
         Ok(Self {
             hashed: self.hashed,
+            mark: self.mark.clone(),
             ..place
         })
     }
@@ -68,6 +81,12 @@ impl Place {
             hashed: true,
             ..self
         }
+    }
+
+    /// The same place, its temporary file marked.
+    pub(crate) fn marked(self, mark: &str) -> Self {
+        let mark = mark.to_owned();
+        Self { mark, ..self }
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -85,7 +104,7 @@ impl Place {
     }
 
     fn open(&self) -> Result<Output, Failure> {
-        Output::create(&self.path, self.overwrite, &self.inputs)
+        Output::create_marked(&self.path, self.overwrite, &self.inputs, &self.mark)
             .map_err(|error| Failure::output(&error))
     }
 

@@ -10,7 +10,7 @@ use tumble_formats::Loaded;
 
 use crate::arguments::input;
 use crate::batch::digest;
-use crate::batch::manifest::{Entry, Manifest, Previous, kernels_sha256};
+use crate::batch::manifest::{Entry, Previous, kernels_sha256};
 use crate::batch::output::Target;
 use crate::batch::place::Written;
 use crate::messages::exit::{Failure, for_each};
@@ -44,26 +44,47 @@ pub(crate) struct Evaluated {
 /// Takes each result as it is whole, with the name that the manifest gives it.
 pub(crate) type Done<'a> = dyn FnMut(&str, Evaluated) -> Result<(), Failure> + 'a;
 
+/// Who remembers what a batch has made.
+pub(crate) trait Records {
+    /// What was there before.
+    fn previous(&self) -> Previous;
+
+    /// A result is whole and gets its name, now or with others.
+    fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure>;
+
+    /// A result, or those of all clips in its place, are there from before.
+    fn skip(&mut self, _output: &str) {}
+
+    /// An input has no result, and the batch goes on.
+    fn refuse(&mut self, _path: &Path, _failure: &Failure) {}
+
+    /// Says something to people.
+    fn tell(&self, text: &str) {
+        words::note(text);
+    }
+}
+
 impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
     pub(crate) fn run(
         &self,
         jobs: &[(PathBuf, Target)],
-        mut manifest: Manifest,
+        records: &mut impl Records,
         mut evaluate: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let previous = manifest.previous();
+        let previous = records.previous();
         let mut skipped = 0;
         let mut made = HashSet::new();
         let outcome = thread::scope(|scope| {
             // One is waiting at most: two sets are in memory.
             let (hand_over, inputs) = sync_channel(0);
             scope.spawn(move || self.read_all(jobs, &previous, &hand_over));
-            for_each(jobs, |(path, target)| {
+            let mut make = |path: &Path, target: &Target, records: &mut dyn Records| {
                 if let Some(stop) = signals::stopped() {
                     return Err(stop);
                 }
                 let Some((sha256, loaded)) = taken(&inputs)? else {
                     skipped += 1;
+                    records.skip(target.name());
                     return Ok(());
                 };
                 let clips = loaded.clips.len();
@@ -78,7 +99,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         )));
                     }
                     let digest = evaluated.written.digest.take().unwrap_or_default();
-                    manifest.add(Entry {
+                    let entry = Entry {
                         output: name.to_owned(),
                         output_bytes: digest.bytes(),
                         output_sha256: digest.finish(),
@@ -89,18 +110,24 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         tumble: env!("CARGO_PKG_VERSION").to_owned(),
                         device: evaluated.device,
                         one_of: (name != target.name()).then(|| (target.name().to_owned(), clips)),
-                    })?;
-                    evaluated.written.commit()?;
-                    words::note(&evaluated.told);
+                    };
+                    records.keep(entry, evaluated.written)?;
+                    records.tell(&evaluated.told);
                     Ok(())
+                })
+            };
+            for_each(jobs, |(path, target)| {
+                make(path, target, records).inspect_err(|failure| {
+                    if !failure.is_final() {
+                        records.refuse(path, failure);
+                    }
                 })
             })
         });
         if skipped > 0 {
             let results = words::count(skipped, "result");
-            words::note(&format!("{results} skipped: done before, and whole"));
+            records.tell(&format!("{results} skipped: done before, and whole"));
         }
-        manifest.finish()?;
         outcome
     }
 

@@ -8,6 +8,9 @@ use rayon::prelude::*;
 
 use crate::batch::digest;
 use crate::batch::manifest::{Entry, Lines, NAME};
+use crate::batch::shards::merge::Progress;
+use crate::batch::shards::plan::Stated;
+use crate::batch::shards::record;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
@@ -17,7 +20,8 @@ use crate::messages::words;
 #[command(after_help = "\
 `tumble eval` writes a manifest into every directory of results: for each result a line of
 JSON with the SHA-256 of the result and of its input, the options, the kernels, the program's
-version and the device.
+version and the device. Of a directory that shards are being written into it checks what is
+there, and says how many shards that is.
 
 Examples:
   tumble check results/manifest.jsonl
@@ -41,18 +45,27 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         given.clone()
     };
     let shown = path.display();
-    let bytes = std::fs::read(&path).map_err(|error| {
-        Failure::new(
-            ALL_INPUTS,
-            format!("{shown}: the manifest cannot be read: {error}"),
-        )
-    })?;
-    let Lines { entries, damaged } = Lines::parse(&bytes);
-    if entries.is_empty() {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let shards = Stated::read(folder)?;
+    let bytes = match std::fs::read(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && shards.is_some() => Vec::new(),
+        read => read.map_err(|error| {
+            Failure::new(
+                ALL_INPUTS,
+                format!("{shown}: the manifest cannot be read: {error}"),
+            )
+        })?,
+    };
+    let Lines {
+        mut entries,
+        damaged,
+    } = Lines::parse(&bytes);
+    if shards.is_some() {
+        entries.extend(record::entries(folder));
+    } else if entries.is_empty() {
         let message = format!("{shown}: is no manifest; `tumble eval` writes one, {NAME}");
         return Err(Failure::new(ALL_INPUTS, message));
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
     let entries: Vec<Entry> = entries.into_values().collect();
     let faults: Vec<(&Entry, Fault)> = busy("checking", || {
         let faulty = |entry| fault(folder, entry).map(|fault| (entry, fault));
@@ -80,7 +93,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure::new(DIFFERENCE, message));
     }
-    words::listing(&format!("{total}, every bit as written\n"))
+    words::listing(&format!("{total}, every bit as written\n"))?;
+    match shards.map(|stated| Progress::of(folder, &stated)) {
+        None => Ok(()),
+        Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
+    }
+}
+
+/// What is yet to do in a directory with shards.
+fn unmerged(folder: &Path, progress: &Progress) -> String {
+    let (folder, told) = (folder.display(), progress.told());
+    match progress.missing.is_empty() {
+        true => format!("{folder}: {told}; `tumble merge {folder}` makes them one"),
+        false => format!("{folder}: {told}; --resume makes the others"),
+    }
 }
 
 fn fault(folder: &Path, entry: &Entry) -> Option<Fault> {

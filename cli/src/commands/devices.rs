@@ -120,6 +120,7 @@ impl Entry {
         let _ = writeln!(text, "   kind        {}", kind.as_str().unwrap_or_default());
         let _ = writeln!(text, "   driver      {}", info.driver);
         let _ = writeln!(text, "   Vulkan      {}", info.api_version);
+        let _ = writeln!(text, "   uuid        {}", info.uuid);
         let _ = writeln!(
             text,
             "   buffers     {} visible of one, {} in one allocation",

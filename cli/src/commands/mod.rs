@@ -11,6 +11,7 @@ pub(crate) mod explain;
 pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
+pub(crate) mod merge;
 pub(crate) mod methods;
 pub(crate) mod picture;
 pub(crate) mod plot;
@@ -46,6 +47,7 @@ pub(crate) enum Command {
     Reduce(Box<reduce::Arguments>),
     Bench(bench::Arguments),
     Check(check::Arguments),
+    Merge(merge::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
     #[command(hide = true)]
@@ -72,6 +74,7 @@ impl Command {
             Self::Reduce(arguments) => reduce::run(&arguments),
             Self::Bench(arguments) => bench::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
+            Self::Merge(arguments) => merge::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),
             Self::ProbeDrivers(arguments) => probe::run(&arguments),

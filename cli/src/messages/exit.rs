@@ -105,9 +105,14 @@ impl Failure {
         self.message
     }
 
+    /// What it says.
+    pub(crate) fn message(&self) -> &str {
+        &self.message
+    }
+
     /// Whether the next input would fail in the same way.
     pub(crate) fn is_final(&self) -> bool {
-        !matches!(self.code, USAGE | ALL_INPUTS)
+        !matches!(self.code, USAGE | SOME_INPUTS | ALL_INPUTS)
     }
 
     /// Says why, on standard error, and gives the exit code.

@@ -15,12 +15,17 @@ __all__ = [
     "Clip",
     "Engine",
     "File",
+    "Plan",
     "Verification",
+    "Worker",
     "__version__",
     "devices",
     "evaluate",
+    "inputs_of",
+    "kernels_sha256",
     "load",
     "load_drivers",
+    "merge",
     "methods",
     "page",
     "panic",
@@ -347,3 +352,46 @@ def page(clips: Clip | File | Sequence[Clip], options: Sequence[str]) -> str: ..
 def panic() -> None: ...
 def run(arguments: Sequence[str]) -> int: ...
 def set_probe(command: Sequence[str]) -> None: ...
+@final
+class Plan:
+    def __new__(
+        cls,
+        line: Sequence[str],
+        library: str,
+        listed: Sequence[tuple[str, int]] | None,
+        folder: str,
+        shard_bytes: str,
+        into: str,
+    ) -> Plan: ...
+    @property
+    def id(self) -> str: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def options(self) -> str: ...
+    def __len__(self) -> int: ...
+    def claim(self, folder: str) -> None: ...
+    def inputs_of(self, shard: int) -> list[tuple[str, str]]: ...
+    def names_of(self, shard: int) -> list[str]: ...
+
+@final
+class Worker:
+    def __new__(cls, line: Sequence[str], threads: int | None) -> Worker: ...
+    @property
+    def device(self) -> str: ...
+    @property
+    def options(self) -> str: ...
+    def run(
+        self,
+        folder: str,
+        shard: int,
+        of: int,
+        plan: str,
+        inputs: Sequence[tuple[str, str]],
+        *,
+        record: bool,
+    ) -> tuple[int, str]: ...
+
+def inputs_of(line: Sequence[str]) -> list[str]: ...
+def kernels_sha256() -> str: ...
+def merge(folder: str) -> tuple[int, str]: ...

@@ -3,6 +3,7 @@
 mod applies;
 mod motion;
 mod rotations;
+pub(crate) mod shards;
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -28,8 +29,9 @@ use crate::arguments::what::{OrderArgument, What, quaternions};
 use crate::batch::digest;
 use crate::batch::output::Target;
 use crate::batch::place::Written;
-use crate::batch::run::Evaluated;
+use crate::batch::run::{Done, Evaluated};
 use crate::commands::eval::applies::Kind;
+use crate::commands::eval::shards::Part;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -51,15 +53,16 @@ Examples:
   find . -name '*.dat' | tumble eval --files-from - -o results
   tumble eval walk.glb --fps 60 -o walk60.glb  baked; everything else stays as it is
   tumble eval clips -o out --to bvh --resume   formats may be mixed
+  seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     given: Given,
     #[command(flatten)]
-    inputs: Inputs,
+    pub(crate) inputs: Inputs,
     #[command(flatten)]
-    results: Results,
+    pub(crate) results: Results,
     /// How to interpolate (`tumble methods`); channels that hold each key until the next one stay
     /// as they are
     #[arg(
@@ -75,7 +78,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     manner: Manner,
     #[command(flatten)]
-    device: DeviceArguments,
+    pub(crate) device: DeviceArguments,
     /// The order of results: (tracks, frames, 4) or (frames, tracks, 4); poses and CSV come frame by
     /// frame
     #[arg(long, value_enum, default_value = "track")]
@@ -95,6 +98,19 @@ pub(crate) struct Arguments {
     /// Also say which way each input takes to its rotations; all ways give the same bits
     #[arg(long)]
     explain_route: bool,
+    /// Evaluate one part of several into a directory that other processes fill too, then `tumble
+    /// merge` it: I/N, such as 3/64, or one shard by its number
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Part>,
+    /// The input of a shard, at most; shards have 256 inputs at most, and depend on nothing else
+    #[arg(
+        long,
+        value_name = "SIZE",
+        default_value = "32MiB",
+        requires = "shard",
+        value_parser = words::parse_bytes
+    )]
+    shard_bytes: u64,
     /// Print JSON about the results on standard output
     #[arg(long)]
     json: bool,
@@ -131,16 +147,22 @@ pub(crate) struct Told {
     seconds: f64,
 }
 
+impl Told {
+    /// How many were evaluated.
+    pub(crate) fn rotations(&self) -> u64 {
+        self.tracks as u64 * self.frames as u64
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(part) = arguments.shard {
+        return shards::run(arguments, part);
+    }
     // Everything that can be refused is refused before any work.
     let inputs = arguments
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;
-    if let Some(method) = arguments.method.0 {
-        let checked = arguments.manner.check(&[method]);
-        checked.map_err(Failure::usage)?;
-    }
-    let samples = arguments.sampling.samples()?;
+    let samples = arguments.checked_samples()?;
     let plan = arguments.results.plan(&inputs)?;
     // All targets have one format.
     if let Some(target) = plan.targets.first() {
@@ -161,7 +183,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         plan,
         options,
         |path, loaded, target, done| {
-            let mut job = Job {
+            let job = Job {
                 arguments,
                 device: &mut device,
                 samples: &samples,
@@ -169,24 +191,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 loaded,
                 started: Instant::now(),
             };
-            let name = input::name(path);
-            let latest = RefCell::new(None);
-            let mut done = |name: &str, evaluated: Evaluated| {
-                done(name, evaluated)?;
-                told.extend(latest.take());
-                Ok(())
-            };
-            each_file(
-                &name,
-                (path, loaded),
-                target,
-                &mut done,
-                |name, clips, target| {
-                    let (evaluated, own) = job.evaluate(name, clips, target)?;
-                    latest.replace(Some(own));
-                    Ok(evaluated)
-                },
-            )
+            job.run(target, done, &mut told)
         },
     );
     if arguments.json {
@@ -196,6 +201,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// The samples, once the method takes what is said of it.
+    fn checked_samples(&self) -> Result<Samples, Failure> {
+        if let Some(method) = self.method.0 {
+            let checked = self.manner.check(&[method]);
+            checked.map_err(Failure::usage)?;
+        }
+        self.sampling.samples()
+    }
+
     /// All that decides over the bytes of a result besides its input.
     fn options(&self, samples: &Samples) -> String {
         let mut options = self.given.options();
@@ -221,6 +235,28 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// All clips of the input; `told` gets what is to be said of each result that is done.
+    fn run(
+        mut self,
+        target: &Target,
+        done: &mut Done<'_>,
+        told: &mut Vec<Told>,
+    ) -> Result<(), Failure> {
+        let name = input::name(self.path);
+        let file = (self.path, self.loaded);
+        let latest = RefCell::new(None);
+        let mut done = |name: &str, evaluated: Evaluated| {
+            done(name, evaluated)?;
+            told.extend(latest.take());
+            Ok(())
+        };
+        each_file(&name, file, target, &mut done, |name, clips, target| {
+            let (evaluated, own) = self.evaluate(name, clips, target)?;
+            latest.replace(Some(own));
+            Ok(evaluated)
+        })
+    }
+
     /// Some clips, into one file.
     fn evaluate(
         &mut self,

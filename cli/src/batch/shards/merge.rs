@@ -1,0 +1,258 @@
+//! All shards of a directory become its manifest, as one process would have written it.
+
+use std::collections::{BTreeSet, HashMap};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tumble_formats::output::{Output, remove_marked};
+
+use crate::batch::manifest::{Entry, NAME};
+use crate::batch::shards::plan::Stated;
+use crate::batch::shards::record::{self, MARK, Refusal};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, OUTPUT};
+use crate::messages::words;
+
+/// So many shards' files are in memory at once; neighbouring results are mostly of one shard.
+const KEPT: usize = 16;
+
+/// What merging came to.
+#[derive(Debug)]
+pub(crate) struct Merged {
+    /// Lines of the manifest.
+    pub(crate) results: usize,
+    pub(crate) shards: usize,
+    pub(crate) inputs: usize,
+    pub(crate) failed: Vec<Refusal>,
+}
+
+/// How far the shards of a directory are.
+pub(crate) struct Progress {
+    pub(crate) done: usize,
+    pub(crate) missing: Vec<usize>,
+}
+
+/// A line of the manifest to be: whose it is, and where it stands. File 0 is the manifest before,
+/// any other that of the shard of this number.
+struct Line {
+    output: String,
+    file: usize,
+    at: Range<usize>,
+}
+
+impl Progress {
+    pub(crate) fn of(folder: &Path, stated: &Stated) -> Self {
+        let is_done = |&shard: &usize| read(folder, stated, shard).is_some();
+        let (done, missing): (Vec<usize>, Vec<usize>) = (1..=stated.shards).partition(is_done);
+        Self {
+            done: done.len(),
+            missing,
+        }
+    }
+
+    /// `3 of 79 shards are done; the first that is not is shard 4`.
+    pub(crate) fn told(&self) -> String {
+        let all = words::count(self.done + self.missing.len(), "shard");
+        let first = self.missing.first();
+        let first = first.map(|first| format!("; the first that is not is shard {first}"));
+        format!(
+            "{} of {all} are done{}",
+            self.done,
+            first.unwrap_or_default()
+        )
+    }
+}
+
+/// A shard's file, where it is of the plan and whole, with its refusals and the start of its lines.
+fn read(folder: &Path, stated: &Stated, shard: usize) -> Option<(Vec<u8>, Vec<Refusal>, usize)> {
+    let bytes = std::fs::read(record::path(folder, shard)).ok()?;
+    let (header, start) = record::header(&bytes)?;
+    let is_own = header.plan == stated.plan && header.shard == shard;
+    is_own.then_some((bytes, header.failed, start))
+}
+
+/// Writes the manifest of a directory whose shards are all done, and removes `manifest.d` and what
+/// lost workers left half-way.
+pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
+    let shown = folder.display();
+    let Some(stated) = Stated::read(folder)? else {
+        let message =
+            format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them");
+        return Err(Failure::new(ALL_INPUTS, message));
+    };
+    let _lock = lock(folder)?;
+    let progress = Progress::of(folder, &stated);
+    if !progress.missing.is_empty() {
+        let message = format!("{shown}: {}; make them with --resume", progress.told());
+        return Err(Failure::new(DIFFERENCE, message));
+    }
+    let mut lines = Vec::new();
+    let path = folder.join(NAME);
+    list_before(&path, &mut lines)?;
+    let mut failed = Vec::new();
+    for shard in 1..=stated.shards {
+        let (bytes, refused, start) = read(folder, &stated, shard).ok_or_else(|| {
+            let message = format!("{shown}: shard {shard} went away while it was merged");
+            Failure::new(DIFFERENCE, message)
+        })?;
+        failed.extend(refused);
+        list(&bytes, start, shard, &mut lines);
+    }
+    let lines = one_each(lines)?;
+    if !lines.is_empty() {
+        write(folder, &path, &lines)?;
+    }
+    let parents: BTreeSet<PathBuf> = (lines.iter())
+        .filter_map(|line| folder.join(&line.output).parent().map(Path::to_owned))
+        .collect();
+    for parent in parents.iter().map(|parent| &**parent).chain([folder]) {
+        remove_marked(parent, MARK);
+    }
+    Stated::remove(folder)?;
+    Ok(Merged {
+        results: lines.len(),
+        shards: stated.shards,
+        inputs: stated.inputs,
+        failed,
+    })
+}
+
+/// Two who merge at once would remove what the other reads.
+fn lock(folder: &Path) -> Result<Option<File>, Failure> {
+    let Ok(file) = File::open(folder.join(super::plan::FOLDER).join("plan.json")) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Err(std::fs::TryLockError::WouldBlock) => {
+            let folder = folder.display();
+            let message = format!("{folder}: another tumble is merging it; wait for it");
+            Err(Failure::new(OUTPUT, message))
+        }
+        // Where a file system has no locks there is none to wait for.
+        Ok(()) | Err(std::fs::TryLockError::Error(_)) => Ok(Some(file)),
+    }
+}
+
+/// As much of a line as says whose it is.
+#[derive(Deserialize)]
+struct Owner {
+    output: String,
+}
+
+/// Lists the lines of the manifest before, which may be of a million results: one is in memory at a
+/// time.
+fn list_before(path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
+    let Ok(file) = File::open(path) else {
+        return Ok(()); // mostly there is none
+    };
+    let mut reader = BufReader::new(file);
+    let (mut line, mut start) = (Vec::new(), 0);
+    loop {
+        line.clear();
+        let length = reader.read_until(b'\n', &mut line).map_err(|error| {
+            let message = format!("{}: cannot be read: {error}", path.display());
+            Failure::new(ALL_INPUTS, message)
+        })?;
+        if length == 0 {
+            return Ok(());
+        }
+        let mut own = Vec::new();
+        list(&line, 0, 0, &mut own);
+        lines.extend(own.pop().map(|Line { output, .. }| Line {
+            output,
+            file: 0,
+            at: start..start + length,
+        }));
+        start += length;
+    }
+}
+
+/// Lists the lines of a file that are entries.
+fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<Line>) {
+    let mut at = start;
+    for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
+        let end = at + line.len();
+        if line.ends_with(b"\n")
+            && let Ok(Owner { output }) = serde_json::from_slice(line)
+        {
+            let at = at..end;
+            lines.push(Line { output, file, at });
+        }
+        at = end;
+    }
+}
+
+/// One line for each output, in order; of the manifest before and a shard the shard's.
+fn one_each(mut lines: Vec<Line>) -> Result<Vec<Line>, Failure> {
+    lines.sort_by(|one, other| {
+        one.output
+            .cmp(&other.output)
+            .then(one.file.cmp(&other.file))
+    });
+    let mut kept: Vec<Line> = Vec::with_capacity(lines.len());
+    for line in lines {
+        match kept.last_mut() {
+            Some(last) if last.output == line.output && last.file == 0 => *last = line,
+            Some(last) if last.output == line.output => {
+                let output = &line.output;
+                return Err(Failure::usage(format!(
+                    "shards {} and {} both made {output}; evaluate their inputs into different \
+                     directories",
+                    last.file, line.file
+                )));
+            }
+            _ => kept.push(line),
+        }
+    }
+    Ok(kept)
+}
+
+/// Writes the lines where they belong. Few files are in memory: the index of a million results is
+/// 130 MB, their lines are 500.
+fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
+    let failed = |error| Failure::writing(&path.display().to_string(), &error);
+    let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
+    let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
+    let mut before = match lines.iter().any(|line| line.file == 0) {
+        true => Some(BufReader::new(File::open(path).map_err(failed)?)),
+        false => None,
+    };
+    let (mut at, mut one) = (0, Vec::new());
+    for line in lines {
+        let text = match (line.file, &mut before) {
+            (0, Some(before)) => {
+                // Mostly it is the next one, which the reader has already.
+                let step = line.at.start as i64 - at;
+                before.seek_relative(step).map_err(failed)?;
+                one.resize(line.at.len(), 0);
+                before.read_exact(&mut one).map_err(failed)?;
+                at = line.at.end as i64;
+                &*one
+            }
+            (shard, _) => {
+                if !kept.contains_key(&shard) {
+                    if kept.len() == KEPT {
+                        kept.clear();
+                    }
+                    let bytes = std::fs::read(record::path(folder, shard)).map_err(failed)?;
+                    kept.insert(shard, bytes);
+                }
+                kept[&shard].get(line.at.clone()).unwrap_or_default()
+            }
+        };
+        // What was replaced meanwhile by another attempt has the same entries, maybe at other places.
+        let is_whole =
+            serde_json::from_slice::<Entry>(text).is_ok_and(|entry| entry.output == line.output);
+        if !is_whole {
+            let message = format!(
+                "{}: changed while it was merged; try again",
+                folder.display()
+            );
+            return Err(Failure::new(DIFFERENCE, message));
+        }
+        output.write_all(text).map_err(failed)?;
+    }
+    output.commit().map_err(|error| Failure::output(&error))
+}

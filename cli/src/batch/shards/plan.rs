@@ -1,0 +1,256 @@
+//! Which inputs a shard has, and what a directory's shards are of.
+
+use std::collections::HashSet;
+use std::io::{self, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use tumble_formats::format::Format;
+use tumble_formats::output::Output;
+
+use crate::arguments::gather::Found;
+use crate::arguments::input;
+use crate::batch::digest::Digest;
+use crate::batch::manifest::kernels_sha256;
+use crate::batch::shards::record;
+use crate::batch::{folder, place};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+
+/// The directory in that of results.
+pub(crate) const FOLDER: &str = "manifest.d";
+
+/// What the shards are of.
+const STATED: &str = "plan.json";
+
+/// No shard has more inputs: what a lost worker had done of one is done again.
+const MOST_INPUTS: usize = 256;
+
+/// All inputs of a request, cut into shards.
+pub(crate) struct Plan {
+    pub(crate) inputs: Vec<Found>,
+    /// Of the results, in the order of their inputs.
+    pub(crate) names: Vec<String>,
+    /// The inputs of each shard.
+    pub(crate) cuts: Vec<Range<usize>>,
+    pub(crate) format: &'static Format,
+    pub(crate) stated: Stated,
+}
+
+/// What a directory says of its shards. Two of one plan are equal, wherever they were made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Stated {
+    /// The hash of all that decides which shard has which inputs, and how they are evaluated.
+    pub(crate) plan: String,
+    pub(crate) shards: usize,
+    pub(crate) inputs: usize,
+    /// Of input in a shard, at most; one input may be larger.
+    pub(crate) shard_bytes: u64,
+    /// The hash of the names of all results.
+    pub(crate) outputs_sha256: String,
+    pub(crate) options: String,
+    pub(crate) kernels_sha256: String,
+    pub(crate) tumble: String,
+}
+
+/// The inputs of shards: in their order, until there are `MOST_INPUTS`, or would be more than
+/// `most_bytes`.
+pub(crate) fn cut(sizes: &[u64], most_bytes: u64) -> Vec<Range<usize>> {
+    let mut cuts = Vec::new();
+    let (mut first, mut bytes) = (0, 0_u64);
+    for (place, &size) in sizes.iter().enumerate() {
+        let is_full = place - first == MOST_INPUTS || bytes.saturating_add(size) > most_bytes;
+        if is_full && place > first {
+            cuts.push(first..place);
+            (first, bytes) = (place, 0);
+        }
+        bytes = bytes.saturating_add(size);
+    }
+    if first < sizes.len() {
+        cuts.push(first..sizes.len());
+    }
+    cuts
+}
+
+/// The hash of a list of names.
+pub(crate) fn hash_of(names: &[String]) -> String {
+    let mut digest = Digest::default();
+    for name in names {
+        digest.update(name.as_bytes());
+        digest.update(b"\n"); // in a name it would be one of another list, which does no harm here
+    }
+    digest.finish()
+}
+
+impl Plan {
+    /// Cuts inputs, of those sizes, into shards.
+    pub(crate) fn new(
+        inputs: Vec<Found>,
+        sizes: &[u64],
+        folder: &Path,
+        format: Option<&'static Format>,
+        options: String,
+        shard_bytes: u64,
+    ) -> Result<Self, Failure> {
+        if let Some(pipe) = inputs.iter().find(|found| input::is_standard(&found.path)) {
+            let name = input::name(&pipe.path);
+            let message = format!("{name}: no other process can read it; give a file");
+            return Err(Failure::usage(message));
+        }
+        let format = folder::format(folder, format)?;
+        let names = folder::names(&inputs, folder, format)?;
+        let cuts = cut(sizes, shard_bytes);
+        let mut digest = Digest::default();
+        let mut say = |text: &str| {
+            digest.update(&(text.len() as u64).to_le_bytes());
+            digest.update(text.as_bytes());
+        };
+        for text in [&options, kernels_sha256(), env!("CARGO_PKG_VERSION")] {
+            say(text);
+        }
+        say(&shard_bytes.to_string());
+        for (name, size) in names.iter().zip(sizes) {
+            say(name);
+            say(&size.to_string());
+        }
+        let stated = Stated {
+            plan: digest.finish(),
+            shards: cuts.len(),
+            inputs: inputs.len(),
+            shard_bytes,
+            outputs_sha256: hash_of(&names),
+            options,
+            kernels_sha256: kernels_sha256().to_owned(),
+            tumble: env!("CARGO_PKG_VERSION").to_owned(),
+        };
+        Ok(Self {
+            inputs,
+            names,
+            cuts,
+            format,
+            stated,
+        })
+    }
+
+    /// Says in the directory what its shards are of, before any result gets its name: from then on
+    /// the results of the plan are no stranger's. Any number of processes may do so at once.
+    pub(crate) fn claim(
+        &self,
+        folder: &Path,
+        resume: bool,
+        overwrite: bool,
+    ) -> Result<(), Failure> {
+        place::folder(folder)?;
+        let found = Stated::read(folder)?;
+        if found.as_ref() == Some(&self.stated) {
+            return Ok(());
+        }
+        if found.is_some() && !resume && !overwrite {
+            let shown = folder.display();
+            return Err(Failure::usage(format!(
+                "{shown}: has shards of another list, other options or another tumble; --resume keeps \
+                 what is the same, --overwrite makes all again"
+            )));
+        }
+        if let (false, Some(failure)) = (overwrite, self.stranger(folder, resume)) {
+            // Another process of the same plan may have been quicker.
+            return match Stated::read(folder)?.as_ref() == Some(&self.stated) {
+                true => Ok(()),
+                false => Err(failure),
+            };
+        }
+        self.stated.write(folder)
+    }
+
+    /// A file under the name of a result, which no manifest names or nobody asked to go on with.
+    fn stranger(&self, folder: &Path, resume: bool) -> Option<Failure> {
+        let known: HashSet<String> = match resume {
+            true => record::names(folder),
+            false => HashSet::new(),
+        };
+        let there = |name: &&String| !known.contains(*name) && folder.join(name).exists();
+        let name = self.names.iter().find(there)?;
+        let path = folder.join(name);
+        let path = path.display();
+        Some(Failure::usage(format!(
+            "{path}: exists; give --overwrite to replace it (--resume skips what is done)"
+        )))
+    }
+}
+
+impl Stated {
+    fn path(folder: &Path) -> PathBuf {
+        folder.join(FOLDER).join(STATED)
+    }
+
+    /// What a directory says; nothing where it has no shards.
+    pub(crate) fn read(folder: &Path) -> Result<Option<Self>, Failure> {
+        let path = Self::path(folder);
+        let refuse = |why: &dyn std::fmt::Display| {
+            let path = path.display();
+            Failure::new(ALL_INPUTS, format!("{path}: cannot be read: {why}"))
+        };
+        match std::fs::read(&path) {
+            Ok(bytes) => serde_json::from_slice(&bytes)
+                .map(Some)
+                .map_err(|error| refuse(&error)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(None),
+            Err(error) => Err(refuse(&error)),
+        }
+    }
+
+    /// Written whole, over what another process writes at the same time.
+    fn write(&self, folder: &Path) -> Result<(), Failure> {
+        let path = Self::path(folder);
+        let shown = path.display().to_string();
+        std::fs::create_dir_all(folder.join(FOLDER))
+            .map_err(|error| Failure::writing(&shown, &error))?;
+        let text = serde_json::to_string(self).expect("strings and numbers") + "\n";
+        let written = Output::create(&path, true, &[]).and_then(|mut output| {
+            output.write_all(text.as_bytes()).map_err(|source| {
+                tumble_formats::output::OutputError::Write {
+                    path: path.clone(),
+                    source,
+                }
+            })?;
+            output.commit()
+        });
+        written.map_err(|error| Failure::output(&error))
+    }
+
+    /// The shards are merged: nothing is said of them any more. What is left when this is stopped
+    /// half-way says nothing without the plan, which goes first.
+    pub(crate) fn remove(folder: &Path) -> Result<(), Failure> {
+        let failed = |error: &io::Error| {
+            let folder = folder.join(FOLDER);
+            Failure::writing(&folder.display().to_string(), error)
+        };
+        for removed in [
+            std::fs::remove_file(Self::path(folder)),
+            std::fs::remove_dir_all(folder.join(FOLDER)),
+        ] {
+            match removed {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(failed(&error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_depend_on_sizes_alone() {
+        assert_eq!(cut(&[], 10), []);
+        assert_eq!(cut(&[20], 10), [0..1], "one input may be larger");
+        assert_eq!(cut(&[4, 6, 1, 20, 3], 10), [0..2, 2..3, 3..4, 4..5]);
+        assert_eq!(cut(&[0; 600], 10), [0..256, 256..512, 512..600]);
+        assert_eq!(cut(&[u64::MAX, u64::MAX], u64::MAX), [0..1, 1..2]);
+    }
+}

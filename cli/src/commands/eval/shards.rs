@@ -1,0 +1,233 @@
+//! `tumble eval --shard`: one part of a library, into a directory that other processes fill too.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Instant;
+
+use crate::arguments::device::Opened;
+use crate::arguments::gather::Found;
+use crate::arguments::time::Samples;
+use crate::batch::output::Target;
+use crate::batch::run::Batch;
+use crate::batch::shards::plan::Plan;
+use crate::batch::shards::record::Header;
+use crate::batch::shards::run::Shard;
+use crate::commands::eval::{Arguments, Job, Told};
+use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::words;
+
+/// Which shards of a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// That one.
+    One(usize),
+    /// The shards of one process of several, both from 1.
+    Of(usize, usize),
+}
+
+impl FromStr for Part {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let number = |text: &str| text.parse().ok().filter(|&number: &usize| number > 0);
+        let part = match text.split_once('/') {
+            None => number(text).map(Self::One),
+            Some((own, all)) => (number(own).zip(number(all)))
+                .filter(|(own, all)| own <= all)
+                .map(|(own, all)| Self::Of(own, all)),
+        };
+        part.ok_or_else(|| "give I/N, from 1/N to N/N, or the number of a shard, from 1".to_owned())
+    }
+}
+
+impl Part {
+    /// The numbers of its shards, from 1. Parts differ by one shard at most.
+    fn shards(self, all: usize) -> Result<std::ops::RangeInclusive<usize>, Failure> {
+        let share = |part: usize, of: usize| (all as u128 * part as u128 / of as u128) as usize;
+        match self {
+            Self::One(one) if one > all => {
+                let all = words::count(all, "shard");
+                let message = format!("--shard {one}: there are {all}");
+                Err(Failure::usage(message))
+            }
+            Self::One(one) => Ok(one..=one),
+            Self::Of(own, of) => Ok(share(own - 1, of) + 1..=share(own, of)),
+        }
+    }
+}
+
+/// Runs the shards of a part.
+pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
+    let mut evaluator = Evaluator::new(arguments)?;
+    let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
+    let gathered = arguments.inputs.gather(false)?;
+    let sizes: Vec<u64> = gathered.files.iter().map(size).collect();
+    let bytes = arguments.shard_bytes;
+    let request = &evaluator.request;
+    let plan = request.plan(arguments, gathered.files, &sizes, folder, bytes)?;
+    let shards = part.shards(plan.cuts.len())?;
+    plan.claim(folder, resume, arguments.results.overwrites())?;
+    let (mut failed, mut inputs) = (0, 0);
+    let mut told = Vec::new();
+    for number in shards {
+        let own = plan.cuts[number - 1].clone();
+        inputs += own.len();
+        let header = Header {
+            shard: number,
+            of: plan.cuts.len(),
+            plan: plan.stated.plan.clone(),
+            inputs: own.len(),
+            failed: Vec::new(),
+        };
+        let names: Vec<&str> = plan.names[own.clone()].iter().map(|name| &**name).collect();
+        let mut shard = Shard::new(folder, header, &names, resume);
+        if shard.is_done() && !resume && !arguments.results.overwrites() {
+            return Err(Failure::usage(format!(
+                "shard {number} is done; --resume skips what is done, --overwrite makes it again"
+            )));
+        }
+        let paths = plan.inputs[own.clone()]
+            .iter()
+            .map(|found| found.path.clone());
+        let targets = shard.targets(&plan.names[own], plan.format)?;
+        let jobs: Vec<(PathBuf, Target)> = paths.zip(targets).collect();
+        evaluator.evaluate(arguments, &jobs, &mut shard, &mut told)?;
+        shard.finish()?;
+        failed += shard.header.failed.len();
+    }
+    if arguments.json {
+        words::json(&told)?;
+    }
+    match failed {
+        0 => Ok(()),
+        _ if failed == inputs => Err(Failure::new(
+            ALL_INPUTS,
+            format!("all {} failed", words::count(failed, "input")),
+        )),
+        _ => {
+            let message = format!("{failed} of {inputs} inputs failed; the others are done");
+            Err(Failure::new(SOME_INPUTS, message))
+        }
+    }
+}
+
+/// Of a file; what cannot be read is told about when it is opened.
+pub(crate) fn size(found: &Found) -> u64 {
+    std::fs::metadata(&found.path).map_or(0, |file| file.len())
+}
+
+/// What a command line asks for, checked.
+pub(crate) struct Request {
+    samples: Samples,
+    /// All that decides over results besides their inputs.
+    pub(crate) options: String,
+}
+
+impl Request {
+    /// Refuses everything that can be refused before the inputs are known.
+    pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
+        if arguments.sampling.reads_standard_input() {
+            let message = "--times -: no other process can read it; give a file";
+            return Err(Failure::usage(message));
+        }
+        let samples = arguments.checked_samples()?;
+        Ok(Self {
+            options: arguments.options(&samples),
+            samples,
+        })
+    }
+
+    /// Cuts inputs into shards.
+    pub(crate) fn plan(
+        &self,
+        arguments: &Arguments,
+        inputs: Vec<Found>,
+        sizes: &[u64],
+        folder: &Path,
+        shard_bytes: u64,
+    ) -> Result<Plan, Failure> {
+        let format = arguments.results.format();
+        let options = self.options.clone();
+        let plan = Plan::new(inputs, sizes, folder, format, options, shard_bytes)?;
+        arguments.check_before(plan.format)?;
+        Ok(plan)
+    }
+}
+
+/// A request, and the device that does it: kept for shard after shard.
+pub(crate) struct Evaluator {
+    pub(crate) request: Request,
+    pub(crate) device: Opened,
+}
+
+impl Evaluator {
+    /// Opens the device.
+    pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
+        Ok(Self {
+            request: Request::new(arguments)?,
+            device: arguments.device.open()?,
+        })
+    }
+
+    /// Evaluates the inputs of a shard; `told` gets what is to be said of each result. Inputs that
+    /// are refused are in the shard's header, and no failure.
+    pub(crate) fn evaluate(
+        &mut self,
+        arguments: &Arguments,
+        jobs: &[(PathBuf, Target)],
+        shard: &mut Shard<'_>,
+        told: &mut Vec<Told>,
+    ) -> Result<(), Failure> {
+        let batch = Batch {
+            read: |path: &Path| arguments.inputs.read(path),
+            options: self.request.options.clone(),
+            resume: arguments.results.is_resumed(),
+        };
+        let refused = shard.header.failed.len();
+        let outcome = batch.run(jobs, shard, |path, loaded, target, done| {
+            let job = Job {
+                arguments,
+                device: &mut self.device,
+                samples: &self.request.samples,
+                path,
+                loaded,
+                started: Instant::now(),
+            };
+            job.run(target, done, told)
+        });
+        match outcome {
+            Err(failure) if failure.is_final() => Err(failure),
+            Err(failure) => {
+                // A single input's failure has been told to nobody yet.
+                if jobs.len() == 1 && shard.header.failed.len() > refused && !shard.quiet {
+                    failure.report();
+                }
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_every_shard_once() {
+        for (all, of) in [(0, 3), (1, 64), (79, 64), (79, 2), (3, 3)] {
+            let parts = (1..=of).flat_map(|own| Part::Of(own, of).shards(all).unwrap());
+            assert!(parts.eq(1..=all), "{all} in {of}");
+        }
+        assert!(Part::One(4).shards(3).is_err());
+    }
+
+    #[test]
+    fn parts_are_counted_from_one() {
+        assert_eq!("3/64".parse(), Ok(Part::Of(3, 64)));
+        assert_eq!("17".parse(), Ok(Part::One(17)));
+        for text in ["0", "0/4", "5/4", "1/0", "-1/4", "1/", "/", "", "1.5"] {
+            assert!(text.parse::<Part>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! `tumble merge`: the shards that many processes have made become one directory of results.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::batch::shards::merge::{Merged, merge};
+use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::progress::busy;
+use crate::messages::words;
+
+/// Make one manifest of the shards of a directory
+#[derive(Debug, Args)]
+#[command(after_help = "\
+`tumble eval LIBRARY -o OUT --shard I/N` leaves OUT/manifest.d. When all shards are done, merging
+writes the OUT/manifest.jsonl that one `tumble eval LIBRARY -o OUT` would have written, byte for
+byte where all used the same device, and removes manifest.d. It ends with 3 where inputs failed,
+and with 8, doing nothing, where shards are missing.
+
+Examples:
+  tumble merge results
+  seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out")]
+pub(crate) struct Arguments {
+    /// The directory of results
+    #[arg(value_name = "OUT")]
+    folder: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    let Merged {
+        results,
+        shards,
+        inputs,
+        failed,
+    } = busy("merging", || merge(folder))?;
+    for refused in &failed {
+        words::note(&refused.message);
+    }
+    let all = words::count(results, "result");
+    words::note(&format!(
+        "{}: {all} of {}",
+        folder.display(),
+        words::count(shards, "shard")
+    ));
+    match failed.len() {
+        0 => Ok(()),
+        _ if failed.len() == inputs => Err(Failure::new(
+            ALL_INPUTS,
+            format!("all {inputs} inputs failed"),
+        )),
+        failed => {
+            let message = format!("{failed} of {inputs} inputs failed; the others are done");
+            Err(Failure::new(SOME_INPUTS, message))
+        }
+    }
+}

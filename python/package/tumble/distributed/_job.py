@@ -1,0 +1,125 @@
+"""What is said between the driver and its workers."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import tumble
+from tumble import _tumble
+
+# A file's line of the manifest, or an input's refusal, as JSON has it.
+Entry = dict[str, Any]
+
+DONE, USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT = 0, 2, 3, 4, 6, 7
+
+
+class DistributedError(tumble.Error, RuntimeError):
+    """A library could not be evaluated: `exit_code` is that of the program.
+
+    >>> from tumble.distributed import DistributedError
+    >>> DistributedError("no machine has this wheel", 2).exit_code
+    2
+    """
+
+    exit_code: int
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
+
+    def __reduce__(self) -> tuple[type[DistributedError], tuple[str, int]]:
+        return type(self), (str(self), self.exit_code)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is the same for all shards of a library."""
+
+    line: tuple[str, ...]
+    """Options of `tumble eval`, without inputs, output and device."""
+    plan: str
+    shards: int
+    library: str
+    """As it was given."""
+    out: str
+    """An absolute path, or a URL."""
+    folder: str
+    """Where relative names of inputs begin."""
+    into: str
+    resume: bool
+    device: str
+    has_gpu: bool
+    """A worker has a graphics card of its own."""
+    wheel: tuple[str, str]
+    """The kernels' hash and the version: equal bytes where they are equal."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """Where an input is, and where it lies below the library."""
+
+    path: str
+    below: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A shard, or some of its inputs, tried out."""
+
+    shard: int
+    inputs: tuple[Input, ...]
+    is_trial: bool = False
+    """Nothing is kept: does it end its worker?"""
+    device: str | None = None
+    """In the place of the job's."""
+    refused: tuple[tuple[str, str], ...] = ()
+    """Inputs that are left out, and why."""
+
+
+def wheel() -> tuple[str, str]:
+    """What this process computes with."""
+    return _tumble.kernels_sha256(), tumble.__version__
+
+
+def refusal(path: str, message: str) -> Entry:
+    """An input without a result, as a shard's file names it."""
+    return {"input": path, "code": ALL_INPUTS, "message": message}
+
+
+def record_name(shard: int) -> str:
+    """The file that says that a shard is done."""
+    return f"manifest.d/{shard:05}.jsonl"
+
+
+def split_record(text: str) -> tuple[Entry, list[str]]:
+    """The line about the shard itself, and the others, each with its end."""
+    first, *lines = lines_of(text)
+    header: Entry = json.loads(first)
+    return header, lines
+
+
+def lines_of(text: str) -> list[str]:
+    """Lines with their ends; names may have what Python takes for the end of a line."""
+    return [line + "\n" for line in text.split("\n")[:-1]]
+
+
+def join_record(header: Entry, lines: list[str]) -> str:
+    return dump(header) + "".join(lines)
+
+
+def dump(entry: Entry) -> str:
+    """A line, written as the program writes it."""
+    return json.dumps(entry, ensure_ascii=False, separators=(",", ":")) + "\n"
+
+
+def is_url(name: str) -> bool:
+    return "://" in name and not name.startswith("file://")
+
+
+def local(name: str | os.PathLike[str]) -> str:
+    """A path as it is given; that of a `file://` URL."""
+    text = os.fspath(name)
+    return text.removeprefix("file://")

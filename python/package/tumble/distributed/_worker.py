@@ -1,0 +1,316 @@
+"""What a worker does with a task. A worker is a process of Ray's; it keeps one engine open."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import json
+import os
+import platform
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from tumble import _tumble
+from tumble.distributed import _parquet
+from tumble.distributed._job import (
+    DEVICE,
+    OUTPUT,
+    DistributedError,
+    Entry,
+    Job,
+    Task,
+    dump,
+    is_url,
+    join_record,
+    lines_of,
+    record_name,
+    refusal,
+    split_record,
+    wheel,
+)
+from tumble.distributed._stores import Store, objects, put_text, read_text, store
+
+
+def run(job: Job, task: Task) -> Entry:
+    """Evaluates a shard; what comes back is counts and failures."""
+    started = time.monotonic()
+    own = wheel()
+    told: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
+    if own != job.wheel:
+        return {**told, "other_wheel": f"tumble {own[1]}, kernels {own[0][:12]}"}
+    try:
+        worker = _worker(job.line, task.device or _device(job))
+        with _inputs(job, task) as inputs:
+            outcome = _run(worker, job, task, inputs)
+    except ValueError as error:  # a command line or a device that was refused
+        code, message = error.args if len(error.args) == 2 else (DEVICE, str(error))
+        return {**told, "code": code, "message": message}
+    except DistributedError as error:
+        return {**told, "code": error.exit_code, "message": str(error)}
+    return {**told, **outcome, "seconds": time.monotonic() - started}
+
+
+# What a worker process keeps: its engine, by what it was opened for; the last manifest that it read;
+# which card has which UUID.
+_WORKERS: dict[tuple[tuple[str, ...], str], _tumble.Worker] = {}
+_MANIFESTS: dict[tuple[str, int | None], dict[str, list[str]]] = {}
+_UUIDS: dict[str, str] = {}
+
+
+def _worker(line: tuple[str, ...], device: str) -> _tumble.Worker:
+    found = _WORKERS.get((line, device))
+    if found is None:
+        _WORKERS.clear()
+        found = _WORKERS[line, device] = _tumble.Worker(["--device", device, *line], 1)
+    return found
+
+
+def _node() -> str:
+    ray: Any = importlib.import_module("ray")
+    return str(ray.get_runtime_context().get_node_id())
+
+
+def _device(job: Job) -> str:
+    """The device of a worker: Ray says which card is its own by a variable that Vulkan ignores."""
+    if not job.has_gpu:
+        return job.device
+    ray: Any = importlib.import_module("ray")
+    return f"uuid:{_uuid(str(ray.get_gpu_ids()[0]))}"
+
+
+def _uuid(card: str) -> str:
+    """By NVIDIA's own tool, which comes with the driver; Ray may name cards by it already."""
+    if card.startswith("GPU-"):
+        return card.removeprefix("GPU-")
+    if card in _UUIDS:
+        return _UUIDS[card]
+    query = ["nvidia-smi", f"--id={card}", "--query-gpu=uuid", "--format=csv,noheader"]
+    try:
+        found = subprocess.run(query, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise DistributedError(f"card {card}: its UUID is not known: {error}", DEVICE) from error
+    return _UUIDS.setdefault(card, found.stdout.strip().removeprefix("GPU-"))
+
+
+@contextlib.contextmanager
+def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
+    """The inputs under the names that they were given by, which messages and manifests have. Objects
+    are fetched into a directory in which those names lead to them."""
+    inputs = [(own.path, own.below) for own in task.inputs]
+    if not is_url(job.library):
+        with _in(job.folder if not os.path.isabs(job.library) else os.getcwd()):
+            yield inputs
+        return
+    source = objects(job.library)
+    with tempfile.TemporaryDirectory(prefix="tumble-") as folder:
+        for path, below in inputs:
+            target = os.path.join(folder, path)
+            os.makedirs(os.path.dirname(target), exist_ok=True)
+            # What is not there, or not ours to read, the evaluation says of its input.
+            with contextlib.suppress(FileNotFoundError, PermissionError):
+                source.fetch(below, target)
+        with _in(folder):
+            yield inputs
+
+
+@contextlib.contextmanager
+def _in(folder: str) -> Iterator[None]:
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def _run(
+    worker: _tumble.Worker, job: Job, task: Task, inputs: list[tuple[str, str]]
+) -> Entry:
+    """Into the directory itself, where the program can; else beside it first."""
+    refused = [refusal(path, message) for path, message in task.refused]
+    if not task.is_trial and not refused and job.into == "files" and not is_url(job.out):
+        return _evaluate(worker, job, task, inputs, job.out, record=True)
+    out = store(job.out)
+    before = None
+    if job.resume and not task.is_trial:
+        before = _done(worker, job, task, inputs, out)
+    if before is not None:
+        return before
+    with tempfile.TemporaryDirectory(prefix="tumble-") as folder:
+        outcome = _evaluate(worker, job, task, inputs, folder, record=False)
+        record = outcome.pop("record")
+        if task.is_trial:
+            return outcome
+        header, lines = split_record(record)
+        header["failed"] += refused
+        header["inputs"] += len(refused)
+        outcome["failed"] += refused
+        try:
+            if job.into == "parquet":
+                lines = _put_rows(job, task, inputs, folder, lines, out, worker.options)
+            else:
+                for line in lines:
+                    name = json.loads(line)["output"]
+                    out.put(os.path.join(folder, name), name)
+            # The last of all: it says that the others are there.
+            put_text(out, join_record(header, lines), record_name(task.shard))
+        except OSError as error:
+            raise DistributedError(f"{job.out}: cannot be written: {error}", OUTPUT) from error
+        return outcome
+
+
+def _evaluate(
+    worker: _tumble.Worker,
+    job: Job,
+    task: Task,
+    inputs: list[tuple[str, str]],
+    folder: str,
+    *,
+    record: bool,
+) -> Entry:
+    shard, of, plan = task.shard, job.shards, job.plan
+    code, text = worker.run(folder, shard, of, plan, inputs, record=record)
+    if code:
+        raise DistributedError(text, code)
+    outcome: Entry = json.loads(text)
+    return outcome
+
+
+def _put_rows(
+    job: Job,
+    task: Task,
+    inputs: list[tuple[str, str]],
+    folder: str,
+    lines: list[str],
+    out: Store,
+    options: str,
+) -> list[str]:
+    """Writes a shard's file of rows; gives its line of the manifest."""
+    entries = [json.loads(line) for line in lines]
+    if not entries:
+        return []
+    name = _parquet.name_of(task.shard)
+    path = os.path.join(folder, name)
+    _parquet.write(path, folder, entries)
+    entry = {
+        "output": name,
+        "output_sha256": _hash(path),
+        "output_bytes": os.path.getsize(path),
+        "input": job.library,
+        "input_sha256": _hash_of_all(inputs),
+        "options": f"{options} into=parquet",
+        "kernels_sha256": job.wheel[0],
+        "tumble": job.wheel[1],
+        "device": entries[0]["device"],
+    }
+    out.put(path, name)
+    return [dump(entry)]
+
+
+def _hash(path: str) -> str | None:
+    digest = hashlib.sha256()
+    try:
+        with open(path, "rb") as file:
+            while piece := file.read(1 << 20):
+                digest.update(piece)
+    except OSError:
+        return None
+    return digest.hexdigest()
+
+
+def _hash_of_all(inputs: list[tuple[str, str]]) -> str:
+    """Of the hashes of a shard's inputs, in their order."""
+    hashes = "".join(f"{_hash(path)}\n" for path, _ in inputs)
+    return hashlib.sha256(hashes.encode()).hexdigest()
+
+
+def _done(
+    worker: _tumble.Worker,
+    job: Job,
+    task: Task,
+    inputs: list[tuple[str, str]],
+    out: Store,
+) -> Entry | None:
+    """What a shard came to that was done before, from the same inputs and in the same way: its file
+    says so, or the manifest that it was merged into. The bytes of its results are not read again:
+    whole is what has its length."""
+    text = read_text(out, record_name(task.shard))
+    if text is None:
+        merged = _manifest(job.out, out.size("manifest.jsonl"))
+        header: Entry = {
+            "shard": task.shard,
+            "of": job.shards,
+            "plan": job.plan,
+            "inputs": len(inputs),
+            "failed": [],
+        }
+        own = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
+        text = join_record(header, own)
+    header, lines = split_record(text)
+    if header["failed"]:
+        return None
+    entries = [json.loads(line) for line in lines]
+    options = worker.options
+    if job.into == "parquet":
+        options += " into=parquet"
+        hashes = {_parquet.name_of(task.shard): _hash_of_all(inputs)}
+    else:
+        hashes = {
+            key: _hash(path) or ""
+            for key, (path, _) in zip(_keys(job, task, inputs), inputs, strict=True)
+        }
+    made = set()
+    clips: dict[str, int] = {}
+    for entry in entries:
+        key, count = _key(entry)
+        is_same = (
+            entry["input_sha256"] == hashes.get(key)
+            and entry["options"] == options
+            and (entry["kernels_sha256"], entry["tumble"]) == job.wheel
+            and out.size(entry["output"]) == entry["output_bytes"]
+        )
+        if not is_same:
+            return None
+        clips[key] = clips.get(key, 0) + 1
+        if clips[key] == count:
+            made.add(key)
+    if made != set(hashes):
+        return None
+    if header["plan"] != job.plan or out.size(record_name(task.shard)) is None:
+        put_text(out, join_record({**header, "plan": job.plan}, lines), record_name(task.shard))
+    return {
+        "made": 0,
+        "skipped": len(inputs),
+        "rotations": 0,
+        "device": worker.device,
+        "failed": [],
+    }
+
+
+def _keys(job: Job, task: Task, inputs: list[tuple[str, str]]) -> list[str]:
+    """What the results of inputs are known by, without the ending, which is the format's."""
+    if job.into == "parquet":
+        return [_parquet.name_of(task.shard)]
+    return [os.path.splitext(below)[0] for _, below in inputs]
+
+
+def _key(entry: Entry) -> tuple[str, int]:
+    """Which input's result a line is of, and how many there are of it."""
+    name, count = entry.get("one_of") or (entry["output"], 1)
+    return (name if name.endswith(".parquet") else os.path.splitext(name)[0]), count
+
+
+def _manifest(place: str, size: int | None) -> dict[str, list[str]]:
+    """The lines of a merged manifest of that size, by what they are of."""
+    if (place, size) in _MANIFESTS:
+        return _MANIFESTS[place, size]
+    found: dict[str, list[str]] = {}
+    text = (read_text(store(place), "manifest.jsonl") or "") if size is not None else ""
+    for line in lines_of(text):
+        found.setdefault(_key(json.loads(line))[0], []).append(line)
+    _MANIFESTS.clear()
+    return _MANIFESTS.setdefault((place, size), found)

@@ -1,0 +1,181 @@
+//! What `tumble.distributed` is made of: a library cut into shards, a worker that evaluates them, and
+//! the merge. Outcomes are JSON, since they are told to other machines.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use tumble_cli::host::Refused;
+use tumble_cli::shards;
+
+use crate::errors::guarded;
+
+/// What a call came to, as the program would end: JSON, or an exit code and a message.
+type Outcome = (u8, String);
+
+fn ended(outcome: Result<String, Refused>) -> Outcome {
+    match outcome {
+        Ok(json) => (0, json),
+        Err(refused) => (refused.code, refused.message),
+    }
+}
+
+/// A refusal as an exception: a `ValueError` with the exit code and the message.
+fn refuse(refused: Refused) -> PyErr {
+    pyo3::exceptions::PyValueError::new_err((refused.code, refused.message))
+}
+
+/// The inputs that a command line of `tumble eval` names.
+#[pyfunction]
+pub(crate) fn inputs_of(line: Vec<OsString>) -> PyResult<Vec<OsString>> {
+    let inputs = shards::inputs(&line).map_err(refuse)?;
+    Ok(inputs.into_iter().map(PathBuf::into_os_string).collect())
+}
+
+/// The hash of every kernel: machines that agree in it, and in the version, write the same bytes.
+#[pyfunction]
+pub(crate) fn kernels_sha256() -> &'static str {
+    shards::kernels_sha256()
+}
+
+/// Makes one manifest of a directory's shards; gives an exit code, and JSON or a message.
+#[pyfunction]
+pub(crate) fn merge(py: Python<'_>, folder: PathBuf) -> PyResult<Outcome> {
+    py.detach(|| guarded(|| Ok(ended(shards::merge(&folder).map(|merged| merged.to_json())))))
+}
+
+/// A library, cut into shards.
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Plan {
+    own: shards::Plan,
+}
+
+#[pymethods]
+impl Plan {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        line: Vec<OsString>,
+        library: PathBuf,
+        listed: Option<Vec<(String, u64)>>,
+        folder: PathBuf,
+        shard_bytes: &str,
+        into: &str,
+    ) -> PyResult<Self> {
+        py.detach(|| {
+            guarded(|| {
+                let own = shards::Plan::new(&line, &library, listed, &folder, shard_bytes, into);
+                Ok(Self {
+                    own: own.map_err(refuse)?,
+                })
+            })
+        })
+    }
+
+    /// Says in the directory of results what its shards are of.
+    fn claim(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| guarded(|| self.own.claim(&folder).map_err(refuse)))
+    }
+
+    /// Which plan it is.
+    #[getter]
+    fn id(&self) -> &str {
+        self.own.id()
+    }
+
+    /// All that decides over results besides their inputs.
+    #[getter]
+    fn options(&self) -> &str {
+        self.own.options()
+    }
+
+    /// How many inputs there are.
+    #[getter]
+    fn inputs(&self) -> usize {
+        self.own.inputs()
+    }
+
+    /// How many shards there are.
+    fn __len__(&self) -> usize {
+        self.own.shards()
+    }
+
+    /// The inputs of a shard, from 1: where they are, and where they lie below the library.
+    fn inputs_of(&self, shard: usize) -> Vec<(OsString, OsString)> {
+        let inputs = self.own.inputs_of(shard).unwrap_or_default();
+        let text = |(path, below): (PathBuf, PathBuf)| (path.into(), below.into());
+        inputs.into_iter().map(text).collect()
+    }
+
+    /// What the results of a shard are called below the directory of results.
+    fn names_of(&self, shard: usize) -> Vec<String> {
+        self.own.names_of(shard).unwrap_or_default().to_vec()
+    }
+}
+
+/// Evaluates shards on a device that stays open.
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Worker {
+    own: Mutex<shards::Worker>,
+    device: String,
+    options: String,
+}
+
+#[pymethods]
+impl Worker {
+    #[new]
+    fn new(py: Python<'_>, line: Vec<OsString>, threads: Option<usize>) -> PyResult<Self> {
+        py.detach(|| {
+            guarded(|| {
+                let own = shards::Worker::new(&line, threads).map_err(refuse)?;
+                Ok(Self {
+                    device: own.device().to_owned(),
+                    options: own.options().to_owned(),
+                    own: Mutex::new(own),
+                })
+            })
+        })
+    }
+
+    /// How its device is called.
+    #[getter]
+    fn device(&self) -> &str {
+        &self.device
+    }
+
+    /// All that decides over results besides their inputs.
+    #[getter]
+    fn options(&self) -> &str {
+        &self.options
+    }
+
+    /// Evaluates inputs into a directory; gives an exit code, and JSON or a message. `record`: it
+    /// writes the shard's file, rather than give it.
+    #[pyo3(signature = (folder, shard, of, plan, inputs, *, record))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        shard: usize,
+        of: usize,
+        plan: String,
+        inputs: Vec<(PathBuf, PathBuf)>,
+        record: bool,
+    ) -> PyResult<Outcome> {
+        let task = shards::Task {
+            shard,
+            of,
+            plan,
+            inputs,
+            record,
+        };
+        py.detach(|| {
+            guarded(|| {
+                let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+                let outcome = own.run(&task, &folder);
+                Ok(ended(outcome.map(|outcome| outcome.to_json())))
+            })
+        })
+    }
+}

@@ -1,0 +1,525 @@
+"""A library over a Ray cluster on this machine, whose workers, nodes and drivers are killed: in the end
+the bytes are those of one process.
+
+The counts are small here. `KILLS=100 NODES=20 DRIVERS=10 CLIPS=2000` and the like make them large.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import json
+import os
+import pathlib
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+
+import numpy as np
+import pytest
+from conftest import ROOT, unit
+
+import tumble
+import tumble.distributed
+from tumble.distributed import DistributedError, _job, _stores, evaluate
+
+if sys.platform != "linux":
+    pytest.skip("processes are found and killed as Linux has them", allow_module_level=True)
+# Ray is among the tests' requirements; where it has no wheel for a Python, CI is to say so.
+ray = importlib.import_module("ray") if "CI" in os.environ else pytest.importorskip("ray")
+Cluster = importlib.import_module("ray.cluster_utils").Cluster
+
+CLIPS = int(os.environ.get("CLIPS", "240"))
+KILLS = int(os.environ.get("KILLS", "4"))
+NODES = int(os.environ.get("NODES", "2"))
+DRIVERS = int(os.environ.get("DRIVERS", "2"))
+
+TOOLS = pathlib.Path(sys.executable).parent
+FAULTS = pathlib.Path(__file__).parent / "faults"
+QUIET = {"include_dashboard": False, "object_store_memory": 80 << 20}
+# Eight clips or so.
+SHARD = "64KiB"
+
+
+def tumble_program(*arguments, code=0, **options):
+    """`python -m tumble` with these arguments."""
+    command = [sys.executable, "-m", "tumble", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, **options)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+def write_clip(path, rng, tracks=4, keys=24):
+    """A clip as text."""
+    turns = unit(rng, keys, tracks)[..., [3, 0, 1, 2]].reshape(keys, -1)
+    times = np.cumsum(rng.uniform(0.02, 0.1, keys))
+    rows = [" ".join(f"{x:.7g}" for x in [time, *turn]) for time, turn in zip(times, turns, strict=True)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"# {tracks} 1\n" + "\n".join(rows) + "\n", encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    """Clips in folders, and what one process makes of them."""
+    place = tmp_path_factory.mktemp("library")
+    rng = np.random.default_rng(11)
+    for i in range(CLIPS):
+        write_clip(place / "clips" / f"{i % 7}" / f"{i:05}.dat", rng)
+    tumble_program("eval", "clips", "-o", "one", "--fps", "240", "--device", "cpu", cwd=place)
+    return place
+
+
+class Machines:
+    """A head and a node, of one processor each."""
+
+    def __init__(self):
+        environment = os.environ
+        environment["RAY_USAGE_STATS_ENABLED"] = "0"
+        # Workers that start with a fault look here.
+        environment["PYTHONPATH"] = os.pathsep.join([str(FAULTS), environment.get("PYTHONPATH", "")])
+        self.cluster = Cluster(
+            initialize_head=True, head_node_args={"num_cpus": 1, **QUIET}, connect=False
+        )
+        self.nodes = [self.add()]
+
+    def add(self, **environment):
+        options = {"num_cpus": 1, "object_store_memory": 80 << 20}
+        return self.cluster.add_node(**options, env_vars=environment or None)
+
+    def lose(self):
+        """Every process of a node ends at once."""
+        self.cluster.remove_node(self.nodes.pop(0), allow_graceful=False)
+
+    @property
+    def address(self):
+        return self.cluster.address
+
+
+@pytest.fixture(scope="module")
+def machines():
+    found = Machines()
+    yield found
+    found.cluster.shutdown()
+
+
+@pytest.fixture(autouse=True)
+def disconnected():
+    yield
+    if ray.is_initialized():
+        ray.shutdown()
+
+
+def tree(folder):
+    """Every file below a folder, with its bytes."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in pathlib.Path(folder).rglob("*")
+        if path.is_file()
+    }
+
+
+def assert_equal(folder, other):
+    """`diff -r` finds nothing."""
+    done = subprocess.run(["diff", "-rq", str(folder), str(other)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+def command(library, out, *more, fps="240"):
+    line = [sys.executable, "-m", "tumble.distributed", str(library), str(out)]
+    return [*line, "--fps", fps, "--shard-bytes", SHARD, *more]
+
+
+def workers():
+    """The processes of Ray's that have a task of ours."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        with contextlib.suppress(OSError, ValueError):
+            if b"ray::tumble" in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+    return found
+
+
+def test_the_bytes_are_those_of_one_process(machines, library, monkeypatch):
+    monkeypatch.chdir(library)
+    told = []
+    report = evaluate(
+        "clips", "ray", fps=240, address=machines.address, shard_bytes=SHARD, progress=told.append
+    )
+    assert (report.made, report.skipped, report.failed) == (CLIPS, 0, [])
+    assert report.results == CLIPS and report.exit_code == 0
+    assert report.shards > 8 and report.workers == 2
+    frames = sum(int(np.load(path, mmap_mode="r").shape[1]) for path in pathlib.Path("one").rglob("*.npy"))
+    assert report.rotations == 4 * frames
+    assert told[-1].inputs_done == CLIPS and told[-1].seconds_left == 0
+    assert_equal("one", "ray")
+    tumble_program("check", "ray")
+    resumed = tumble_program("eval", "clips", "-o", "ray", "--fps", "240", "--resume")
+    assert f"{CLIPS} results skipped" in resumed.stderr
+    again = evaluate("clips", "ray", fps=240, address=machines.address, shard_bytes=SHARD)
+    assert (again.made, again.skipped) == (0, CLIPS)
+    assert_equal("one", "ray")
+    with pytest.raises(DistributedError, match="exists") as refused:
+        evaluate("clips", "ray", fps=240, address=machines.address, resume=False)
+    assert refused.value.exit_code == 2
+
+
+def test_the_command_line(machines, library):
+    done = subprocess.run(
+        command("clips", "command", "--address", machines.address, "--json"),
+        capture_output=True, text=True, cwd=library,
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert (report["made"], report["exit_code"]) == (CLIPS, 0)
+    assert f"{CLIPS} made, 0 skipped, 0 failed" in done.stderr
+    assert_equal(library / "one", library / "command")
+    for line, words in [
+        (["clips"], "give LIBRARY and OUT"),
+        (["clips", "x", "--fps", "none"], "--fps"),
+        (["clips", "x", "-o", "y"], "leave it out"),
+        (["nowhere", "x"], "nowhere"),
+        (["clips", "x", "--into", "csv"], "give files or parquet"),
+    ]:
+        refused = subprocess.run(
+            [sys.executable, "-m", "tumble.distributed", *line, "--address", machines.address],
+            capture_output=True, text=True, cwd=library,
+        )
+        assert words in refused.stderr, refused.stderr
+        assert refused.returncode in (2, 4), line
+
+
+def test_parts_by_xargs_are_merged(library):
+    line = "seq 5 | xargs -P2 -I{} %s -m tumble eval clips -o xargs --fps 240 --device cpu --shard {}/5 --shard-bytes %s"
+    subprocess.run(line % (sys.executable, SHARD), shell=True, check=True, cwd=library, capture_output=True)
+    check = tumble_program("check", "xargs", cwd=library, code=8)
+    assert "tumble merge" in check.stderr
+    tumble_program("merge", "xargs", cwd=library)
+    assert_equal(library / "one", library / "xargs")
+
+
+def test_workers_are_killed(machines, library):
+    """While they work, one after another, and no pause is long."""
+    out = library / "killed"
+    chance = random.Random(3)
+    kills, ended = 0, threading.Event()
+
+    def kill():
+        nonlocal kills
+        while kills < KILLS and not ended.wait(chance.uniform(0.05, 0.2)):
+            for worker in workers()[:1]:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(worker, signal.SIGKILL)
+                    kills += 1
+
+    rounds = 0
+    while kills < KILLS and rounds < 4 * KILLS:
+        rounds += 1
+        shutil.rmtree(out, ignore_errors=True)
+        ended.clear()
+        thread = threading.Thread(target=kill)
+        thread.start()
+        report = evaluate(
+            library / "clips", out, fps=240, address=machines.address, shard_bytes="8KiB"
+        )
+        ended.set()
+        thread.join()
+        assert (report.made, report.failed) == (CLIPS, [])
+    assert kills >= KILLS
+    rename_inputs(out, f"{library}/", "")
+    assert_equal(library / "one", out)
+
+
+def rename_inputs(out, before, after):
+    """The manifest has inputs as they were given."""
+    manifest = out / "manifest.jsonl"
+    manifest.write_text(manifest.read_text().replace(f'"input":"{before}', f'"input":"{after}'))
+
+
+def test_nodes_are_lost(machines, library):
+    """In the middle, with all their processes."""
+    for round in range(NODES):
+        out = library / f"nodes{round}"
+        losing = threading.Thread(target=machines.lose)
+        begun = []
+
+        def lose(progress, losing=losing, begun=begun):
+            if not begun and progress.inputs_done > CLIPS // 8:
+                begun.append(progress.inputs_done)
+                losing.start()
+
+        report = evaluate(
+            library / "clips", out, fps=240, address=machines.address, shard_bytes="8KiB", progress=lose
+        )
+        losing.join()
+        assert begun[0] < CLIPS, "it was lost in the middle"
+        assert (report.made, report.failed) == (CLIPS, [])
+        rename_inputs(out, f"{library}/", "")
+        assert_equal(library / "one", out)
+        machines.nodes.append(machines.add())
+
+
+def test_a_node_that_is_added_works(machines, library, tmp_path):
+    """All others have other work to do."""
+    ray.init(address=machines.address, log_to_driver=False)
+
+    @ray.remote(num_cpus=1)
+    def hold(path):
+        pathlib.Path(path).touch()
+        time.sleep(600)
+
+    held = [tmp_path / f"held{i}" for i in range(2)]
+    holding = [hold.remote(str(path)) for path in held]
+    while not all(path.exists() for path in held):
+        time.sleep(0.05)
+    reports = []
+    evaluating = threading.Thread(
+        target=lambda: reports.append(evaluate(library / "clips", tmp_path / "out", fps=240))
+    )
+    evaluating.start()
+    added = machines.add()
+    evaluating.join(60)
+    assert (reports[0].made, reports[0].workers) == (CLIPS, 1)
+    for reference in holding:
+        ray.cancel(reference, force=True)
+    ray.shutdown()
+    machines.cluster.remove_node(added)
+    rename_inputs(tmp_path / "out", f"{library}/", "")
+    assert_equal(library / "one", tmp_path / "out")
+
+
+def test_drivers_are_killed(machines, library):
+    out = library / "drivers"
+    stopped = 0
+    line = command("clips", "drivers", "--resume", "--address", machines.address)
+    rounds = 0
+    while stopped < DRIVERS and rounds < 4 * DRIVERS:
+        rounds += 1
+        stop = [signal.SIGKILL, signal.SIGINT, signal.SIGTERM][stopped % 3]
+        driver = subprocess.Popen(line, cwd=library, stderr=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + 60
+        done = len(list(out.glob("manifest.d/*.jsonl")))
+        while time.monotonic() < deadline and driver.poll() is None:
+            if len(list(out.glob("manifest.d/*.jsonl"))) > done:
+                break
+            time.sleep(0.005)
+        driver.send_signal(stop)
+        words = driver.communicate(timeout=60)[1]
+        stopped += driver.returncode != 0
+        if driver.returncode == 0:
+            shutil.rmtree(out)  # it was quicker
+        if stop != signal.SIGKILL and driver.returncode != 0:
+            assert driver.returncode == 128 + stop, words
+            assert "--resume goes on" in words
+        if (out / "manifest.d").is_dir():
+            check = tumble_program("check", out, code=8)
+            assert "shards are done" in check.stderr
+    assert stopped == DRIVERS
+    done = subprocess.run(line, cwd=library, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert_equal(library / "one", out)
+
+
+def test_inputs_that_fail_are_named(machines, library, tmp_path):
+    """One kills its worker, one is refused, one is too large; all others are done."""
+    clips = tmp_path / "clips"
+    for path in sorted((library / "clips").rglob("*.dat"))[:7]:
+        (clips / path.parent.name).mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, clips / path.parent.name / path.name)
+    (clips / "bad.dat").write_text("# 2 3\n0 1 0 0\n")
+    long = "# 1 1\n0 1 0 0 0\n1e14 0 1 0 0\n"
+    (clips / "long.dat").write_text(long)
+    shutil.copy(clips / "0" / "00000.dat", clips / "kills-its-worker.dat")
+    ray.init(address=machines.address, log_to_driver=False, runtime_env={
+        "worker_process_setup_hook": "tumble_faults.kill_on_the_clip_that_says_so",
+    })
+    report = evaluate(clips, tmp_path / "out", address=machines.address, fps=240)
+    failed = {pathlib.Path(own.input).name: own.message for own in report.failed}
+    assert set(failed) == {"bad.dat", "long.dat", "kills-its-worker.dat"}
+    assert "ends the process" in failed["kills-its-worker.dat"]
+    assert report.exit_code == 3 and report.results == 7
+    assert sorted(tree(tmp_path / "out")) == sorted(
+        [f"{path.parent.name}/{path.stem}.npy" for path in clips.rglob("0*.dat")] + ["manifest.jsonl"]
+    )
+    tumble_program("check", tmp_path / "out")
+
+
+def test_an_output_that_is_refused(machines, library, tmp_path):
+    (tmp_path / "file").write_text("no directory")
+    with pytest.raises(DistributedError) as refused:
+        evaluate(library / "clips", tmp_path / "file" / "out", address=machines.address)
+    assert refused.value.exit_code == 7
+
+
+def test_a_machine_with_another_wheel_takes_no_part(machines, library, tmp_path):
+    other = machines.add(TUMBLE_FAULT_WHEEL="1")
+    try:
+        ray.init(address=machines.address, log_to_driver=False, runtime_env={
+            "worker_process_setup_hook": "tumble_faults.another_wheel",
+        })
+        report = evaluate(
+            library / "clips", tmp_path / "out", fps=240, shard_bytes="8KiB", address=machines.address
+        )
+    finally:
+        machines.cluster.remove_node(other)
+    assert len(report.refused_machines) == 1
+    assert "kernels 000000000000" in report.refused_machines[0]
+    rename_inputs(tmp_path / "out", f"{library}/", "")
+    assert_equal(library / "one", tmp_path / "out")
+
+
+def test_vulkan_writes_the_same_bytes(machines, library, tmp_path):
+    """Where a run on the CPU was stopped, lavapipe goes on."""
+    assert tumble.devices(), "lavapipe is there"
+    shutil.copytree(library / "one", tmp_path / "out")
+    for path in sorted((tmp_path / "out").rglob("*.npy"))[::2]:
+        path.unlink()
+    report = evaluate(
+        library / "clips", tmp_path / "out", fps=240, device="vulkan", address=machines.address,
+        shard_bytes=SHARD,
+    )
+    assert (report.made, report.skipped) == (CLIPS // 2, CLIPS // 2)
+    own, other = tree(tmp_path / "out"), tree(library / "one")
+    manifests = [files.pop("manifest.jsonl").decode().splitlines() for files in (own, other)]
+    assert own == other
+    devices = {json.loads(line)["device"] for line in manifests[0]}
+    assert len(devices) == 2 and "CPU" in devices
+    for lines in zip(*manifests, strict=True):
+        first, second = (json.loads(line) for line in lines)
+        for entry in (first, second):
+            del entry["device"], entry["input"]
+        assert first == second
+
+
+def test_rows_of_parquet(machines, library, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    out = tmp_path / "rows"
+    evaluate(
+        library / "clips", out, fps=240, into="parquet", shard_bytes=SHARD, address=machines.address
+    )
+    rows = {}
+    for path in sorted(out.glob("part-*.parquet")):
+        for row in parquet.read_table(path).to_pylist():
+            assert row["clip"] not in rows, "twice"
+            rows[row["clip"]] = row
+    results = {path.relative_to(library / "one"): path for path in (library / "one").rglob("*.npy")}
+    assert set(rows) == {str(name.with_suffix("")) for name in results}
+    for name, path in results.items():
+        row, whole = rows[str(name.with_suffix(""))], np.load(path)
+        own = np.asarray(row["rotations"], np.float32).reshape(row["tracks"], row["frames"], 4)
+        assert np.array_equal(own.view(np.uint32), whole.view(np.uint32))
+        assert row["sha256"] == hashlib.sha256(whole.tobytes()).hexdigest()
+    tumble_program("check", out)
+    before = tree(out)
+    again = evaluate(
+        library / "clips", out, fps=240, into="parquet", shard_bytes=SHARD, address=machines.address
+    )
+    assert (again.made, again.skipped) == (0, CLIPS)
+    assert tree(out) == before
+
+
+@pytest.fixture
+def bucket(monkeypatch):
+    """An S3 server, and the URL of a bucket of its."""
+    pytest.importorskip("moto")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server = subprocess.Popen(
+        [TOOLS / "moto_server", "-H", "127.0.0.1", "-p", str(port)],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )
+    place = f"http://127.0.0.1:{port}"
+    try:
+        for _ in range(200):
+            with contextlib.suppress(OSError):
+                urllib.request.urlopen(urllib.request.Request(f"{place}/clips", method="PUT"))
+                break
+            time.sleep(0.05)
+        yield lambda name: (
+            f"s3://key:secret@clips/{name}?scheme=http&region=us-east-1&endpoint_override=127.0.0.1:{port}"
+        )
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def test_object_stores(machines, library, bucket, tmp_path):
+    """From a bucket into a bucket, with a kill; then from files, and into files."""
+    clips = sorted((library / "clips").rglob("*.dat"))[:60]
+    source = _stores.store(bucket("library"))
+    for path in clips:
+        source.put(str(path), f"{path.parent.name}/{path.name}")
+    url, out = bucket("library"), bucket("out")
+
+    def kill():
+        deadline = time.monotonic() + 20
+        while time.monotonic() < deadline:
+            for worker in workers()[:1]:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(worker, signal.SIGKILL)
+                    return
+            time.sleep(0.02)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    options = {"fps": 240, "shard_bytes": SHARD, "address": machines.address}
+    report = evaluate(url, out, **options)
+    killer.join()
+    assert (report.made, report.failed) == (60, [])
+    there = _stores.store(out)
+    found = {name: there.read(name) for name in there.list()}
+    manifest = found.pop("manifest.jsonl").decode().splitlines()
+    one = tree(library / "one")
+    assert found == {name: one[name] for name in found} and len(found) == 60
+    entries = [json.loads(line) for line in manifest]
+    base = url.split("?")[0]
+    assert {entry["input"] for entry in entries} == {
+        f"{base}/{path.parent.name}/{path.name}" for path in clips
+    }
+    for entry in entries:
+        assert entry["output_sha256"] == hashlib.sha256(found[entry["output"]]).hexdigest()
+    again = evaluate(url, out, **options)
+    assert (again.made, again.skipped) == (0, 60)
+
+    evaluate(url, tmp_path / "local", **options)
+    tumble_program("check", tmp_path / "local")
+    own = tree(tmp_path / "local")
+    assert own.pop("manifest.jsonl").decode().splitlines() == manifest
+    assert own == found
+
+
+def test_a_driver_stops_where_no_machine_may_take_part(monkeypatch, library, tmp_path, machines):
+    from tumble.distributed import _driver
+
+    monkeypatch.setattr(_driver, "wheel", lambda: ("f" * 64, tumble.__version__))
+    with pytest.raises(DistributedError, match="every machine has another wheel"):
+        evaluate(library / "clips", tmp_path / "out", address=machines.address)
+
+
+def test_a_device_goes_by_its_uuid():
+    listed = json.loads(tumble_program("devices", "--json").stdout)["devices"]
+    assert listed, "lavapipe is there"
+    for device in listed:
+        assert tumble.Engine(f"uuid:{device['uuid']}").device == device["name"]
+    with pytest.raises(tumble.InputError, match="there is no device"):
+        tumble.Engine("uuid:00")
+
+
+def test_records_are_lines_of_json():
+    header, lines = {"shard": 1, "failed": []}, ['{"output":"a\u2028b"}\n', '{"output":"é"}\n']
+    assert _job.split_record(_job.join_record(header, lines)) == (header, lines)
+
+
+def test_examples_in_docstrings():
+    import doctest
+
+    for module in (tumble.distributed, _job):
+        assert doctest.testmod(module).failed == 0
+    assert (ROOT / "docs" / "distributed.md").is_file()
