@@ -7,10 +7,12 @@
 //! it.
 
 mod cells;
+mod coalesced;
 mod frame;
 mod functions;
 mod kernels;
 mod layout;
+mod lines;
 mod machine;
 mod operations;
 mod poses;
@@ -39,6 +41,7 @@ fn twins() -> Vec<Twin> {
     all.extend(stores::readers());
     all.extend(stores::keys());
     all.extend(kernels::evaluation());
+    all.extend(coalesced::coalesced());
     all.extend(poses::poses());
     all.push(poses::self_test());
     all
