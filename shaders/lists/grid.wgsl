@@ -1,4 +1,5 @@
-// The arguments of one dispatch whose invocations take a sample each, and which sample that is.
+// The arguments of one dispatch whose neighbouring invocations take neighbouring samples, and which
+// those are.
 
 /// The arguments of one dispatch over a grid of samples. Track by track (`stride` is 1), the
 /// samples of all tracks are one row, and a sample's position is the place where it is stored.
@@ -27,8 +28,10 @@ struct Block {
     starts: u32,
 }
 
-// Eight rows of 32 samples, which read the same constants again and again.
-const GRID_WORKGROUP: u32 = 256;
+const WORKGROUP: u32 = 64;
+
+// Samples of an invocation.
+const SAMPLES_EACH: u32 = 4;
 
 // Set in a `source` or a `count`: it is a constant that is stored as it is, not a segment.
 const IS_CONSTANT: u32 = 0x80000000;
@@ -45,6 +48,16 @@ const LINE: u32 = 8;
 
 var<immediate> dispatch: Grid;
 
+// Where the samples of an invocation begin.
+struct Corner {
+    // The position, counted from the first of the row.
+    first: u32,
+    // Frame by frame, the distance from the beginning of the first row's line.
+    column: u32,
+    // The block of all of them; frame by frame, that of the row in which `column` would be 0.
+    block: u32,
+}
+
 struct Cell {
     place: u32,
     position: u32,
@@ -52,21 +65,33 @@ struct Cell {
     is_inside: bool,
 }
 
-// The sample of an invocation. Eight neighbours always store at eight neighbouring places, the
-// first of which is a multiple of eight.
-fn cell_of(group: vec3u, groups: vec3u, lane: u32) -> Cell {
+fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
     let tile = group.y * groups.x + group.x;
+    let line = lane / LINE;
+    let within = lane & (LINE - 1u);
     if dispatch.stride == 1u {
-        let index = tile * GRID_WORKGROUP + lane;
-        let place = dispatch.first_output + index;
-        let block = dispatch.first_block + index / BLOCK_SAMPLES;
-        return Cell(place, place, block, index < dispatch.samples);
+        let first = (tile * WORKGROUP + line * LINE) * SAMPLES_EACH + within;
+        return Corner(first, 0u, dispatch.first_block + first / BLOCK_SAMPLES);
     }
-    let sample = group.z * (GRID_WORKGROUP / LINE) + lane / LINE;
+    let first = (group.z * (WORKGROUP / LINE) + line) * SAMPLES_EACH;
+    let block = dispatch.first_block + (first / BLOCK_SAMPLES) * dispatch.rows;
+    return Corner(first, tile * LINE + within, block);
+}
+
+// The sample that an invocation takes in its `turn`. Eight neighbours always store at eight
+// neighbouring places, the first of which is a multiple of eight. An invocation's own samples are
+// near each other: track by track 8 apart, frame by frame one.
+fn cell_of(corner: Corner, turn: u32) -> Cell {
+    if dispatch.stride == 1u {
+        let index = corner.first + turn * LINE;
+        let place = dispatch.first_output + index;
+        return Cell(place, place, corner.block, index < dispatch.samples);
+    }
+    let sample = corner.first + turn;
     let row = sample * dispatch.stride + dispatch.first_output;
-    let place = (row & ~(LINE - 1u)) + tile * LINE + (lane & (LINE - 1u));
+    let place = (row & ~(LINE - 1u)) + corner.column;
     // What lies before the row wraps to a large number.
     let track = place - row;
-    let block = dispatch.first_block + (sample / BLOCK_SAMPLES) * dispatch.rows + track;
-    return Cell(place, sample, block, (sample < dispatch.samples) & (track < dispatch.rows));
+    let is_inside = (sample < dispatch.samples) & (track < dispatch.rows);
+    return Cell(place, sample, corner.block + track, is_inside);
 }

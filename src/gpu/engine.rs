@@ -42,7 +42,7 @@ pub(crate) struct VulkanEngine {
     /// Whether kernels write into memory that the host reads; else results are copied out of the
     /// device's own memory.
     pub(crate) in_place: bool,
-    /// Whether each invocation takes one sample; else a run of them.
+    /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
     /// Whether the caller's memory is imported where the device can.
     pub(crate) lends: bool,

@@ -1,10 +1,10 @@
-//! The grid of a window, for devices on which each invocation takes one sample: blocks of
-//! neighbouring samples say which item each of them belongs to, so that nothing is searched.
+//! The grid of a window, for devices on which neighbouring invocations take neighbouring samples:
+//! blocks of samples say which item each of them belongs to, so that nothing is searched.
 
 use crate::gpu::work_list::GroupWork;
 use crate::output::window::Window;
 use crate::shader::{
-    BLOCK_SAMPLES, Block, GRID_WORKGROUP, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY,
+    BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY, SAMPLES_EACH, WORKGROUP,
 };
 
 /// The rows of a window: one where it is stored track by track, else one for each track.
@@ -205,12 +205,13 @@ impl GroupGrid {
 
     /// The workgroups of its dispatch; `most` is the limit along x.
     pub(crate) fn workgroups(&self, most: u32) -> [u32; 3] {
+        let samples = WORKGROUP * SAMPLES_EACH;
         let (tiles, z) = match self.all.stride {
-            1 => (self.samples.div_ceil(GRID_WORKGROUP), 1),
+            1 => (self.samples.div_ceil(samples), 1),
             // Rows of neighbours begin up to a line less one before the first track.
             _ => {
                 let tiles = (self.rows + LINE - 1).div_ceil(LINE);
-                (tiles, self.samples.div_ceil(GRID_WORKGROUP / LINE))
+                (tiles, self.samples.div_ceil(samples / LINE))
             }
         };
         let x = tiles.clamp(1, most);

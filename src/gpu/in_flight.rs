@@ -209,8 +209,8 @@ impl InFlight {
     }
 
     /// Writes the work list of a window into its buffers, one group after another; `shift`
-    /// is added to every place in the output. With `maps_samples` an invocation takes one sample,
-    /// where that can be.
+    /// is added to every place in the output. With `maps_samples` neighbouring invocations take
+    /// neighbouring samples, where that can be.
     pub(crate) fn list(
         &mut self,
         device: &Arc<LogicalDevice>,

@@ -41,9 +41,8 @@ pub enum Mapping {
     /// An invocation takes up to 16 consecutive samples of one segment, whose constants it loads
     /// once. Devices that serve their lanes one by one are fastest so.
     Runs,
-    /// An invocation takes one sample, and neighbours store neighbours: the lanes that a card runs
-    /// together write whole lines of memory, and read the constants that they share from one
-    /// address. As [`Mapping::Runs`] on a device whose workgroups have fewer than 256 invocations.
+    /// Neighbouring invocations take neighbouring samples: the lanes that a card runs together write
+    /// whole lines of memory, and read the constants that they share from one address.
     Samples,
 }
 

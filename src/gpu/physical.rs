@@ -8,7 +8,6 @@ use ash::{ext, khr, vk};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
 use crate::gpu::options::{Mapping, Reads};
-use crate::shader::GRID_WORKGROUP;
 use crate::shader::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
@@ -220,15 +219,13 @@ impl PhysicalDevice {
         }
     }
 
-    /// Whether each invocation takes one sample. Hardware runs neighbouring lanes together, and stores
+    /// Whether neighbouring invocations take neighbouring samples. Hardware runs neighbouring lanes together, and stores
     /// what they store at neighbouring places as whole lines; software devices store lane by lane.
     pub(crate) fn maps_samples(&self, mapping: Mapping) -> bool {
-        let can = self.info.max_compute_work_group_invocations >= GRID_WORKGROUP;
-        let kind = self.info.kind;
         match mapping {
-            Mapping::Automatic => can && !matches!(kind, DeviceKind::Cpu | DeviceKind::Other),
+            Mapping::Automatic => !matches!(self.info.kind, DeviceKind::Cpu | DeviceKind::Other),
             Mapping::Runs => false,
-            Mapping::Samples => can,
+            Mapping::Samples => true,
         }
     }
 

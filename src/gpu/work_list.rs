@@ -30,7 +30,7 @@ pub(crate) struct GroupItems {
     pub(crate) items: u32,
     /// Where the first sample of a sample list is stored.
     pub(crate) first_output: u32,
-    /// The samples of the group, where each invocation takes one.
+    /// The samples of the group, where neighbouring invocations take neighbours.
     pub(crate) grid: Option<GroupGrid>,
 }
 

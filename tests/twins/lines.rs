@@ -26,7 +26,7 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::request::Request;
 use crate::shader::{
-    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, GRID_WORKGROUP, Item, KeySample, ListedSample,
+    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample,
     TangentWeights, WORKGROUP,
 };
 use crate::time::frames::{Frames, Ticks, Timeline};
@@ -105,13 +105,14 @@ fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     }
 }
 
-/// What a wave reads of a buffer: at least each stretch of neighbouring bytes as if it began where a
-/// line does. A line counts once, since a wave finds it in its cache when it comes back to it.
+/// What a wave reads of a buffer: at least each stretch of bytes as if it began where a line does.
+/// Bytes that are less than a line apart are one stretch. A line counts once, since a wave finds it
+/// in its cache when it comes back to it.
 fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     ranges.sort_by_key(|range| range.start);
     let (mut least, mut stretch) = (0, 0..0);
     for range in ranges.iter() {
-        if range.start > stretch.end || stretch.is_empty() {
+        if range.start >= stretch.end + line || stretch.is_empty() {
             least += (stretch.end - stretch.start).div_ceil(line);
             stretch = range.clone();
         }
@@ -129,6 +130,10 @@ fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
 struct Count {
     of_cards: [[Lines; 2]; CARDS.len()],
     rotations: u64,
+    /// Bytes that lanes loaded.
+    loaded: u64,
+    /// Lines of 64 bytes that workgroups loaded.
+    of_workgroups: Lines,
 }
 
 impl Launch {
@@ -160,6 +165,10 @@ impl Launch {
                 .collect();
             let stores = lanes.iter().flatten().filter(|touch| touch.is_store);
             count.rotations += stores.count() as u64;
+            let loads = lanes.iter().flatten().filter(|touch| !touch.is_store);
+            let bytes = |range: Range<u64>| range.end - range.start;
+            count.loaded += loads.map(|touch| bytes(touch.bytes())).sum::<u64>();
+            count.of_workgroups.add(loads_of(&lanes, 64));
             for ((wave, line), lines) in CARDS.into_iter().zip(&mut count.of_cards) {
                 for wave in lanes.chunks(wave as usize) {
                     lines[0].add(stores_of(wave, line));
@@ -347,7 +356,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
     Launch {
         kernel: format!("{form}_{listed}_coalesced_f32"),
         told: Told::Workgroup,
-        workgroup: GRID_WORKGROUP,
+        workgroup: WORKGROUP,
         groups: grids[0].workgroups(65_535),
         globals,
         rotations,
@@ -445,16 +454,15 @@ fn cards_touch_hardly_more_lines_than_they_need() {
         let mut ratios = String::new();
         for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
             let (stored, loaded) = (stores.ratio(), loads.ratio());
-            let bytes = loads.touched * line;
-            ratios += &format!(
-                " | {stored:.2} {loaded:.2} {:.0}",
-                bytes as f64 / count.rotations as f64
-            );
-            let what = format!("{name}, {} lanes, lines of {line}", wave);
+            ratios += &format!(" {stored:.2} {loaded:.2} |");
+            let what = format!("{name}, {wave} lanes, lines of {line}");
             assert!(stored <= 1.1, "{what}: stores {stored}");
             assert!(loaded <= 1.3, "{what}: loads {loaded}");
         }
-        println!("{name} ({}){ratios}", launch.kernel);
+        let each = |bytes: u64| bytes as f64 / count.rotations as f64;
+        let (lanes, lines) = (count.loaded, 64 * count.of_workgroups.touched);
+        let (lanes, lines) = (each(lanes), each(lines));
+        println!("{name} |{ratios} loads of a rotation: lanes {lanes:.0} B, lines {lines:.0} B");
     }
 }
 

@@ -48,10 +48,14 @@ fn twins() -> Vec<Twin> {
 }
 
 /// Functions without a twin of their own, and why.
-const WITHOUT: [(&str, &str); 3] = [
+const WITHOUT: [(&str, &str); 4] = [
     (
         "invocation_index",
         "tells invocations apart; `main` calls it",
+    ),
+    (
+        "segment_of",
+        "chooses what `segment_at` reads; `main` calls it",
     ),
     (
         "hoisted",
