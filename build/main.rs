@@ -33,12 +33,17 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let mut declared = Declared::default();
     let mut compiled = Vec::new();
-    for Kernel { name, files, reads } in table::kernels() {
+    for kernel in table::kernels() {
+        let Kernel {
+            name,
+            files,
+            reads,
+            has_texels,
+        } = kernel;
         let joined: String = files.iter().map(|file| read_shader(file)).collect();
-        let has_texels = !reads.is_empty();
-        let source = match has_texels {
-            true => readers::storage(&reads) + &joined,
-            false => joined,
+        let source = match reads.is_empty() {
+            true => joined,
+            false => readers::storage(&reads) + &joined,
         };
         let module = parse(&name, &source);
         declared.collect(&name, &module);

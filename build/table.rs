@@ -28,9 +28,10 @@ pub(crate) struct Kernel {
     /// Files below `shaders/`, without `.wgsl`, in the order in which they are joined.
     pub(crate) files: Vec<&'static str>,
     /// The buffers that it reads, bound in this order from 0 on, before the one that `store`
-    /// writes. A kernel that declares its own bindings has none here, and reads storage buffers
-    /// only.
+    /// writes. A kernel that declares its own bindings has none here.
     pub(crate) reads: Vec<&'static Read>,
+    /// Whether it is compiled for texel buffers too; else it reads storage buffers only.
+    pub(crate) has_texels: bool,
 }
 
 /// The forms of segments, each with what its formula needs.
@@ -44,15 +45,25 @@ pub(crate) const FORMS: [(&str, &[&str]); 2] = [
 
 /// How the work over segments is listed: the entry point with the files that it needs, and what
 /// it reads beside segments and constants.
-pub(crate) const LISTS: [(&str, &[&str], &[Read]); 3] = [
+pub(crate) const LISTS: [(&str, &[&str], &[Read]); 5] = [
     (
         "frames",
-        &["runs", "lists/frame_distance"],
+        &[
+            "lists/dispatch",
+            "lists/item",
+            "runs",
+            "lists/frame_distance",
+        ],
         &[read("items", "Item", "item_at")],
     ),
     (
         "times",
-        &["runs", "lists/time_distance"],
+        &[
+            "lists/dispatch",
+            "lists/item",
+            "runs",
+            "lists/time_distance",
+        ],
         &[
             read("items", "Item", "item_at"),
             read("distances", "f32", "distance_at"),
@@ -60,10 +71,42 @@ pub(crate) const LISTS: [(&str, &[&str], &[Read]); 3] = [
     ),
     (
         "samples",
-        &["samples"],
+        &["lists/dispatch", "samples"],
         &[read("samples", "ListedSample", "sample_at")],
     ),
+    (
+        "frames_coalesced",
+        &[
+            "lists/grid",
+            "lists/item",
+            "coalesced",
+            "lists/frame_distance",
+        ],
+        &[
+            read("items", "Item", "item_at"),
+            read("blocks", "Block", "block_at"),
+        ],
+    ),
+    (
+        "times_coalesced",
+        &[
+            "lists/grid",
+            "lists/item",
+            "coalesced",
+            "lists/time_distance",
+        ],
+        &[
+            read("items", "Item", "item_at"),
+            read("blocks", "Block", "block_at"),
+            read("distances", "f32", "distance_at"),
+        ],
+    ),
 ];
+
+/// Kernels for cards, which read storage buffers.
+fn is_for_cards(list: &str) -> bool {
+    list.ends_with("_coalesced")
+}
 
 /// What a rotation is stored as: the name of each file of `shaders/stores` that has a function
 /// `store`, and the file that its line `// Needs: FILE.` names.
@@ -147,11 +190,12 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         name: "self_test".to_owned(),
         files: SELF_TEST.to_vec(),
         reads: Vec::new(),
+        has_texels: false,
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
             for (store, needed) in stores() {
-                let mut files = vec!["math/canonical", "lists/dispatch"];
+                let mut files = vec!["math/canonical"];
                 files.extend([formula, entry].concat());
                 files.extend(needed);
                 files.push(format!("stores/{store}").leak());
@@ -159,6 +203,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
                     name: format!("{form}_{list}_{store}"),
                     files,
                     reads: CLIP.iter().chain(listed).collect(),
+                    has_texels: !is_for_cards(list),
                 });
             }
         }
@@ -172,6 +217,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             name: format!("from_keys_{name}"),
             files,
             reads: KEYS[..reads].iter().collect(),
+            has_texels: true,
         });
     }
     for file in POSES {
@@ -186,6 +232,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             name: file.replace('/', "_"),
             files: shared.into_iter().chain([file]).collect(),
             reads: Vec::new(),
+            has_texels: false,
         });
     }
     kernels

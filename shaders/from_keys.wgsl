@@ -1,5 +1,5 @@
-// Entry point: an invocation evaluates one sample of up to four tracks straight from the keys
-// beside it, for sets with fewer samples than keys; no segment is prepared.
+// Entry point: an invocation evaluates one sample of some tracks straight from the keys beside it,
+// for sets with fewer samples than keys; no segment is prepared.
 // The build joins it with a file of `from_keys/` (`hoisted`, which computes once what all rows
 // share, and `rotation_between`), with the functions that read buffers (`key_at`, `sample_at`) and
 // a `store`.
@@ -21,6 +21,12 @@ struct RowShape {
     keys: u32,
     /// How many rows.
     count: u32,
+    /// Rows that an invocation takes: up to `ROWS_PER_INVOCATION`, or one where `line` is not 0.
+    each: u32,
+    /// Rows begin anywhere in a line of the result's memory. Where that matters, the number of
+    /// rotations of a line, less one: the first of so many neighbours then stores where a line
+    /// begins.
+    line: u32,
 }
 
 const FROM_KEYS_WORKGROUP: u32 = 64;
@@ -37,22 +43,24 @@ var<immediate> rows: RowShape;
 
 @compute @workgroup_size(FROM_KEYS_WORKGROUP)
 fn main(@builtin(global_invocation_id) invocation: vec3u) {
-    if invocation.x >= rows.samples {
+    let row = invocation.y * rows.each;
+    // What lies before the row wraps to a large number.
+    let own_sample = invocation.x - ((row * rows.samples) & rows.line);
+    if own_sample >= rows.samples {
         return;
     }
-    let sample = sample_at(invocation.x);
+    let sample = sample_at(own_sample);
     let is_key = (sample.key & IS_KEY) != 0u;
     let first = sample.key & ~IS_KEY;
     // A sample that is a key has that key as its neighbour: the last key has no next one.
     let next = select(1u, 0u, is_key);
     let all_rows = hoisted(first, first + next, sample.parameter);
-    let row = invocation.y * ROWS_PER_INVOCATION;
-    let is_last = rows.count < row + ROWS_PER_INVOCATION;
-    let count = select(ROWS_PER_INVOCATION, rows.count - row, is_last);
+    let is_last = rows.count < row + rows.each;
+    let count = select(rows.each, rows.count - row, is_last);
     let keys = rows.keys;
     let samples = rows.samples;
     var key = row * keys + first;
-    var place = row * samples + invocation.x;
+    var place = row * samples + own_sample;
     for (var j = 0u; j < count; j++) {
         let stored = key_at(key);
         let own = canonical(rotation_between(key, continued(stored), key + next, all_rows));

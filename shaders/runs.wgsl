@@ -2,23 +2,6 @@
 // The build joins it with a form (`Segment`, `evaluate`), with the functions that read buffers
 // (`segment_at`, `constant_at`, `item_at`), a `distance_from_middle` and a `store`.
 
-/// Consecutive samples of one track that lie in one segment, or hold one constant.
-struct Item {
-    /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
-    source: u32,
-    /// Where the first sample is stored.
-    output: u32,
-    /// Number of samples, at most `ITEM_SAMPLES`, with the bit `IS_CONSTANT` if they are a
-    /// constant.
-    count: u32,
-    /// For frames, the first sample's distance from the segment's middle; for explicit times, the
-    /// index of its distance in the list of distances.
-    first: i32,
-    /// parameter = distance * scale + offset
-    scale: f32,
-    offset: f32,
-}
-
 const ITEM_SAMPLES: u32 = 16;
 
 @compute @workgroup_size(WORKGROUP)

@@ -16,7 +16,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let index = invocation_index(invocation, groups);
-    if index >= dispatch.item_count {
+    if index - dispatch.idle >= dispatch.item_count {
         return;
     }
     let sample = sample_at(dispatch.first_item + index);

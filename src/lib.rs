@@ -106,7 +106,7 @@ pub use crate::engine::Engine;
 pub use crate::error::Error;
 pub use crate::gpu::error::VulkanError;
 pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
-pub use crate::gpu::options::{EngineOptions, Reads, Timings, Transfer};
+pub use crate::gpu::options::{EngineOptions, Mapping, Reads, Timings, Transfer};
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
 pub use crate::gpu::self_test::SelfTestReport;
 pub use crate::memory::OutOfMemory;

@@ -2,13 +2,14 @@
 //! frames, however the work is cut.
 
 use crate::support::{
-    Random, first_difference, give_key_data, hostile_set, is_turn, vulkan_devices, vulkan_engines,
+    Random, WAYS, first_difference, give_key_data, hostile_set, is_turn, vulkan_devices,
+    vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
     Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path,
-    Reads, Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
+    Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -103,25 +104,21 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let frames = Frames::fps(25).between(-1.0, 20.0);
     let budgets = [None, Some(1), Some(10_000), Some(200_000), Some(5_000_000)];
     let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());
-    let ways = [
-        (Transfer::InPlace, Reads::StorageBuffers),
-        (Transfer::Staged, Reads::StorageBuffers),
-        (Transfer::InPlace, Reads::TexelBuffers),
-        (Transfer::Staged, Reads::TexelBuffers),
-    ];
-    for (way, (transfer, reads)) in ways.into_iter().enumerate() {
+    let transfers = [Transfer::InPlace, Transfer::Staged];
+    let ways = transfers.map(|transfer| WAYS.map(|way| (transfer, way)));
+    for (way, (transfer, (reads, mapping))) in ways.concat().into_iter().enumerate() {
         for (budget, memory) in budgets.into_iter().enumerate() {
             for device in vulkan_devices() {
                 let engine = engine(&device, |options| {
                     options.transfer = transfer;
-                    options.reads = reads;
+                    (options.reads, options.mapping) = (reads, mapping);
                     options.memory = memory;
                 });
                 for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {
                     if !is_turn(way + budget, i, 3) {
                         continue;
                     }
-                    let what = format!("{method}, {transfer:?}, {memory:?} bytes");
+                    let what = format!("{method}, {transfer:?}, {mapping:?}, {memory:?} bytes");
                     let found = engine.evaluate(&set, *method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), &what);
                     let layout = Layout::FrameMajor;
@@ -964,7 +961,6 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         |_: &mut EngineOptions| {},
         |options: &mut EngineOptions| options.memory = Some(300_000),
         |options: &mut EngineOptions| options.transfer = Transfer::Staged,
-        |options: &mut EngineOptions| options.reads = Reads::StorageBuffers,
     ] {
         engines.extend(vulkan_engines(change));
     }

@@ -64,7 +64,10 @@ fn every_shader_function_has_its_twin() {
                 "poses",
                 "runs",
                 "samples",
+                "coalesced",
                 "dispatch",
+                "grid",
+                "item",
                 "frame_distance",
                 "time_distance",
                 // Stores that move bits alone.

@@ -1,10 +1,12 @@
 //! Vulkan's side of the bargain: devices, self-tests, validation, handles.
 
-use crate::support::{dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines};
+use crate::support::{
+    WAYS, dense_set, first_difference, hostile_set, vulkan_devices, vulkan_engines,
+};
 use bytemuck::Pod;
 use glam::Quat;
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Reads, Skeleton, TrackSet,
+    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Mapping, Skeleton, TrackSet,
     Transfer, VulkanBuffer, VulkanError, method,
 };
 
@@ -47,15 +49,12 @@ fn the_validation_layer_has_nothing_to_say() {
         Frames::at(vec![0.5, 0.25, 7.0]),
     ];
     for device in devices {
-        for (transfer, reads) in [
-            (Transfer::InPlace, Reads::StorageBuffers),
-            (Transfer::Staged, Reads::StorageBuffers),
-            (Transfer::InPlace, Reads::TexelBuffers),
-            (Transfer::Staged, Reads::TexelBuffers),
-        ] {
+        let transfers = [Transfer::InPlace, Transfer::Staged];
+        let ways = transfers.map(|transfer| WAYS.map(|way| (transfer, way)));
+        for (transfer, (reads, mapping)) in ways.concat() {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
-            options.reads = reads;
+            (options.reads, options.mapping) = (reads, mapping);
             options.memory = Some(1_000_000);
             let engine = Engine::with_options(device.clone(), &options).unwrap();
             // Constants alone, and both forms.
@@ -92,7 +91,7 @@ fn an_applications_own_device_gives_the_same_bits() {
         return;
     }
     let application = crate::application::Application::new();
-    let engine = application.engine();
+    let engine = application.engine(Mapping::Automatic);
     let set = hostile_set(4, 32);
     let frames = Frames::fps(30).between(0.0, 20.0);
     for method in METHODS {
@@ -109,13 +108,19 @@ fn an_applications_own_device_gives_the_same_bits() {
 
 /// Results that a renderer draws from: nothing comes back to the host.
 #[test]
-#[allow(unsafe_code)] // the buffer is the application's
 fn results_stay_in_an_applications_own_buffer() {
     if vulkan_devices().is_empty() {
         return;
     }
+    for mapping in [Mapping::Runs, Mapping::Samples] {
+        assert_stays_in_own_buffer(mapping);
+    }
+}
+
+#[allow(unsafe_code)] // the buffer is the application's
+fn assert_stays_in_own_buffer(mapping: Mapping) {
     let application = crate::application::Application::new();
-    let engine = application.engine();
+    let engine = application.engine(mapping);
     // With intervals so wild that the host computes their samples.
     let mut set = hostile_set(4, 32);
     let turn = |angle| glam::Quat::from_rotation_x(angle);

@@ -12,6 +12,9 @@ struct Dispatch {
     detail: u32,
     /// Where the first listed sample is stored; the others follow.
     first_output: u32,
+    /// Invocations before the first listed sample, which do nothing: so neighbours begin to store
+    /// where a line of memory begins. `first_item` and `first_output` count them too.
+    idle: u32,
 }
 
 const WORKGROUP: u32 = 64;

@@ -1,6 +1,7 @@
 //! Segments: the constants of a curve between two keys, as a kernel reads them.
 
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
+use crate::twin::evaluate::Evaluate as _;
 
 /// The segments of one clip, all of one form: the list of the other form stays empty.
 #[derive(Debug, Clone)]
@@ -33,6 +34,17 @@ impl Segments {
     pub(crate) fn clear(&mut self) {
         self.arcs.clear();
         self.polynomials.clear();
+    }
+
+    /// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
+    /// those ([`Evaluate::is_canonical`](crate::twin::evaluate::Evaluate::is_canonical)).
+    #[inline(always)]
+    pub(crate) fn may_be_tiny(&self, index: u32) -> bool {
+        let is_canonical = match self.form {
+            Form::Arc => self.arcs[index as usize].is_canonical(),
+            Form::Polynomial => self.polynomials[index as usize].is_canonical(),
+        };
+        !is_canonical
     }
 
     pub(crate) fn as_bytes(&self) -> &[u8] {

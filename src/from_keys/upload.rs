@@ -8,7 +8,9 @@ use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, What};
-use crate::shader::{IS_KEY, KeySample, RowShape, SIGN_TURNED, TangentWeights};
+use crate::shader::{
+    IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
+};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
@@ -19,8 +21,16 @@ use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 
 impl KeyDispatch<'_, '_> {
-    pub(crate) fn rows(&self) -> RowShape {
+    /// Its rows; with `maps_samples` an invocation takes a sample of one, and neighbours begin to
+    /// store where a line of memory does.
+    pub(crate) fn rows(&self, maps_samples: bool) -> RowShape {
+        let (each, line) = match maps_samples {
+            true => (1, LINE - 1),
+            false => (ROWS_PER_INVOCATION, 0),
+        };
         RowShape {
+            each,
+            line,
             samples: self.samples as u32,
             keys: (self.keys / self.rows) as u32,
             count: self.rows as u32,

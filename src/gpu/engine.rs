@@ -42,6 +42,8 @@ pub(crate) struct VulkanEngine {
     /// Whether kernels write into memory that the host reads; else results are copied out of the
     /// device's own memory.
     pub(crate) in_place: bool,
+    /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
+    pub(crate) maps_samples: bool,
     /// Whether the caller's memory is imported where the device can.
     pub(crate) lends: bool,
     /// Rotations of one window.
@@ -140,6 +142,7 @@ impl VulkanEngine {
             in_flight: Mutex::default(),
             keys_in_flight: Mutex::default(),
             in_place,
+            maps_samples: device.physical.maps_samples(options.mapping),
             lends: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes,

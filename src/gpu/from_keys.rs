@@ -19,7 +19,7 @@ use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::in_flight::{Flight, Stopwatch, Target, copy, grow};
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::{FROM_KEYS_WORKGROUP, Kernel, ROWS_PER_INVOCATION};
+use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
 
 /// What one dispatch in flight needs. The submission is the first field: dropped first, it waits for
 /// its work to end before the buffers are freed.
@@ -118,7 +118,7 @@ impl VulkanEngine {
             evaluation.finish(&mut imported.target, stopwatch)?;
             let writing = Instant::now();
             let own = start..start + dispatch.rotation_count() * size_of::<Quat>();
-            evaluation.start(&self.device, &pipeline, &dispatch, imported, own.clone())?;
+            evaluation.start(self, &pipeline, &dispatch, imported, own.clone())?;
             stopwatch.timings.work_lists += writing.elapsed();
             start = own.end;
         }
@@ -141,12 +141,13 @@ impl KeysInFlight {
     /// Submits one dispatch; `output` are the bytes of the whole result that it makes.
     fn start(
         &mut self,
-        device: &Arc<LogicalDevice>,
+        engine: &VulkanEngine,
         pipeline: &Pipeline,
         dispatch: &KeyDispatch<'_, '_>,
         imported: &Borrowed<'_>,
         output: Range<usize>,
     ) -> Result<(), EvaluateError> {
+        let (device, maps_samples) = (&engine.device, engine.maps_samples);
         let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = dispatch.bytes();
         let place = match &imported.target {
             Target::ImportedMemory(memory) if !output.is_empty() => {
@@ -186,10 +187,11 @@ impl KeysInFlight {
             bindings.push(Binding::whole(weights));
         }
         bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));
-        let rows = dispatch.rows();
+        let rows = dispatch.rows(maps_samples);
         let groups = [
-            rows.samples.div_ceil(FROM_KEYS_WORKGROUP),
-            rows.count.div_ceil(ROWS_PER_INVOCATION),
+            (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
+            rows.count.div_ceil(rows.each),
+            1,
         ];
         self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         self.submission.begin(1)?;

@@ -4,21 +4,23 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
+use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::grid::{GridRows, GroupGrid, write_blocks};
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
 use crate::gpu::sample_list::SampleList;
 use crate::gpu::submission::{Spent, Submission};
-use crate::gpu::work_list::{GroupItems, GroupWork, Patch, Work, WorkChunk, work};
+use crate::gpu::work_list::{Cut, GroupItems, GroupWork, Patch, Work, WorkChunk, work};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::{Item, List, ListedSample};
+use crate::shader::{Block, Item, List, ListedSample};
 use crate::time::frames::{Ticks, Timeline};
 
 /// What one window in flight needs. The submission is the first field: dropped first, it waits for
@@ -31,6 +33,9 @@ pub(crate) struct InFlight {
     /// The same in the device's own memory, where that is not the host's.
     pub(crate) device_items: Option<Buffer>,
     pub(crate) device_distances: Option<Buffer>,
+    /// The blocks of a grid, likewise.
+    pub(crate) blocks: Option<Buffer>,
+    pub(crate) device_blocks: Option<Buffer>,
     /// A window's rotations: where the kernel writes, and where the host reads.
     pub(crate) rotations: Option<Buffer>,
     pub(crate) readback: Option<Buffer>,
@@ -193,6 +198,8 @@ impl InFlight {
             distances: Buffer::new(device, "tumble distances", 0, Residence::Upload)?,
             device_items: None,
             device_distances: None,
+            blocks: None,
+            device_blocks: None,
             rotations: None,
             readback: None,
             done: None,
@@ -202,7 +209,8 @@ impl InFlight {
     }
 
     /// Writes the work list of a window into its buffers, one group after another; `shift`
-    /// is added to every place in the output.
+    /// is added to every place in the output. With `maps_samples` neighbouring invocations take
+    /// neighbouring samples, where that can be.
     pub(crate) fn list(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -210,16 +218,45 @@ impl InFlight {
         timeline: &Timeline,
         window: &Window,
         shift: u32,
+        maps_samples: bool,
     ) -> Result<Work, EvaluateError> {
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = list.count() * size_of::<ListedSample>();
             let place = room(device, &mut self.items, "tumble items", bytes)?;
             return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
         }
-        let lists = work(clip, timeline, window, shift, &mut self.spare)?;
+        let rows = GridRows::new(window, shift).filter(|_| maps_samples);
+        if let Some(rows) = rows {
+            let cut = Cut::Whole;
+            let lists = work(clip, timeline, window, shift, cut, &mut self.spare)?;
+            if let Some(grids) = rows.of_groups(&lists) {
+                let last = self.write_lists(device, &lists, Some(rows))?;
+                let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
+                let (own, bytes) = (&mut self.blocks, blocks * size_of::<Block>());
+                let own = grow(device, own, bytes as u64, Residence::Upload)?;
+                let blocks = bytemuck::cast_slice_mut(own.bytes_mut(0..bytes));
+                write_blocks(&lists, &grids, last, blocks);
+                let grids = grids.into_iter().map(Some);
+                return Ok(self.listed(timeline, lists, grids));
+            }
+            self.take_back(lists);
+        }
+        let lists = work(clip, timeline, window, shift, Cut::Short, &mut self.spare)?;
+        self.write_lists(device, &lists, None)?;
+        Ok(self.listed(timeline, lists, std::iter::repeat(None)))
+    }
+
+    /// Writes items and distances, and for a grid one item without samples after all others, whose
+    /// place it returns.
+    fn write_lists(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        lists: &[GroupWork],
+        rows: Option<GridRows>,
+    ) -> Result<u32, VulkanError> {
         let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
         let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
-        let item_bytes = item_count * size_of::<Item>();
+        let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
         let items = room(device, &mut self.items, "tumble items", item_bytes)?;
         let distance_bytes = distance_count * size_of::<f32>();
         let distances = room(
@@ -228,31 +265,50 @@ impl InFlight {
             "tumble distances",
             distance_bytes,
         )?;
-        write(
-            &lists,
-            bytemuck::cast_slice_mut(items),
-            bytemuck::cast_slice_mut(distances),
-        );
-        let mut work = Work {
-            list: match timeline.ticks {
-                Ticks::Frames { .. } => List::Frames,
-                Ticks::Times { .. } => List::Times,
-            },
-            groups: Vec::new(),
-            patches: Vec::new(),
-        };
-        for list in lists {
-            work.groups.push(GroupItems {
+        let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
+        nothing.fill(Item::zeroed());
+        write(lists, rows, items, bytemuck::cast_slice_mut(distances));
+        Ok(item_count as u32)
+    }
+
+    /// What is to be done of lists that were written, whose memory is kept.
+    fn listed(
+        &mut self,
+        timeline: &Timeline,
+        lists: Vec<GroupWork>,
+        grids: impl Iterator<Item = Option<GroupGrid>>,
+    ) -> Work {
+        let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
+        let mut groups = Vec::new();
+        for (list, grid) in lists.iter().zip(grids) {
+            groups.push(GroupItems {
                 group: list.group,
                 items: list.item_count() as u32,
                 first_output: 0,
+                grid,
             });
-            for mut chunk in list.chunks {
-                work.patches.append(&mut chunk.patches);
-                self.spare.push(chunk.cleared());
-            }
         }
-        Ok(work)
+        let list = match (groups.iter().any(|own| own.grid.is_some()), is_timed) {
+            (false, false) => List::Frames,
+            (false, true) => List::Times,
+            (true, false) => List::FramesCoalesced,
+            (true, true) => List::TimesCoalesced,
+        };
+        Work {
+            list,
+            groups,
+            patches: self.take_back(lists),
+        }
+    }
+
+    /// Keeps the memory of lists for the next ones; returns what they leave to the host.
+    fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
+            patches.append(&mut chunk.patches);
+            self.spare.push(chunk.cleared());
+        }
+        patches
     }
 }
 
@@ -282,8 +338,14 @@ fn room<'b>(
     Ok(buffer.bytes_mut(0..bytes))
 }
 
-/// Writes the work lists of all groups, one after another.
-fn write(lists: &[GroupWork], mut items: &mut [Item], mut distances: &mut [f32]) {
+/// Writes the work lists of all groups, one after another; in `rows` of a grid, the position of an
+/// item takes the place of where it is stored.
+pub(crate) fn write(
+    lists: &[GroupWork],
+    rows: Option<GridRows>,
+    mut items: &mut [Item],
+    mut distances: &mut [f32],
+) {
     let mut next_distance = 0;
     let mut places = Vec::new();
     for chunk in lists.iter().flat_map(|list| &list.chunks) {
@@ -299,8 +361,13 @@ fn write(lists: &[GroupWork], mut items: &mut [Item], mut distances: &mut [f32])
             items.copy_from_slice(&chunk.items);
             distances.copy_from_slice(&chunk.distances);
             if !distances.is_empty() {
-                for item in items {
+                for item in &mut *items {
                     item.first += first;
+                }
+            }
+            if let Some(rows) = rows {
+                for item in items {
+                    item.output = rows.position(item.output);
                 }
             }
         });

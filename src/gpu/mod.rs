@@ -7,6 +7,7 @@ pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;
 pub(crate) mod from_keys;
+pub(crate) mod grid;
 pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;

@@ -31,6 +31,21 @@ pub enum Reads {
     TexelBuffers,
 }
 
+/// How the samples of a result are shared among the invocations of a kernel on a Vulkan device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mapping {
+    /// [`Mapping::Samples`] on graphics cards and integrated devices, [`Mapping::Runs`] on software
+    /// devices.
+    #[default]
+    Automatic,
+    /// An invocation takes up to 16 consecutive samples of one segment, whose constants it loads
+    /// once. Devices that serve their lanes one by one are fastest so.
+    Runs,
+    /// Neighbouring invocations take neighbouring samples: the lanes that a card runs together write
+    /// whole lines of memory, and read the constants that they share from one address.
+    Samples,
+}
+
 /// Choices for an [`Engine`](crate::engine::Engine); none of them changes a bit of any result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -46,6 +61,8 @@ pub struct EngineOptions {
     pub transfer: Transfer,
     /// How a Vulkan device's kernels read.
     pub reads: Reads,
+    /// How a Vulkan device's invocations share the samples.
+    pub mapping: Mapping,
     /// Use a device although it fails the self-test: its bits may differ.
     pub allow_inexact: bool,
 }

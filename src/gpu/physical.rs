@@ -7,7 +7,7 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
-use crate::gpu::options::Reads;
+use crate::gpu::options::{Mapping, Reads};
 use crate::shader::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
@@ -222,6 +222,16 @@ impl PhysicalDevice {
             Reads::Automatic => can && self.info.kind == DeviceKind::Cpu,
             Reads::StorageBuffers => false,
             Reads::TexelBuffers => can,
+        }
+    }
+
+    /// Whether neighbouring invocations take neighbouring samples. Hardware runs neighbouring lanes together, and stores
+    /// what they store at neighbouring places as whole lines; software devices store lane by lane.
+    pub(crate) fn maps_samples(&self, mapping: Mapping) -> bool {
+        match mapping {
+            Mapping::Automatic => !matches!(self.info.kind, DeviceKind::Cpu | DeviceKind::Other),
+            Mapping::Runs => false,
+            Mapping::Samples => true,
         }
     }
 

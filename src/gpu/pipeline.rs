@@ -1,7 +1,7 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::{Dispatch, Kernel, spirv};
+use crate::shader::{Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -10,6 +10,14 @@ use ash::vk;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
+
+/// Bytes that come with a dispatch, at most.
+const PUSHED: u32 = {
+    assert!(size_of::<Dispatch>() <= size_of::<Grid>());
+    assert!(size_of::<RowShape>() <= size_of::<Grid>());
+    assert!(size_of::<PoseDispatch>() <= size_of::<Grid>());
+    size_of::<Grid>() as u32
+};
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -59,7 +67,7 @@ impl Pipeline {
         let set_layouts = [pipeline.set_layout];
         let constants = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(size_of::<Dispatch>() as u32)];
+            .size(PUSHED)];
         let info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&set_layouts)
             .push_constant_ranges(&constants);
@@ -96,7 +104,7 @@ impl Pipeline {
         &self,
         inputs: &[&[u8]],
         constants: &[u8],
-        groups: [u32; 2],
+        groups: [u32; 3],
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
         let new = |bytes: usize, residence| {

@@ -12,7 +12,20 @@ use crate::gpu::in_flight::{Finish, Flight as _, InFlight, Stopwatch, Target, gr
 use crate::gpu::submission::{Access, Binding};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::{Dispatch, Kernel, List, WORKGROUP};
+use crate::shader::{Dispatch, Kernel, LINE, List, WORKGROUP};
+
+/// Bytes of the lines in which a card's memory is written, at most.
+const LINE_BYTES: u64 = 128;
+
+/// The last aligned offset that is a whole number of rotations before the start of a window; a
+/// binding begins there.
+fn aligned_before(start: u64, rotation: u64, alignment: u64) -> Option<u64> {
+    let mut aligned = start / alignment * alignment;
+    while !(start - aligned).is_multiple_of(rotation) {
+        aligned = aligned.checked_sub(alignment)?;
+    }
+    Some(aligned)
+}
 
 impl VulkanEngine {
     /// Evaluates a window of a result, cut into smaller windows that suit the device.
@@ -68,7 +81,6 @@ impl VulkanEngine {
         let (clip, encoding) = (job.clip, job.encoding);
         let rotation = encoding.bytes() as u64;
         let info = &self.device.physical.info;
-        let alignment = info.min_storage_buffer_offset_alignment.max(1);
         let start = match target {
             Target::Buffer(_) => window.start as u64 * rotation,
             Target::ImportedMemory(memory) => {
@@ -77,26 +89,34 @@ impl VulkanEngine {
             Target::External(buffer) => buffer.offset + window.start as u64 * rotation,
             Target::Slice(_) => 0,
         };
-        // The binding begins at an aligned offset, a whole number of rotations before the window.
-        let mut aligned = start / alignment * alignment;
-        while !(start - aligned).is_multiple_of(rotation) {
-            aligned -= alignment;
-        }
+        let least = info.min_storage_buffer_offset_alignment.max(1);
+        let lines = self.maps_samples.then_some(least.max(LINE_BYTES));
+        let aligned = (lines.into_iter().chain([least]))
+            .find_map(|alignment| aligned_before(start, rotation, alignment))
+            .unwrap_or(0);
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let work = evaluation.list(&self.device, clip, job.timeline, &window, shift as u32)?;
+        let (timeline, shift) = (job.timeline, shift as u32);
+        let samples = self.maps_samples;
+        let work = evaluation.list(&self.device, clip, timeline, &window, shift, samples)?;
 
         let room = |kept: &mut Option<Buffer>, size: u64, residence| {
             grow(&self.device, kept, size, residence).map(|_| ())
         };
+        let is_grid = matches!(work.list, List::FramesCoalesced | List::TimesCoalesced);
+        let is_timed = matches!(work.list, List::Times | List::TimesCoalesced);
         if !self.in_place {
-            let (items, distances) = (evaluation.items.size(), evaluation.distances.size());
-            room(&mut evaluation.device_items, items, Residence::Device)?;
+            let device = Residence::Device;
             room(
-                &mut evaluation.device_distances,
-                distances,
-                Residence::Device,
+                &mut evaluation.device_items,
+                evaluation.items.size(),
+                device,
             )?;
+            let distances = evaluation.distances.size();
+            room(&mut evaluation.device_distances, distances, device)?;
+            if let Some(blocks) = evaluation.blocks.as_ref().filter(|_| is_grid) {
+                room(&mut evaluation.device_blocks, blocks.size(), device)?;
+            }
         }
         if matches!(target, Target::Slice(_)) {
             let residence = if self.in_place {
@@ -110,18 +130,18 @@ impl VulkanEngine {
             }
         }
         evaluation.submission.begin(work.groups.len() as u32)?;
-        let (mut items, mut distances) = (&evaluation.items, &evaluation.distances);
-        if let (Some(own_items), Some(own_distances)) =
-            (&evaluation.device_items, &evaluation.device_distances)
-        {
-            evaluation
-                .submission
-                .copy(items, own_items, 0, items.size());
-            evaluation
-                .submission
-                .copy(distances, own_distances, 0, distances.size());
+        let mut listed = vec![&evaluation.items];
+        listed.extend(evaluation.blocks.as_ref().filter(|_| is_grid));
+        listed.extend(is_timed.then_some(&evaluation.distances));
+        if !self.in_place {
+            let mut resident: Vec<&Buffer> = evaluation.device_items.iter().collect();
+            resident.extend(evaluation.device_blocks.as_ref().filter(|_| is_grid));
+            resident.extend(evaluation.device_distances.as_ref().filter(|_| is_timed));
+            for (from, to) in listed.iter().zip(&resident) {
+                evaluation.submission.copy(from, to, 0, from.size());
+            }
             evaluation.submission.barrier(Access::Copy, Access::Kernel);
-            (items, distances) = (own_items, own_distances);
+            listed = resident;
         }
         let rotations = match (target, &evaluation.rotations) {
             (Target::Buffer(buffer), _) => Binding::range(buffer.raw, aligned, size),
@@ -134,7 +154,7 @@ impl VulkanEngine {
         let pipeline =
             self.pipeline(Kernel::over_segments(form, work.list, encoding.row().store))?;
         evaluation.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
-        let mut first_item = 0;
+        let mut first_item = 0_u32;
         for own in work.groups {
             let item_count = own.items;
             if item_count == 0 {
@@ -144,26 +164,38 @@ impl VulkanEngine {
             let mut bindings = vec![
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
-                Binding::whole(items),
             ];
-            if work.list == List::Times {
-                bindings.push(Binding::whole(distances));
-            }
+            bindings.extend(listed.iter().map(|buffer| Binding::whole(buffer)));
             bindings.push(rotations);
-            let dispatch = Dispatch {
-                first_item,
-                item_count,
-                stride: window.stride() as u32,
-                detail: encoding.row().detail,
-                first_output: own.first_output,
+            let detail = encoding.row().detail;
+            let (grid, dispatch);
+            let (arguments, groups) = match own.grid {
+                Some(of_group) => {
+                    grid = of_group.arguments(detail);
+                    let most = info.max_compute_work_group_count[0];
+                    (bytemuck::bytes_of(&grid), of_group.workgroups(most))
+                }
+                None => {
+                    // Only samples have a first output.
+                    let idle = match self.maps_samples {
+                        true => own.first_output % LINE,
+                        false => 0,
+                    };
+                    dispatch = Dispatch {
+                        first_item: first_item.wrapping_sub(idle),
+                        item_count,
+                        stride: window.stride() as u32,
+                        detail,
+                        first_output: own.first_output - idle,
+                        idle,
+                    };
+                    let groups = self.workgroups(item_count + idle);
+                    (bytemuck::bytes_of(&dispatch), groups)
+                }
             };
-            let groups = self.workgroups(item_count);
-            evaluation.submission.dispatch(
-                &pipeline,
-                &bindings,
-                bytemuck::bytes_of(&dispatch),
-                groups,
-            )?;
+            evaluation
+                .submission
+                .dispatch(&pipeline, &bindings, arguments, groups)?;
             first_item += item_count;
         }
         let mut patches = work.patches;
@@ -196,9 +228,9 @@ impl VulkanEngine {
     }
 
     /// Enough workgroups for `items`, within the limit along x.
-    pub(crate) fn workgroups(&self, items: u32) -> [u32; 2] {
+    pub(crate) fn workgroups(&self, items: u32) -> [u32; 3] {
         let groups = items.div_ceil(WORKGROUP);
         let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
-        [x, groups.div_ceil(x)]
+        [x, groups.div_ceil(x), 1]
     }
 }

@@ -126,6 +126,7 @@ impl<'a> SampleList<'a> {
                 group: own.group,
                 items: (end - own.first) as u32,
                 first_output: own.first as u32 + shift,
+                grid: None,
             });
             let each = parts_per_chunk(self.window);
             let mut first = own.first;

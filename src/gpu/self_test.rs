@@ -122,11 +122,12 @@ fn expressions(
         stride: 1,
         detail: 0,
         first_output: 0,
+        idle: 0,
     };
     pipeline.run_once(
         &[bytemuck::cast_slice(&probes)],
         bytemuck::bytes_of(&dispatch),
-        [(probes.len() as u32).div_ceil(WORKGROUP), 1],
+        [(probes.len() as u32).div_ceil(WORKGROUP), 1, 1],
         bytemuck::cast_slice_mut(&mut replies),
     )?;
     let self_tests: [(&str, Value); 10] = [

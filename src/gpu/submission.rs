@@ -14,7 +14,7 @@ use crate::gpu::pipeline::Pipeline;
 const TIMEOUT_SECONDS: u64 = 60;
 
 /// The most buffers that a kernel binds.
-const MOST_BINDINGS: u32 = 5;
+const MOST_BINDINGS: u32 = 6;
 
 /// Command buffer, fence and descriptor pool, used again and again.
 pub(crate) struct Submission {
@@ -171,7 +171,7 @@ impl Submission {
         pipeline: &Pipeline,
         bindings: &[Binding],
         constants: &[u8],
-        groups: [u32; 2],
+        groups: [u32; 3],
     ) -> Result<(), VulkanError> {
         debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
         let raw = &self.device.raw;
@@ -216,7 +216,7 @@ impl Submission {
             raw.cmd_bind_pipeline(commands, compute, pipeline.raw);
             raw.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
             raw.cmd_push_constants(commands, pipeline.layout, stage, 0, constants);
-            raw.cmd_dispatch(commands, groups[0], groups[1], 1);
+            raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
         }
         Ok(())
     }

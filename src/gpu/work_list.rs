@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
+use crate::gpu::grid::GroupGrid;
 use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::{IS_CONSTANT, ITEM_SAMPLES, Item, List};
+use crate::shader::{IS_CONSTANT, ITEM_SAMPLES, Item, List, MAY_BE_TINY};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frames::{FramesError, Timeline};
@@ -29,6 +30,8 @@ pub(crate) struct GroupItems {
     pub(crate) items: u32,
     /// Where the first sample of a sample list is stored.
     pub(crate) first_output: u32,
+    /// The samples of the group, where neighbouring invocations take neighbours.
+    pub(crate) grid: Option<GroupGrid>,
 }
 
 /// A place in the window, and the rotation there.
@@ -87,6 +90,15 @@ pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Part
     &prepared.parts[from(window.tracks.start)..from(window.tracks.end)]
 }
 
+/// How runs become items.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// An item for each invocation: at most `ITEM_SAMPLES` samples.
+    Short,
+    /// A whole run, for a grid, with the bit `MAY_BE_TINY` where the run needs it.
+    Whole,
+}
+
 /// The work lists of a window: one for each group that has any of its tracks. `shift` is added to
 /// every place in the output. `spare` are emptied chunks to use again: fresh memory would cost
 /// more than listing.
@@ -95,6 +107,7 @@ pub(crate) fn work(
     timeline: &Timeline,
     window: &Window,
     shift: u32,
+    cut: Cut,
     spare: &mut Vec<WorkChunk>,
 ) -> Result<Vec<GroupWork>, FramesError> {
     let mut all = Vec::new();
@@ -108,6 +121,7 @@ pub(crate) fn work(
                 timeline,
                 window,
                 shift,
+                cut,
                 chunk: spare.pop().unwrap_or_default(),
                 listed: Ok(()),
             })
@@ -133,6 +147,7 @@ struct PartsList<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
     shift: u32,
+    cut: Cut,
     chunk: WorkChunk,
     listed: Result<(), FramesError>,
 }
@@ -146,6 +161,7 @@ impl InLanes for PartsList<'_> {
                 timeline: self.timeline,
                 window: self.window,
                 shift: self.shift,
+                cut: self.cut,
                 track: part.track as usize,
                 chunk: &mut self.chunk,
             };
@@ -170,6 +186,7 @@ struct RunItems<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
     shift: u32,
+    cut: Cut,
     track: usize,
     chunk: &'a mut WorkChunk,
 }
@@ -201,6 +218,16 @@ impl Emit for RunItems<'_> {
                     own
                 }
             };
+        }
+        if self.cut == Cut::Whole {
+            let mut whole = item(run.source, output(run.sample), run.count as u32, first);
+            if let RunSource::Segment(index, ..) = run.source
+                && self.prepared.segments.may_be_tiny(index)
+            {
+                whole.count |= MAY_BE_TINY;
+            }
+            chunk.items.push(whole);
+            return;
         }
         for done in (0..run.count).step_by(ITEM_SAMPLES as usize) {
             let count = (run.count - done).min(ITEM_SAMPLES as usize) as u32;

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // each test program uses some of it
 
 use ash::vk;
-use tumble::{Engine, EngineOptions, VulkanHandles};
+use tumble::{Engine, EngineOptions, Mapping, VulkanHandles};
 
 pub(crate) struct Application {
     pub(crate) instance: ash::Instance,
@@ -48,7 +48,9 @@ impl Application {
     }
 
     /// An engine on it, which must go first.
-    pub(crate) fn engine(&self) -> Engine {
+    pub(crate) fn engine(&self, mapping: Mapping) -> Engine {
+        let mut options = EngineOptions::default();
+        options.mapping = mapping;
         let handles = VulkanHandles {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
@@ -61,7 +63,7 @@ impl Application {
             queue_family: 0,
         };
         // SAFETY: the handles belong together and outlive the engine.
-        unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap()
+        unsafe { Engine::from_vulkan(handles, &options) }.unwrap()
     }
 
     /// A buffer in memory that the host can see.

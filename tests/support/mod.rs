@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Device, Engine, EngineOptions, Frames, Reads, Tcb, TrackSet};
+use tumble::{Device, Engine, EngineOptions, Frames, Mapping, Reads, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.
@@ -21,17 +21,24 @@ pub fn vulkan_devices() -> Vec<Device> {
     devices
 }
 
-/// Every Vulkan device, reading storage buffers and reading texel buffers.
+/// How kernels read, and what an invocation takes.
+pub const WAYS: [(Reads, Mapping); 3] = [
+    (Reads::StorageBuffers, Mapping::Runs),
+    (Reads::TexelBuffers, Mapping::Runs),
+    (Reads::StorageBuffers, Mapping::Samples),
+];
+
+/// Every Vulkan device in all of [`WAYS`].
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
-    let both = |device: Device| {
-        [Reads::StorageBuffers, Reads::TexelBuffers].map(|reads| {
+    let every = |device: Device| {
+        WAYS.map(|(reads, mapping)| {
             let mut options = EngineOptions::default();
-            options.reads = reads;
+            (options.reads, options.mapping) = (reads, mapping);
             change(&mut options);
             Engine::with_options(device.clone(), &options).unwrap()
         })
     };
-    vulkan_devices().into_iter().flat_map(both).collect()
+    vulkan_devices().into_iter().flat_map(every).collect()
 }
 
 /// Whether the case at a place is tried in this round: the rounds of a test share its cases out, so that

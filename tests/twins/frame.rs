@@ -5,7 +5,9 @@
 //! statement that is not known here panics with its text.
 
 use naga::valid::FunctionInfo;
-use naga::{Block, Expression, Function, Handle, Module, Scalar, Statement, TypeInner};
+use naga::{
+    Block, Expression, Function, Handle, MathFunction, Module, Scalar, Statement, TypeInner,
+};
 
 use super::layout::{cells, cells_of, constant, element};
 use super::machine::{Step, pointer_to_global};
@@ -338,6 +340,16 @@ impl Frame<'_> {
                     },
                 }
             }
+            Expression::Math {
+                fun: MathFunction::CountOneBits,
+                arg,
+                ..
+            } => Step::Unary {
+                work: |bits| (bits as u32).count_ones().into(),
+                from: self.place(arg),
+                to,
+                count,
+            },
             Expression::ArrayLength(pointer) => {
                 let (_, stride, _) = element(self.module, self.pointee(pointer), 0);
                 Step::ArrayLength {

@@ -18,7 +18,7 @@ use super::stores::StoredKey;
 use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
 
 /// A form of segments: what its kernels read.
-trait Segment: Evaluate + 'static {
+pub(super) trait Segment: Evaluate + 'static {
     const KERNELS: [&str; 3];
     fn random(random: &mut Random) -> Self;
     fn cells(&self) -> Vec<[f32; 4]>;
@@ -100,9 +100,10 @@ impl<S: Segment> Scene<S> {
         (self.source as u32, bit)
     }
 
-    fn dispatch(&self, trial: &mut Trial, stride: u32, first_output: u32) {
-        let count = self.index + 1;
-        let dispatch = [self.first_item, count, stride, 0, first_output];
+    /// `idle` invocations before the first do nothing.
+    fn dispatch(&self, trial: &mut Trial, stride: u32, first_output: u32, idle: u32) {
+        let count = self.index + 1 - idle;
+        let dispatch = [self.first_item, count, stride, 0, first_output, idle];
         trial.global("dispatch", dispatch);
     }
 }
@@ -114,7 +115,7 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
         let scene = Scene::<S>::new(random, trial);
         let (output, stride, count) = (random.below(2), 1 + random.below(3), 1 + random.below(4));
         trial.samples(count);
-        scene.dispatch(trial, stride, 0);
+        scene.dispatch(trial, stride, 0, 0);
         let affine = Affine {
             scale: random.number() * 0.25,
             offset: random.parameter(),
@@ -158,7 +159,7 @@ fn samples<S: Segment>() -> Twin {
     with_globals(S::KERNELS[2], "main", |random, trial| {
         let scene = Scene::<S>::new(random, trial);
         let first_output = random.below(2);
-        scene.dispatch(trial, 0, first_output);
+        scene.dispatch(trial, 0, first_output, random.below(2));
         let parameter = random.parameter();
         let (source, bit) = scene.source_with_bit();
         let mut list = vec![(0, 0.0); scene.place()];
@@ -177,7 +178,7 @@ fn samples<S: Segment>() -> Twin {
     })
 }
 
-/// The rows of the second invocation of its sample: those after the first four.
+/// The rows of the second invocation of its sample: those after the first ones.
 struct Rows {
     rows: Vec<Vec<StoredKey>>,
     is_key: bool,
@@ -193,25 +194,28 @@ impl Rows {
         mut keys: impl FnMut(&mut Random) -> Vec<StoredKey>,
     ) -> Self {
         const SAMPLES: u32 = 2;
-        let count = 1 + random.below(2);
+        // Lines of four rotations, of which rows of two begin at the first or at the third.
+        let (each, line) = match random.below(2) {
+            0 => (ROWS_PER_INVOCATION, 0),
+            _ => (1, 3),
+        };
+        let count = 1 + random.below(2).min(each - 1);
         trial.samples(count);
         let rows: Vec<_> = (0..count).map(|_| keys(random)).collect();
-        let each = rows[0].len();
+        let keys = rows[0].len();
         let (is_key, parameter) = (random.once_in(8), random.parameter());
         let own = random.below(SAMPLES);
-        trial.argument([own, 1, 0]);
-        trial.global("rows", [SAMPLES, each as u32, ROWS_PER_INVOCATION + count]);
+        let invocation = own + ((each * SAMPLES) & line);
+        trial.argument([invocation, 1, 0]);
+        trial.global("rows", [SAMPLES, keys as u32, each + count, each, line]);
         let mut samples = [(0, 0.0); SAMPLES as usize];
         samples[own as usize] = (before | if is_key { IS_KEY } else { 0 }, parameter);
         trial.global("samples", samples);
-        let mut stored = vec![[0; 4]; ROWS_PER_INVOCATION as usize * each];
+        let mut stored = vec![[0; 4]; each as usize * keys];
         stored.extend(rows.iter().flatten().map(|key| key.stored));
         trial.global("keys", stored);
         trial.output("rotations");
-        trial.expect(vec![
-            [UNTOUCHED; 4];
-            (ROWS_PER_INVOCATION * SAMPLES + own) as usize
-        ]);
+        trial.expect(vec![[UNTOUCHED; 4]; (each * SAMPLES + own) as usize]);
         Self {
             rows,
             is_key,

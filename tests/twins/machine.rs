@@ -116,8 +116,24 @@ pub(super) struct Machine<'a> {
     program: &'a Program,
     stack: Vec<u64>,
     pub(super) globals: Vec<Vec<u64>>,
+    /// What was read and written of global variables, where that is asked for.
+    pub(super) touches: Option<Vec<Touch>>,
     /// Whether anything was read or written outside the memory, or beyond the end of an array.
     is_outside: bool,
+}
+
+/// A load or a store of a global variable.
+pub(super) struct Touch {
+    pub(super) global: usize,
+    cells: Range<usize>,
+    pub(super) is_store: bool,
+}
+
+impl Touch {
+    /// Its bytes, for a buffer of numbers of four bytes.
+    pub(super) fn bytes(&self) -> Range<u64> {
+        4 * self.cells.start as u64..4 * self.cells.end as u64
+    }
 }
 
 pub(super) fn pointer_to_global(index: usize) -> u64 {
@@ -141,6 +157,7 @@ impl<'a> Machine<'a> {
             program,
             stack: Vec::new(),
             globals: vec![Vec::new(); program.globals.len()],
+            touches: None,
             is_outside: false,
         }
     }
@@ -184,11 +201,22 @@ impl<'a> Machine<'a> {
         (first + count <= length).then_some((memory, first..first + count))
     }
 
+    fn note(&mut self, global: usize, cells: &Range<usize>, is_store: bool) {
+        if let Some(touches) = &mut self.touches {
+            touches.push(Touch {
+                global,
+                cells: cells.clone(),
+                is_store,
+            });
+        }
+    }
+
     fn load(&mut self, pointer: u64, to: usize, count: usize) {
         match self.cells(pointer, count) {
             None => self.is_outside = true,
             Some((0, cells)) => self.stack.copy_within(cells, to),
             Some((global, cells)) => {
+                self.note(global - 1, &cells, false);
                 self.stack[to..to + count].copy_from_slice(&self.globals[global - 1][cells]);
             }
         }
@@ -199,6 +227,7 @@ impl<'a> Machine<'a> {
             None => self.is_outside = true,
             Some((0, cells)) => self.stack.copy_within(from..from + count, cells.start),
             Some((global, cells)) => {
+                self.note(global - 1, &cells, true);
                 self.globals[global - 1][cells].copy_from_slice(&self.stack[from..from + count]);
             }
         }

@@ -7,10 +7,12 @@
 //! it.
 
 mod cells;
+mod coalesced;
 mod frame;
 mod functions;
 mod kernels;
 mod layout;
+mod lines;
 mod machine;
 mod operations;
 mod poses;
@@ -39,16 +41,21 @@ fn twins() -> Vec<Twin> {
     all.extend(stores::readers());
     all.extend(stores::keys());
     all.extend(kernels::evaluation());
+    all.extend(coalesced::coalesced());
     all.extend(poses::poses());
     all.push(poses::self_test());
     all
 }
 
 /// Functions without a twin of their own, and why.
-const WITHOUT: [(&str, &str); 3] = [
+const WITHOUT: [(&str, &str); 4] = [
     (
         "invocation_index",
         "tells invocations apart; `main` calls it",
+    ),
+    (
+        "segment_of",
+        "chooses what `segment_at` reads; `main` calls it",
     ),
     (
         "hoisted",

@@ -1,0 +1,97 @@
+// The arguments of one dispatch whose neighbouring invocations take neighbouring samples, and which
+// those are.
+
+/// The arguments of one dispatch over a grid of samples. Track by track (`stride` is 1), the
+/// samples of all tracks are one row, and a sample's position is the place where it is stored.
+/// Frame by frame each track is a row, and a position is a sample's number.
+struct Grid {
+    /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    detail: u32,
+    /// Distance in the result between neighbouring samples of a track, in rotations.
+    stride: u32,
+    /// Number of positions of a row.
+    samples: u32,
+    /// How many rows.
+    rows: u32,
+    /// Where the first position of the first row is stored; track by track that is a multiple of
+    /// `BLOCK_SAMPLES`.
+    first_output: u32,
+    /// The block of the first positions of the first row.
+    first_block: u32,
+}
+
+/// Which items the samples of 32 neighbouring positions belong to.
+struct Block {
+    /// The item of the first position.
+    first: u32,
+    /// A bit for each position at which the next item begins, the lowest for the first.
+    starts: u32,
+}
+
+const WORKGROUP: u32 = 64;
+
+// Samples of an invocation.
+const SAMPLES_EACH: u32 = 4;
+
+// Set in a `source` or a `count`: it is a constant that is stored as it is, not a segment.
+const IS_CONSTANT: u32 = 0x80000000;
+
+// Set in a `count`: a component of the segment may pass near 0.
+const MAY_BE_TINY: u32 = 0x40000000;
+
+// Positions of a block.
+const BLOCK_SAMPLES: u32 = 32;
+
+// Neighbours that store one line of 128 bytes, where a rotation has 16.
+const LINE: u32 = 8;
+
+
+var<immediate> dispatch: Grid;
+
+// Where the samples of an invocation begin.
+struct Corner {
+    // The position, counted from the first of the row.
+    first: u32,
+    // Frame by frame, the distance from the beginning of the first row's line.
+    column: u32,
+    // The block of all of them; frame by frame, that of the row in which `column` would be 0.
+    block: u32,
+}
+
+struct Cell {
+    place: u32,
+    position: u32,
+    block: u32,
+    is_inside: bool,
+}
+
+fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
+    let tile = group.y * groups.x + group.x;
+    let line = lane / LINE;
+    let within = lane & (LINE - 1u);
+    if dispatch.stride == 1u {
+        let first = (tile * WORKGROUP + line * LINE) * SAMPLES_EACH + within;
+        return Corner(first, 0u, dispatch.first_block + first / BLOCK_SAMPLES);
+    }
+    let first = (group.z * (WORKGROUP / LINE) + line) * SAMPLES_EACH;
+    let block = dispatch.first_block + (first / BLOCK_SAMPLES) * dispatch.rows;
+    return Corner(first, tile * LINE + within, block);
+}
+
+// The sample that an invocation takes in its `turn`. Eight neighbours always store at eight
+// neighbouring places, the first of which is a multiple of eight. An invocation's own samples are
+// near each other: track by track 8 apart, frame by frame one.
+fn cell_of(corner: Corner, turn: u32) -> Cell {
+    if dispatch.stride == 1u {
+        let index = corner.first + turn * LINE;
+        let place = dispatch.first_output + index;
+        return Cell(place, place, corner.block, index < dispatch.samples);
+    }
+    let sample = corner.first + turn;
+    let row = sample * dispatch.stride + dispatch.first_output;
+    let place = (row & ~(LINE - 1u)) + corner.column;
+    // What lies before the row wraps to a large number.
+    let track = place - row;
+    let is_inside = (sample < dispatch.samples) & (track < dispatch.rows);
+    return Cell(place, sample, corner.block + track, is_inside);
+}
