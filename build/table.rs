@@ -66,8 +66,8 @@ pub(crate) const LISTS: [(&str, &[&str], &[Read]); 3] = [
 ];
 
 /// What a rotation is stored as: the name of each file of `shaders/stores` that has a function
-/// `store`, and the file that its line `// Needs: FILE.` names.
-pub(crate) fn stores() -> Vec<(&'static str, Option<&'static str>)> {
+/// `store`, and the files that its line `// Needs: FILE, FILE.` names.
+pub(crate) fn stores() -> Vec<(&'static str, Vec<&'static str>)> {
     let mut stores = Vec::new();
     for entry in fs::read_dir("shaders/stores").expect("the stores lie there") {
         let path = entry.expect("a file").path();
@@ -81,7 +81,10 @@ pub(crate) fn stores() -> Vec<(&'static str, Option<&'static str>)> {
         if text.contains("\nfn store(") && !is_wide {
             let mut lines = text.lines();
             let needed = lines.find_map(|line| line.strip_prefix("// Needs: "));
-            stores.push((&*name.leak(), needed.map(|file| file.trim_end_matches('.'))));
+            let needed = needed.map_or_else(Vec::new, |files| {
+                files.trim_end_matches('.').split(", ").collect()
+            });
+            stores.push((&*name.leak(), needed));
         }
     }
     stores.sort_unstable();
@@ -132,6 +135,41 @@ const POSES: [&str; 6] = [
     "poses/smooth",
     "poses/steps",
     "poses/world",
+];
+
+/// Kernels over a crowd, each with the files that it needs.
+const CROWD: [(&str, &[&str]); 6] = [
+    ("crowd/times", &["crowd/entry", "lists/frame_distance"]),
+    ("crowd/rotations", &CROWD_LAYERS),
+    (
+        "crowd/locals",
+        &[
+            "math/canonical",
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "math/polynomial",
+            "math/matrix",
+            "forms/evaluate_arc",
+            "crowd/entry",
+            "crowd/layers",
+        ],
+    ),
+    ("crowd/walk", &["math/canonical", "crowd/affine"]),
+    ("crowd/skin", &["math/canonical", "crowd/affine"]),
+    ("crowd/half", &["math/half"]),
+];
+
+/// What evaluates the layers of an instance.
+const CROWD_LAYERS: [&str; 8] = [
+    "math/canonical",
+    "math/sine_cosine",
+    "math/arc_tangent",
+    "math/quaternion",
+    "math/polynomial",
+    "forms/evaluate_arc",
+    "crowd/entry",
+    "crowd/layers",
 ];
 
 /// The files of the self-test.
@@ -185,6 +223,13 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         kernels.push(Kernel {
             name: file.replace('/', "_"),
             files: shared.into_iter().chain([file]).collect(),
+            reads: Vec::new(),
+        });
+    }
+    for (file, needed) in CROWD {
+        kernels.push(Kernel {
+            name: file.replace('/', "_"),
+            files: [needed, &["crowd", file]].concat(),
             reads: Vec::new(),
         });
     }

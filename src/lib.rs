@@ -72,6 +72,7 @@
 mod auto;
 mod clip;
 mod cpu;
+mod crowd;
 mod curve;
 mod device;
 mod engine;
@@ -100,6 +101,12 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
+pub use crate::crowd::error::CrowdError;
+pub use crate::crowd::layer::CrowdLayer;
+pub use crate::crowd::library::CrowdLibrary;
+pub use crate::crowd::output::{CrowdOutput, CrowdValues};
+pub use crate::crowd::own_device::CrowdTarget;
+pub use crate::crowd::player::Crowd;
 pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;

@@ -1,7 +1,7 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::{Dispatch, Kernel, spirv};
+use crate::shader::{CrowdDispatch, Dispatch, Kernel, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -10,6 +10,10 @@ use ash::vk;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
+
+/// Bytes of the longest arguments of a dispatch; Vulkan allows at least 128.
+const LONGEST_DISPATCH: usize = size_of::<CrowdDispatch>();
+const _: () = assert!(LONGEST_DISPATCH >= size_of::<Dispatch>() && LONGEST_DISPATCH <= 128);
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -59,7 +63,7 @@ impl Pipeline {
         let set_layouts = [pipeline.set_layout];
         let constants = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(size_of::<Dispatch>() as u32)];
+            .size(LONGEST_DISPATCH as u32)];
         let info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&set_layouts)
             .push_constant_ranges(&constants);

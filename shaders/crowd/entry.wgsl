@@ -1,0 +1,27 @@
+// What the kernels over a crowd share: the entries of layers, and where in a clip each stands.
+// Twin: src/twin/crowd_times.rs.
+
+/// What one layer of an instance plays, and since when: all that the host writes when it changes.
+struct CrowdEntry {
+    /// The clip, 16 bits, and above it the weight in units of 2^-15; 0 leaves the layer out.
+    clip_and_weight: u32,
+    /// The speed in units of 2^-16: its magnitude, 23 bits, and whether it runs backwards, 1 bit.
+    /// Above them the mask, 5 bits, the wrap mode, 2 bits, and whether the layer is additive, 1 bit.
+    speed_and_modes: u32,
+    /// The clip's own time in ticks, plus `START_BIAS`, when the clock stood at the anchor.
+    start: u32,
+    /// The anchor: ticks of the clock without the lowest 8 bits.
+    anchor: u32,
+}
+
+/// Where a layer stands in one time base of its clip.
+struct CrowdPlace {
+    /// The span; with the bit `ON_KEY` exactly at its first key.
+    span: u32,
+    /// The parameter in the span, about -1/2 to 1/2.
+    parameter: f32,
+}
+
+// Set in a span's start, and in a place: there is a key.
+const ON_KEY: u32 = 0x80000000;
+const TICKS: u32 = 0x7fffffff;
