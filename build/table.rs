@@ -137,31 +137,8 @@ const POSES: [&str; 6] = [
     "poses/world",
 ];
 
-/// Kernels over a crowd, each with the files that it needs.
-const CROWD: [(&str, &[&str]); 6] = [
-    ("crowd/times", &["crowd/entry", "lists/frame_distance"]),
-    ("crowd/rotations", &CROWD_LAYERS),
-    (
-        "crowd/locals",
-        &[
-            "math/canonical",
-            "math/sine_cosine",
-            "math/arc_tangent",
-            "math/quaternion",
-            "math/polynomial",
-            "math/matrix",
-            "forms/evaluate_arc",
-            "crowd/entry",
-            "crowd/layers",
-        ],
-    ),
-    ("crowd/walk", &["math/canonical", "crowd/affine"]),
-    ("crowd/skin", &["math/canonical", "crowd/affine"]),
-    ("crowd/half", &["math/half"]),
-];
-
-/// What evaluates the layers of an instance.
-const CROWD_LAYERS: [&str; 8] = [
+/// What evaluates the channels of a crowd's joints.
+const CHANNELS: [&str; 8] = [
     "math/canonical",
     "math/sine_cosine",
     "math/arc_tangent",
@@ -169,7 +146,49 @@ const CROWD_LAYERS: [&str; 8] = [
     "math/polynomial",
     "forms/evaluate_arc",
     "crowd/entry",
-    "crowd/layers",
+    "crowd/sampled",
+];
+
+/// Kernels over a crowd, each with the files that it needs, those of [`CHANNELS`] before them or not.
+const CROWD: [(&str, bool, &[&str]); 8] = [
+    (
+        "times",
+        false,
+        &["crowd/entry", "lists/frame_distance", "crowd/times"],
+    ),
+    (
+        "arcs",
+        false,
+        &[
+            "math/canonical",
+            "math/sine_cosine",
+            "forms/evaluate_arc",
+            "crowd/entry",
+            "crowd/arcs",
+        ],
+    ),
+    ("rotations", true, &["crowd/layers", "crowd/rotations"]),
+    (
+        "locals",
+        true,
+        &["math/matrix", "crowd/layers", "crowd/locals"],
+    ),
+    (
+        "locals_alone",
+        true,
+        &["math/matrix", "crowd/alone", "crowd/locals"],
+    ),
+    (
+        "walk",
+        false,
+        &["math/canonical", "crowd/affine", "crowd/walk"],
+    ),
+    (
+        "skin",
+        false,
+        &["math/canonical", "crowd/affine", "crowd/skin"],
+    ),
+    ("half", false, &["math/half", "crowd/half"]),
 ];
 
 /// The files of the self-test.
@@ -226,10 +245,11 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: Vec::new(),
         });
     }
-    for (file, needed) in CROWD {
+    for (name, has_channels, own) in CROWD {
+        let channels: &[&str] = if has_channels { &CHANNELS } else { &[] };
         kernels.push(Kernel {
-            name: file.replace('/', "_"),
-            files: [needed, &["crowd", file]].concat(),
+            name: format!("crowd_{name}"),
+            files: [channels, own, &["crowd"]].concat(),
             reads: Vec::new(),
         });
     }

@@ -26,6 +26,8 @@ mod view_skeletons;
 
 #[path = "../../tests/support/application.rs"]
 mod application;
+#[path = "../../tests/crowd/mod.rs"]
+mod crowd;
 #[path = "support/browser.rs"]
 mod browser;
 #[path = "support/program.rs"]

@@ -22,6 +22,22 @@ struct CrowdPlace {
     parameter: f32,
 }
 
+/// Where one channel (the rotation, the translation or the scale) of a joint lies in a clip.
+struct CrowdChannel {
+    /// The cell of its first constant in the first span.
+    first: u32,
+    /// How many channels lie beside each other: the next constant is `count` cells on. 0 for a channel
+    /// that is constant.
+    count: u32,
+    /// The form, 8 bits, above the place of its time base in the clip, 24 bits.
+    form_and_base: u32,
+    /// The cell of its first key.
+    keys: u32,
+}
+
+// Channels of a joint: the rotation, the translation and the scale.
+const CHANNELS: u32 = 3;
+
 // Set in a span's start, and in a place: there is a key.
 const ON_KEY: u32 = 0x80000000;
 const TICKS: u32 = 0x7fffffff;

@@ -259,6 +259,9 @@ impl ClipTables {
     /// Gives the curves of a clip their places.
     fn add(&mut self, period: u32, curves: &[Curve]) -> Result<(), CrowdError> {
         let first_base = self.bases.len();
+        if self.cells.is_empty() {
+            self.cells.push([0.0; 4]); // kernels use the first cell as 0
+        }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
         let mut sides: HashMap<Side, Vec<usize>> = HashMap::new();
         let mut order: Vec<Side> = Vec::new();
@@ -315,9 +318,22 @@ impl ClipTables {
         for side in order {
             let members = &sides[&side];
             let (_, form, base) = side;
+            if form == FORM_CONSTANT {
+                for &place in members {
+                    let cell = self.cells.len() as u32;
+                    self.cells.push(curves[place].constants[0]);
+                    self.channels[first_channel + place] = CrowdChannel {
+                        first: cell,
+                        count: 0,
+                        form_and_base: form << 24,
+                        keys: cell,
+                    };
+                }
+                continue;
+            }
             let first = self.cells.len();
             let parts = constants_of(form);
-            let spans = curves[members[0]].spans.len().max(1);
+            let spans = curves[members[0]].spans.len();
             for span in 0..spans {
                 for part in 0..parts {
                     let own = |&place: &usize| curves[place].constants[span * parts + part];
@@ -353,6 +369,13 @@ impl ClipTables {
         });
         self.runs.push(self.runs_from(first_channel));
         Ok(())
+    }
+
+    /// Whether no rotation is anything but an arc or a constant.
+    pub(crate) fn has_only_arcs(&self) -> bool {
+        let rotations = self.channels.iter().step_by(CHANNELS as usize);
+        let mut forms = rotations.map(|channel| channel.form_and_base >> 24);
+        forms.all(|form| form == FORM_ARC || form == FORM_CONSTANT)
     }
 
     /// The runs of rotations among the channels from here on.

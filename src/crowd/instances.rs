@@ -56,10 +56,10 @@ impl Instances {
         self.changed[place / 64] |= 1 << (place % 64);
     }
 
-    /// Sets the clock. Entries tell a time from their anchors up to 2^40 ticks, and none before; where
-    /// that would not do, all get new anchors.
+    /// Sets the clock. Entries tell times from their anchors on, up to 2^40 ticks later; where that would
+    /// not do, all get new anchors.
     pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
-        let is_near = (self.since..self.since + (1 << (ELAPSED_BITS - 1))).contains(&clock);
+        let is_near = clock >= self.clock && clock - self.since < 1 << (ELAPSED_BITS - 1);
         if !is_near {
             for place in 0..self.entries.len() {
                 let layer = CrowdLayer::moved(&self.entries[place], clips, self.clock, clock);

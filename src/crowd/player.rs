@@ -116,6 +116,7 @@ impl Crowd {
                 levels: library.levels.clone(),
                 masks: self.cells.masks,
                 references: self.cells.references,
+                only_arcs: tables.has_only_arcs(),
             },
         };
         Ok(Some(Arc::new(DeviceCrowd::new(&opened.engine(), source)?)))

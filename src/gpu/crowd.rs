@@ -16,6 +16,9 @@ use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPlace, Kern
 /// The most bytes that one command may write into a buffer.
 const UPDATE: usize = 1 << 16;
 
+/// The fewest instances of a window: so many that windows start at multiples of 256 bytes.
+const LEAST_WINDOW: u64 = 32;
+
 /// What a crowd's kernels read, as bytes.
 pub(crate) struct CrowdSource<'a> {
     pub(crate) clips: &'a [u8],
@@ -42,6 +45,8 @@ pub(crate) struct CrowdShape {
     /// The cells of the first mask and of the first reference pose.
     pub(crate) masks: u32,
     pub(crate) references: u32,
+    /// Whether all rotations are arcs or constants.
+    pub(crate) only_arcs: bool,
 }
 
 /// What an evaluation leaves: which of the kernels run.
@@ -102,6 +107,10 @@ impl DeviceCrowd {
         let entries = u64::from(shape.instances) * u64::from(shape.layers);
         let entries = entries * size_of::<CrowdEntry>() as u64;
         check("a crowd's instances", entries)?;
+        check(
+            "a window of a crowd's poses",
+            LEAST_WINDOW * 48 * u64::from(shape.joints),
+        )?;
         Ok(Self {
             engine: Arc::clone(engine),
             clips: resident("tumble crowd clips", source.clips)?,
@@ -123,7 +132,6 @@ impl DeviceCrowd {
 
     /// Instances that are evaluated at once: as many as their results fit the device's limits.
     pub(crate) fn window(&self) -> u32 {
-        const STEP: u64 = 32; // so that windows start at multiples of 256 bytes
         let shape = &self.shape;
         let info = &self.engine.device.physical.info;
         let matrices = 48 * u64::from(shape.joints);
@@ -134,8 +142,8 @@ impl DeviceCrowd {
             .min(info.max_memory_allocation_size);
         // Vectors are counted in 32 bits.
         let most = (range / bytes).min(u64::from(u32::MAX / 4) / (bytes / 8));
-        let all = u64::from(shape.instances).next_multiple_of(STEP);
-        (most / STEP * STEP).clamp(STEP, all) as u32
+        let all = u64::from(shape.instances).next_multiple_of(LEAST_WINDOW);
+        (most / LEAST_WINDOW * LEAST_WINDOW).clamp(LEAST_WINDOW, all) as u32
     }
 
     /// Records an evaluation at a time of the clock: the entries that changed, then the dispatches.
@@ -220,13 +228,16 @@ pub(crate) struct CrowdPipelines {
 }
 
 impl CrowdPipelines {
-    pub(crate) fn new(engine: &VulkanEngine, steps: CrowdSteps) -> Result<Self, VulkanError> {
+    pub(crate) fn new(crowd: &DeviceCrowd, steps: CrowdSteps) -> Result<Self, VulkanError> {
+        let (engine, shape) = (&crowd.engine, &crowd.shape);
         let if_wanted = |wanted: bool, kernel| wanted.then(|| engine.pipeline(kernel)).transpose();
         Ok(Self {
             times: engine.pipeline(Kernel::CrowdTimes)?,
-            joints: engine.pipeline(match steps.matrices {
-                true => Kernel::CrowdLocals,
-                false => Kernel::CrowdRotations,
+            joints: engine.pipeline(match (steps.matrices, shape.layers) {
+                (true, 1) => Kernel::CrowdLocalsAlone,
+                (true, _) => Kernel::CrowdLocals,
+                (false, 1) if shape.only_arcs => Kernel::CrowdArcs,
+                (false, _) => Kernel::CrowdRotations,
             })?,
             walk: if_wanted(steps.walk, Kernel::CrowdWalk)?,
             skin: if_wanted(steps.skin, Kernel::CrowdSkin)?,

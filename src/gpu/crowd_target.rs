@@ -66,7 +66,7 @@ impl CrowdTarget {
         let mut target = Self {
             crowd: Arc::clone(crowd),
             steps,
-            pipelines: CrowdPipelines::new(engine, steps)?,
+            pipelines: CrowdPipelines::new(crowd, steps)?,
             window,
             windows: Vec::new(),
             pool: vk::DescriptorPool::null(),

@@ -7,6 +7,7 @@
 //! it.
 
 mod cells;
+mod crowd;
 mod frame;
 mod functions;
 mod kernels;
@@ -40,6 +41,9 @@ fn twins() -> Vec<Twin> {
     all.extend(stores::keys());
     all.extend(kernels::evaluation());
     all.extend(poses::poses());
+    all.extend(crowd::times());
+    all.extend(crowd::layers());
+    all.extend(crowd::matrices());
     all.push(poses::self_test());
     all
 }
