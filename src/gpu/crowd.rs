@@ -130,7 +130,8 @@ impl DeviceCrowd {
         })
     }
 
-    /// Instances that are evaluated at once: as many as their results fit the device's limits.
+    /// Instances that are evaluated at once: as many as their results fit the device's limits, and the
+    /// memory budget.
     pub(crate) fn window(&self) -> u32 {
         let shape = &self.shape;
         let info = &self.engine.device.physical.info;
@@ -140,6 +141,8 @@ impl DeviceCrowd {
         let range = info
             .max_storage_buffer_range
             .min(info.max_memory_allocation_size);
+        let budget = self.engine.clip_bytes().map_or(range, |bytes| bytes as u64);
+        let range = range.min(budget);
         // Vectors are counted in 32 bits.
         let most = (range / bytes).min(u64::from(u32::MAX / 4) / (bytes / 8));
         let all = u64::from(shape.instances).next_multiple_of(LEAST_WINDOW);

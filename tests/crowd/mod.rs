@@ -206,6 +206,9 @@ fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(Strin
         for transfer in [tumble::Transfer::InPlace, tumble::Transfer::Staged] {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
+            if transfer == tumble::Transfer::Staged {
+                options.memory = Some(4096); // so that windows are as short as they may be
+            }
             let engine = Engine::with_options(device.clone(), &options).unwrap();
             let crowd = engine.crowd(library, instances, layers).unwrap();
             all.push((format!("{}, {transfer:?}", engine.device_name()), crowd));
