@@ -4,7 +4,10 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
-use tumble::{Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, TrackSet, method};
+use tumble::{
+    CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Frames, Layout,
+    METHODS, Skeleton, TrackSet, VectorMethod, method,
+};
 
 fn main() {
     divan::main();
@@ -77,5 +80,30 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
             encoding
                 .encode(divan::black_box(&rotations), &mut output)
                 .unwrap();
+        });
+}
+
+/// A frame of a crowd, each character at its own time in a clip of arcs, per joint.
+#[divan::bench(args = [CrowdValues::Rotations, CrowdValues::Model])]
+fn crowd(bencher: Bencher<'_, '_>, values: CrowdValues) {
+    const CHARACTERS: usize = 1000;
+    let skeleton = Skeleton::chain(TRACKS / 4, 0.1).expect("a skeleton");
+    let mut library = CrowdLibrary::new(&skeleton).expect("joints");
+    let set = set(0.3).select(0..TRACKS / 4).expect("tracks");
+    let clip = library.push(&set, method::SLERP, VectorMethod::Linear);
+    let clip = clip.expect("a clip");
+    let mut crowd = one_thread()
+        .crowd(&library, CHARACTERS, 1)
+        .expect("a crowd");
+    for instance in 0..CHARACTERS {
+        let plays = CrowdLayer::new(clip).at(instance as i64 * 9_973);
+        crowd.set(instance, 0, plays).expect("an instance");
+    }
+    let mut output = vec![[0.0; 4]; crowd.output_len(values)];
+    bencher
+        .counter(ItemsCount::new(CHARACTERS * skeleton.len()))
+        .bench_local(|| {
+            crowd.advance(1.0 / 60.0).expect("a short step");
+            crowd.evaluate_into(values, &mut output)
         });
 }

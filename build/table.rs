@@ -109,8 +109,8 @@ fn is_for_cards(list: &str) -> bool {
 }
 
 /// What a rotation is stored as: the name of each file of `shaders/stores` that has a function
-/// `store`, and the file that its line `// Needs: FILE.` names.
-pub(crate) fn stores() -> Vec<(&'static str, Option<&'static str>)> {
+/// `store`, and the files that its line `// Needs: FILE, FILE.` names.
+pub(crate) fn stores() -> Vec<(&'static str, Vec<&'static str>)> {
     let mut stores = Vec::new();
     for entry in fs::read_dir("shaders/stores").expect("the stores lie there") {
         let path = entry.expect("a file").path();
@@ -124,7 +124,10 @@ pub(crate) fn stores() -> Vec<(&'static str, Option<&'static str>)> {
         if text.contains("\nfn store(") && !is_wide {
             let mut lines = text.lines();
             let needed = lines.find_map(|line| line.strip_prefix("// Needs: "));
-            stores.push((&*name.leak(), needed.map(|file| file.trim_end_matches('.'))));
+            let needed = needed.map_or_else(Vec::new, |files| {
+                files.trim_end_matches('.').split(", ").collect()
+            });
+            stores.push((&*name.leak(), needed));
         }
     }
     stores.sort_unstable();
@@ -175,6 +178,60 @@ const POSES: [&str; 6] = [
     "poses/smooth",
     "poses/steps",
     "poses/world",
+];
+
+/// What evaluates the channels of a crowd's joints.
+const CHANNELS: [&str; 8] = [
+    "math/canonical",
+    "math/sine_cosine",
+    "math/arc_tangent",
+    "math/quaternion",
+    "math/polynomial",
+    "forms/evaluate_arc",
+    "crowd/entry",
+    "crowd/sampled",
+];
+
+/// Kernels over a crowd, each with the files that it needs, those of [`CHANNELS`] before them or not.
+const CROWD: [(&str, bool, &[&str]); 8] = [
+    (
+        "times",
+        false,
+        &["crowd/entry", "lists/frame_distance", "crowd/times"],
+    ),
+    (
+        "arcs",
+        false,
+        &[
+            "math/canonical",
+            "math/sine_cosine",
+            "forms/evaluate_arc",
+            "crowd/entry",
+            "crowd/arcs",
+        ],
+    ),
+    ("rotations", true, &["crowd/layers", "crowd/rotations"]),
+    (
+        "locals",
+        true,
+        &["math/matrix", "crowd/layers", "crowd/locals"],
+    ),
+    (
+        "locals_alone",
+        true,
+        &["math/matrix", "crowd/alone", "crowd/locals"],
+    ),
+    (
+        "walk",
+        false,
+        &["math/canonical", "crowd/affine", "crowd/walk"],
+    ),
+    (
+        "skin",
+        false,
+        &["math/canonical", "crowd/affine", "crowd/skin"],
+    ),
+    ("half", false, &["math/half", "crowd/half"]),
 ];
 
 /// The files of the self-test.
@@ -231,6 +288,15 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         kernels.push(Kernel {
             name: file.replace('/', "_"),
             files: shared.into_iter().chain([file]).collect(),
+            reads: Vec::new(),
+            has_texels: false,
+        });
+    }
+    for (name, has_channels, own) in CROWD {
+        let channels: &[&str] = if has_channels { &CHANNELS } else { &[] };
+        kernels.push(Kernel {
+            name: format!("crowd_{name}"),
+            files: [channels, own, &["crowd"]].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

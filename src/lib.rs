@@ -44,10 +44,12 @@
 //!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
 //!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.
 //!   [`Engine::blend`], [`Engine::mix`] and [`Engine::add`] put layers of poses together.
-//! * **Crowds**: keep a [`Clip`] of each animation. Many characters at their own times in one clip are
-//!   one call with [`Frames::at`], a sample for each character, in [`Layout::FrameMajor`]; give the times
-//!   in increasing order: the keys around them are then found in one pass.
-//! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue, and
+//! * **Crowds**: a [`CrowdLibrary`] holds the clips of a skeleton, and a [`Crowd`] plays them: many
+//!   instances, each at its own time, with layers, into matrices for skinning. Without a skeleton, many
+//!   characters at their own times in one [`Clip`] are one call with [`Frames::at`], a sample for each,
+//!   in [`Layout::FrameMajor`]; give the times in increasing order.
+//! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue,
+//!   [`Crowd::record`] records a crowd's poses into its command buffers, and
 //!   [`Clip::evaluate_to_buffer`] leaves the poses in the renderer's buffer. `examples/own_device.rs`
 //!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
 //! * **Bodies that travel**: [`Engine::follow`] moves them along paths, [`Engine::smooth`] takes the
@@ -72,6 +74,7 @@
 mod auto;
 mod clip;
 mod cpu;
+mod crowd;
 mod curve;
 mod device;
 mod engine;
@@ -100,6 +103,12 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
+pub use crate::crowd::error::CrowdError;
+pub use crate::crowd::layer::CrowdLayer;
+pub use crate::crowd::library::CrowdLibrary;
+pub use crate::crowd::output::{CrowdOutput, CrowdValues};
+pub use crate::crowd::own_device::CrowdTarget;
+pub use crate::crowd::player::Crowd;
 pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;

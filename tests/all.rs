@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod bit_identity;
+mod crowd;
 mod encoding;
 mod examples;
 mod external_vectors;

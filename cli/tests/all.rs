@@ -29,6 +29,8 @@ mod view_skeletons;
 mod application;
 #[path = "support/browser.rs"]
 mod browser;
+#[path = "../../tests/crowd/mod.rs"]
+mod crowd;
 #[path = "support/program.rs"]
 mod program;
 #[path = "../../tests/support/mod.rs"]

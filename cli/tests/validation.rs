@@ -234,7 +234,13 @@ fn on_vulkan<'a>(line: &[&'a str]) -> Vec<&'a str> {
 /// `VALIDATE_ALL=1` also those that take longest. Not the one that has a layer of its own.
 #[test]
 fn no_layer_has_anything_to_say_of_the_library() {
-    let mut tests = vec!["poses::", "encoding::", "transforms::", "vulkan::"];
+    let mut tests = vec![
+        "crowd::",
+        "poses::",
+        "encoding::",
+        "transforms::",
+        "vulkan::",
+    ];
     if std::env::var_os("VALIDATE_ALL").is_some() {
         tests.extend(["bit_identity::", "stream::", "outside::"]);
     }

@@ -1,6 +1,6 @@
 // Stores rotations as 3 × 3 matrices, nine numbers each.
 // Twin: src/twin/matrix.rs.
-// Needs: stores/matrix.
+// Needs: math/matrix, stores/matrix.
 
 fn store(place: u32, rotation: vec4f) {
     let rows = matrix_rows(rotation, dispatch.detail);

@@ -1,6 +1,6 @@
 // Stores rotations as 3 × 4 matrices whose translation is 0, twelve numbers each.
 // Twin: src/twin/matrix.rs.
-// Needs: stores/matrix.
+// Needs: math/matrix, stores/matrix.
 
 fn store(place: u32, rotation: vec4f) {
     let detail = dispatch.detail;

@@ -255,7 +255,7 @@ impl VulkanEngine {
     }
 
     /// A buffer with these bytes, in the memory that kernels read fastest.
-    fn resident(
+    pub(crate) fn resident(
         &self,
         name: &str,
         bytes: &[u8],

@@ -3,6 +3,9 @@
 #![allow(unsafe_code)]
 
 pub(crate) mod buffer;
+pub(crate) mod crowd;
+pub(crate) mod crowd_reader;
+pub(crate) mod crowd_target;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;

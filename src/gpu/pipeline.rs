@@ -1,7 +1,7 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
 use crate::gpu::submission::{Access, Binding, Submission};
-use crate::shader::{Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
+use crate::shader::{CrowdDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -11,12 +11,13 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
 
-/// Bytes that come with a dispatch, at most.
+/// Bytes that come with a dispatch, at most; Vulkan allows at least 128.
 const PUSHED: u32 = {
-    assert!(size_of::<Dispatch>() <= size_of::<Grid>());
-    assert!(size_of::<RowShape>() <= size_of::<Grid>());
-    assert!(size_of::<PoseDispatch>() <= size_of::<Grid>());
-    size_of::<Grid>() as u32
+    let most = size_of::<CrowdDispatch>();
+    assert!(size_of::<Dispatch>() <= most && size_of::<Grid>() <= most);
+    assert!(size_of::<RowShape>() <= most && size_of::<PoseDispatch>() <= most);
+    assert!(most <= 128);
+    most as u32
 };
 
 /// A compute pipeline with its layouts.

@@ -115,6 +115,20 @@ impl Submission {
         Ok(submission)
     }
 
+    /// Where commands are recorded.
+    pub(crate) fn commands(&self) -> vk::CommandBuffer {
+        self.commands
+    }
+
+    /// Whether submitted work has ended, as far as a look tells.
+    pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
+        if self.submitted.is_none() {
+            return Ok(true);
+        }
+        // SAFETY: the fence belongs to this device.
+        unsafe { self.device.raw.get_fence_status(self.fence) }.named("vkGetFenceStatus")
+    }
+
     /// Starts recording, with room for `sets` descriptor sets.
     ///
     /// Must not be called while work is pending.

@@ -1,4 +1,4 @@
-//! Twin of `shaders/stores/f16.wgsl`: the same names, the same order.
+//! Twin of `shaders/stores/f16.wgsl` and `shaders/math/half.wgsl`: the same names, the same order.
 
 use crate::shader::LEAST_NORMAL;
 

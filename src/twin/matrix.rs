@@ -1,5 +1,5 @@
-//! Twin of `shaders/stores/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl` and
-//! `shaders/stores/matrix3x4.wgsl`: the same names, the same order.
+//! Twin of `shaders/math/matrix.wgsl`, `shaders/stores/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl`
+//! and `shaders/stores/matrix3x4.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
 
@@ -10,7 +10,7 @@ pub(crate) fn rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
 }
 
 #[inline(always)]
-pub(super) fn matrix_rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
+pub(crate) fn matrix_rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
     let [x, y, z, w] = rotation;
     let along = if detail == 1 { [-x, -y, -z] } else { [x, y, z] };
     let double = along.map(|c| c + c);

@@ -4,6 +4,9 @@
 pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;
 pub(crate) mod axis_angle;
+pub(crate) mod crowd_layers;
+pub(crate) mod crowd_matrices;
+pub(crate) mod crowd_times;
 pub(crate) mod euler;
 pub(crate) mod evaluate;
 pub(crate) mod evaluate_arc;

@@ -8,6 +8,7 @@
 
 mod cells;
 mod coalesced;
+mod crowd;
 mod frame;
 mod functions;
 mod kernels;
@@ -43,6 +44,9 @@ fn twins() -> Vec<Twin> {
     all.extend(kernels::evaluation());
     all.extend(coalesced::coalesced());
     all.extend(poses::poses());
+    all.extend(crowd::times());
+    all.extend(crowd::layers());
+    all.extend(crowd::matrices());
     all.push(poses::self_test());
     all
 }

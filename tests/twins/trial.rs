@@ -36,7 +36,7 @@ impl Trial {
         value.put(cells);
     }
 
-    /// Takes the result from a buffer.
+    /// Takes the result from a buffer; all of it, if [`Trial::global`] filled it.
     pub(super) fn output(&mut self, name: &'static str) {
         self.output = Some(name);
     }
@@ -114,7 +114,9 @@ impl Twin {
                 machine.globals[global(name)].clone_from(cells);
             }
             let count = trial.expected.len();
-            if let Some(name) = trial.output {
+            // A buffer that is filled is read and written.
+            let is_filled = |name| trial.buffers.iter().any(|(own, _)| *own == name);
+            if let Some(name) = trial.output.filter(|&name| !is_filled(name)) {
                 let output = &mut machine.globals[global(name)];
                 output.clear();
                 output.resize(count, UNTOUCHED);

@@ -1,0 +1,24 @@
+// Stores the transform of every joint of every instance in its parent's frame, as the three rows of an
+// affine matrix: T R S.
+// Twin: src/twin/crowd_matrices.rs.
+
+@group(0) @binding(4) var<storage, read_write> matrices: array<vec4f>;
+
+// A row of R with the columns scaled, and the translation behind it.
+fn transform_row(turned: vec3f, scale: vec4f, moved: f32) -> vec4f {
+    let row = canonical(vec4f(turned, 0.0));
+    return canonical(vec4f(row.x * scale.x, row.y * scale.y, row.z * scale.z, moved));
+}
+
+// `place` is a joint of an instance.
+fn crowd_work(place: u32) {
+    let instance = place / dispatch.joints;
+    let joint = place - instance * dispatch.joints;
+    let rows = matrix_rows(layered(instance, joint, ROTATION), 0u);
+    let moved = layered(instance, joint, TRANSLATION);
+    let scale = layered(instance, joint, SCALE);
+    let first = place * 3u;
+    matrices[first] = transform_row(rows.first, scale, moved.x);
+    matrices[first + 1u] = transform_row(rows.second, scale, moved.y);
+    matrices[first + 2u] = transform_row(rows.third, scale, moved.z);
+}

@@ -1,0 +1,426 @@
+//! A clip of a library: the curves of its joints as tables of constants that kernels read.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use crate::crowd::error::{CrowdError, MOST_TICKS};
+use crate::curve::options::Quantity;
+use crate::memory::reserved;
+use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
+use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::prepare::prepared::Prepared;
+use crate::shader::{
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
+    FORM_POLYNOMIAL, Form, ON_KEY, POWERS,
+};
+use crate::time::frame_clock::{FrameClock, in_frames};
+use crate::time::frame_rate::FrameRate;
+use crate::time::spans::{NONE, Source};
+use crate::time::wrap::{TrackCopy, WrapMode};
+use crate::tracks::set::TrackSet;
+use crate::tracks::vectors::Channel;
+use crate::twin::crowd_layers::sampled;
+use crate::twin::crowd_times::place_at;
+
+/// The tables of all clips.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ClipTables {
+    pub(crate) clips: Vec<CrowdClip>,
+    pub(crate) bases: Vec<CrowdBase>,
+    pub(crate) spans: Vec<CrowdSpan>,
+    /// `[clip][joint]`, a rotation, a translation and a scale each.
+    pub(crate) channels: Vec<CrowdChannel>,
+    /// Constants of segments, and keys.
+    pub(crate) cells: Vec<[f32; 4]>,
+    /// Rotations of consecutive joints that lie side by side, `runs[clip]`.
+    pub(crate) runs: Vec<Vec<JointRun>>,
+}
+
+/// Consecutive joints whose rotations are of one form and one time base, and lie side by side.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct JointRun {
+    pub(crate) first_joint: u32,
+    pub(crate) count: u32,
+}
+
+/// One channel before it has its place: its spans, and what it is in each.
+struct Curve {
+    form: u32,
+    spans: Vec<CrowdSpan>,
+    /// The constants of each span, as many as its form has.
+    constants: Vec<[f32; 4]>,
+    /// The key at the start of each span; used where the span says that there is one.
+    keys: Vec<[f32; 4]>,
+}
+
+/// How many constants a form has in each span.
+pub(crate) fn constants_of(form: u32) -> usize {
+    match form {
+        FORM_CONSTANT => 1,
+        FORM_ARC => 2,
+        FORM_CUBIC => 4,
+        _ => POWERS,
+    }
+}
+
+impl Curve {
+    fn new(form: u32) -> Self {
+        Self {
+            form,
+            spans: Vec::new(),
+            constants: Vec::new(),
+            keys: Vec::new(),
+        }
+    }
+
+    fn constant(value: [f32; 4]) -> Self {
+        let mut curve = Self::new(FORM_CONSTANT);
+        curve.constants.push(value);
+        curve
+    }
+
+    /// Adds a span in which the value stays. A curve whose other constants are 0 gives it, bit for bit.
+    fn hold(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
+        let span = CrowdSpan {
+            start,
+            whole: start as i32,
+            scale: 0.0,
+            offset: 0.0,
+        };
+        let mut constants = [[0.0; 4]; POWERS];
+        constants[0] = value;
+        self.push(span, &constants[..constants_of(self.form)], key);
+    }
+
+    fn push(&mut self, mut span: CrowdSpan, constants: &[[f32; 4]], key: Option<[f32; 4]>) {
+        if key.is_some() {
+            span.start |= ON_KEY;
+        }
+        self.spans.push(span);
+        self.constants.extend_from_slice(constants);
+        self.keys.push(key.unwrap_or_default());
+    }
+}
+
+/// The ticks of a clip.
+#[derive(Clone, Copy)]
+struct ClipClock {
+    rate: FrameRate,
+    /// When it starts, seconds.
+    start: f64,
+    period: u32,
+}
+
+/// How the curves of a clip follow from its keys.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClipMethods {
+    pub(crate) rotations: Interpolation,
+    pub(crate) vectors: VectorMethod,
+}
+
+/// The constants of one segment, power by power.
+fn segment(prepared: &Prepared, index: u32, form: u32, constants: &mut Vec<[f32; 4]>) {
+    let segments = &prepared.segments;
+    constants.clear();
+    match form {
+        FORM_ARC => {
+            let arc = &segments.arcs[index as usize];
+            constants.extend([arc.middle, arc.tangent]);
+        }
+        _ => {
+            let all = &segments.polynomials[index as usize].coefficients;
+            constants.extend_from_slice(&all[..constants_of(form)]);
+        }
+    }
+}
+
+/// The curve of one track, as evaluation at frames has it: a frame is a tick.
+fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<Curve, CrowdError> {
+    let mut curve = Curve::new(form);
+    let mut constants = Vec::new();
+    let whole = TrackCopy::own(0..0);
+    let last_tick = f64::from(clock.period);
+    for own in data.parts_in(track, &whole) {
+        let (prepared, part) = (own.prepared, own.part);
+        let frames = FrameClock::new(clock.rate, clock.start, part.end);
+        let constant = |index: u32| prepared.constants[index as usize];
+        let spans = part.spans.clone();
+        let begin = prepared.spans.starts[spans.clone()].first();
+        let begin = frames.boundary(begin.copied().unwrap_or(part.end));
+        if part.before != NONE && begin.first > 0.0 {
+            curve.hold(0, constant(part.before), None);
+        }
+        for place in spans.clone() {
+            let start = prepared.spans.starts[place];
+            let end = match place + 1 < spans.end {
+                true => prepared.spans.starts[place + 1],
+                false => part.end,
+            };
+            let (from, to) = (frames.boundary(start), frames.boundary(end));
+            if from.first >= to.first || from.first > last_tick {
+                continue; // no tick lies in it
+            }
+            let first = from.first as u32;
+            let key = prepared.spans.keys[place];
+            let key = (key != NONE && from.first == from.frame).then(|| constant(key));
+            match prepared.spans.sources[place] {
+                Source::Segment(index) => {
+                    let along = in_frames(from.frame, to.frame, 1.0);
+                    segment(prepared, index, form, &mut constants);
+                    let span = CrowdSpan {
+                        start: first,
+                        whole: along.whole as i32,
+                        scale: along.scale,
+                        offset: along.offset,
+                    };
+                    curve.push(span, &constants, key);
+                }
+                Source::Constant(index) => curve.hold(first, constant(index), key),
+                Source::Exact(_) => {
+                    return Err(CrowdError::TooWild {
+                        track,
+                        seconds: start,
+                    });
+                }
+            }
+        }
+        let end = frames.boundary(part.end);
+        if part.after != NONE && (end.first <= last_tick || curve.spans.is_empty()) {
+            let at_end = part.beyond.as_ref().map(|beyond| beyond.at_end);
+            let key = at_end.filter(|&key| key != NONE && end.first == end.frame);
+            let first = end.first.min(last_tick) as u32;
+            let first = if curve.spans.is_empty() { 0 } else { first };
+            curve.hold(first, constant(part.after), key.map(constant));
+        }
+    }
+    let is_still = curve.spans.len() == 1 && curve.spans[0].scale == 0.0;
+    Ok(match curve.constants.first() {
+        Some(&value) if is_still && curve.spans[0].start & ON_KEY == 0 => Curve::constant(value),
+        _ => curve,
+    })
+}
+
+/// Channels of one kind, one form and one time base, which lie side by side.
+type Side = (u32, u32, u32);
+
+impl ClipTables {
+    /// Adds a clip. `offsets` are where joints without translations hang.
+    pub(crate) fn push(
+        &mut self,
+        set: &TrackSet,
+        methods: ClipMethods,
+        ticks_per_second: u32,
+        offsets: &[Vec3],
+    ) -> Result<(), CrowdError> {
+        let mut interpolation = methods.rotations;
+        if interpolation.quantity != Quantity::Rotation {
+            return Err(CrowdError::NotRotations);
+        }
+        // Instances say how they go on.
+        (interpolation.before, interpolation.after) = (WrapMode::Hold, WrapMode::Hold);
+        let joints = offsets.len();
+        let (start, end) = set.time_span().unwrap_or((0.0, 0.0));
+        let rate = FrameRate::whole(ticks_per_second);
+        let ticks = rate.frames_in(end - start).round();
+        if ticks.is_nan() || ticks > f64::from(MOST_TICKS) {
+            return Err(CrowdError::TooLong {
+                seconds: end - start,
+                ticks_per_second,
+            });
+        }
+        let clock = ClipClock {
+            rate,
+            start,
+            period: (ticks as u32).max(1),
+        };
+        let rotations = ClipData::new(set, interpolation, Wanted::all(set))?;
+        let form = match interpolation.form() {
+            Form::Arc => FORM_ARC,
+            Form::Polynomial => FORM_POLYNOMIAL,
+        };
+        let vectors =
+            |channel| ClipData::of_vectors(set, channel, methods.vectors, &interpolation, None);
+        let translations = vectors(Channel::Translation);
+        let scales = vectors(Channel::Scale);
+        let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
+        for (joint, offset) in offsets.iter().enumerate() {
+            curves.push(curve(&rotations, joint, form, clock)?);
+            curves.push(match set.vectors(Channel::Translation, joint) {
+                Some(_) => curve(&translations, joint, FORM_CUBIC, clock)?,
+                None => Curve::constant([offset.x, offset.y, offset.z, 0.0]),
+            });
+            curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
+        }
+        self.add(clock.period, &curves)
+    }
+
+    /// Gives the curves of a clip their places.
+    fn add(&mut self, period: u32, curves: &[Curve]) -> Result<(), CrowdError> {
+        let first_base = self.bases.len();
+        if self.cells.is_empty() {
+            self.cells.push([0.0; 4]); // kernels use the first cell as 0
+        }
+        let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
+        let mut sides: HashMap<Side, Vec<usize>> = HashMap::new();
+        let mut order: Vec<Side> = Vec::new();
+        for (place, curve) in curves.iter().enumerate() {
+            let base = match curve.form {
+                FORM_CONSTANT => 0,
+                _ => {
+                    let bytes = bytemuck::cast_slice::<_, u8>(&curve.spans).to_vec();
+                    *known.entry(bytes).or_insert_with(|| {
+                        self.bases.push(CrowdBase {
+                            first: self.spans.len() as u32,
+                            count: curve.spans.len() as u32,
+                            step: match curve.spans.len() {
+                                ..2 => 0,
+                                count => 1 << (count - 1).ilog2(),
+                            },
+                        });
+                        self.spans.extend_from_slice(&curve.spans);
+                        (self.bases.len() - 1 - first_base) as u32
+                    })
+                }
+            };
+            let side = (place as u32 % CHANNELS, curve.form, base);
+            sides
+                .entry(side)
+                .or_insert_with(|| {
+                    order.push(side);
+                    Vec::new()
+                })
+                .push(place);
+        }
+        if self.bases.len() == first_base {
+            // Entries always stand somewhere.
+            self.bases.push(CrowdBase {
+                first: self.spans.len() as u32,
+                count: 1,
+                step: 0,
+            });
+            self.spans.push(CrowdSpan {
+                start: 0,
+                whole: 0,
+                scale: 0.0,
+                offset: 0.0,
+            });
+        }
+        let first_channel = self.channels.len();
+        let none = CrowdChannel {
+            first: 0,
+            count: 0,
+            form_and_base: 0,
+            keys: 0,
+        };
+        self.channels.resize(first_channel + curves.len(), none);
+        for side in order {
+            let members = &sides[&side];
+            let (_, form, base) = side;
+            if form == FORM_CONSTANT {
+                for &place in members {
+                    let cell = self.cells.len() as u32;
+                    self.cells.push(curves[place].constants[0]);
+                    self.channels[first_channel + place] = CrowdChannel {
+                        first: cell,
+                        count: 0,
+                        form_and_base: form << 24,
+                        keys: cell,
+                    };
+                }
+                continue;
+            }
+            let first = self.cells.len();
+            let parts = constants_of(form);
+            let spans = curves[members[0]].spans.len();
+            for span in 0..spans {
+                for part in 0..parts {
+                    let own = |&place: &usize| curves[place].constants[span * parts + part];
+                    self.cells.extend(members.iter().map(own));
+                }
+            }
+            let keys = self.cells.len();
+            let of_base = &curves[members[0]].spans;
+            if of_base.iter().any(|span| span.start & ON_KEY != 0) {
+                for span in 0..spans {
+                    self.cells
+                        .extend(members.iter().map(|&place| curves[place].keys[span]));
+                }
+            }
+            for (slot, &place) in members.iter().enumerate() {
+                self.channels[first_channel + place] = CrowdChannel {
+                    first: (first + slot) as u32,
+                    count: members.len() as u32,
+                    form_and_base: form << 24 | base,
+                    keys: (keys + slot) as u32,
+                };
+            }
+        }
+        let counts = [self.cells.len(), self.spans.len(), self.channels.len()];
+        if counts.iter().any(|&count| count > (1 << 31)) || self.bases.len() - first_base > 1 << 24
+        {
+            return Err(CrowdError::TooLarge);
+        }
+        self.clips.push(CrowdClip {
+            period,
+            first_base: first_base as u32,
+            bases: (self.bases.len() - first_base) as u32,
+        });
+        self.runs.push(self.runs_from(first_channel));
+        Ok(())
+    }
+
+    /// Whether no rotation is anything but an arc or a constant.
+    pub(crate) fn has_only_arcs(&self) -> bool {
+        let rotations = self.channels.iter().step_by(CHANNELS as usize);
+        let mut forms = rotations.map(|channel| channel.form_and_base >> 24);
+        forms.all(|form| form == FORM_ARC || form == FORM_CONSTANT)
+    }
+
+    /// The runs of rotations among the channels from here on.
+    fn runs_from(&self, first_channel: usize) -> Vec<JointRun> {
+        let rotations = self.channels[first_channel..]
+            .iter()
+            .step_by(CHANNELS as usize);
+        let mut runs: Vec<JointRun> = Vec::new();
+        let mut before: Option<&CrowdChannel> = None;
+        for (joint, own) in (0..).zip(rotations) {
+            let goes_on = before.is_some_and(|before| {
+                before.form_and_base == own.form_and_base
+                    && before.first + 1 == own.first
+                    && before.count == own.count
+            });
+            before = Some(own);
+            match runs.last_mut() {
+                Some(run) if goes_on => run.count += 1,
+                _ => runs.push(JointRun {
+                    first_joint: joint,
+                    count: 1,
+                }),
+            }
+        }
+        runs
+    }
+
+    /// Every channel of a clip at a tick, and its kind, `[joint][kind]`.
+    pub(crate) fn pose(
+        &self,
+        joints: usize,
+        clip: usize,
+        tick: u32,
+    ) -> impl Iterator<Item = (u32, [f32; 4])> {
+        let own = &self.clips[clip];
+        let tick = tick.min(own.period);
+        let bases = &self.bases[own.first_base as usize..][..own.bases as usize];
+        let places: Vec<_> = (bases.iter())
+            .map(|base| place_at(base, &self.spans, tick))
+            .collect();
+        let each = joints * CHANNELS as usize;
+        let channels = &self.channels[clip * each..][..each];
+        (0..).zip(channels).map(move |(place, channel)| {
+            let own = places[(channel.form_and_base & 0x00ff_ffff) as usize];
+            (place % CHANNELS, sampled(&self.cells, channel, own))
+        })
+    }
+}

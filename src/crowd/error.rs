@@ -1,0 +1,216 @@
+//! Why a crowd cannot be made, changed or evaluated as asked. Places count from 0.
+
+use crate::curve::options::InterpolationError;
+use crate::gpu::error::VulkanError;
+use crate::gpu::recovery::OfDevice;
+use crate::memory::OutOfMemory;
+use crate::time::wrap::WrapMode;
+
+/// The most clips of a library.
+pub(crate) const MOST_CLIPS: usize = 1 << 16;
+/// The most masks of a library, beside the one that lets everything through.
+pub(crate) const MOST_MASKS: usize = 31;
+/// The most instances of a crowd.
+pub(crate) const MOST_INSTANCES: usize = 1_000_000;
+/// The most layers of an instance.
+pub(crate) const MOST_LAYERS: usize = 4;
+/// The longest clip, ticks.
+pub(crate) const MOST_TICKS: u32 = (1 << 31) - (1 << 18);
+/// Speeds stay below this magnitude.
+pub(crate) const FASTEST: f32 = 128.0;
+/// Where a buffer's range may start: Vulkan allows every device to ask for as much.
+pub(crate) const OFFSET_STEP: u64 = 256;
+
+/// Why a crowd cannot be made, changed or evaluated as asked. Places count from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CrowdError {
+    /// A clip of other joints than the library's skeleton.
+    #[error(
+        "the clip has {given} tracks, the skeleton has {joints} joints; give one track for each"
+    )]
+    Tracks {
+        /// Tracks of the set.
+        given: usize,
+        /// Joints of the skeleton.
+        joints: usize,
+    },
+    /// A skeleton without joints.
+    #[error("the skeleton has no joints; a crowd has at least one")]
+    NoJoints,
+    /// A library without clips.
+    #[error("the library has no clips; push one")]
+    NoClips,
+    /// More clips than entries can name.
+    #[error("the library is full: there can be {} clips", MOST_CLIPS)]
+    TooManyClips,
+    /// More masks than entries can name.
+    #[error("the library is full: there can be {} masks", MOST_MASKS)]
+    TooManyMasks,
+    /// The library is larger than indices of 32 bits can tell.
+    #[error(
+        "the library's clips have more constants than 32 bits can count; use fewer or shorter clips"
+    )]
+    TooLarge,
+    /// Ticks of no length.
+    #[error("{given} ticks a second; give 1 to {}", MOST_TICKS)]
+    TicksPerSecond {
+        /// What was given.
+        given: u32,
+    },
+    /// A clip that is too long for its ticks.
+    #[error("the clip takes {seconds} s; at {ticks_per_second} ticks a second there can be {} s", f64::from(MOST_TICKS) / f64::from(*ticks_per_second))]
+    TooLong {
+        /// How long it is.
+        seconds: f64,
+        /// The library's ticks.
+        ticks_per_second: u32,
+    },
+    /// The method is to give velocities.
+    #[error("the interpolation gives velocities or accelerations; a crowd takes rotations")]
+    NotRotations,
+    /// A curve that turns so wildly that no polynomial fits it.
+    #[error(
+        "track {track} turns too wildly at {seconds} s for a polynomial; add a key there, or use slerp"
+    )]
+    TooWild {
+        /// The track.
+        track: usize,
+        /// Where the piece starts, in the set's time.
+        seconds: f64,
+    },
+    /// A track cannot be interpolated as asked.
+    #[error(transparent)]
+    Interpolation(#[from] InterpolationError),
+    /// A mask or a set of matrices is not of the skeleton's joints.
+    #[error("{given} {what} were given for {joints} joints; give one for each")]
+    Joints {
+        /// What was given.
+        what: &'static str,
+        /// How many.
+        given: usize,
+        /// Joints of the skeleton.
+        joints: usize,
+    },
+    /// A weight of a mask outside 0 to 1.
+    #[error("joint {joint} has the weight {weight} in the mask; weights are 0 to 1")]
+    MaskWeight {
+        /// The joint.
+        joint: usize,
+        /// Its weight.
+        weight: f32,
+    },
+    /// An inverse bind matrix with a number that is not finite.
+    #[error("the inverse bind matrix of joint {joint} has a number that is not finite")]
+    BindNotFinite {
+        /// The joint.
+        joint: usize,
+    },
+    /// Skinning matrices of a library without inverse bind matrices.
+    #[error("the library has no inverse bind matrices; set_inverse_bind gives it some")]
+    NoInverseBind,
+    /// Too many instances, or none.
+    #[error("{given} instances; there can be 1 to {}", MOST_INSTANCES)]
+    Instances {
+        /// What was asked for.
+        given: usize,
+    },
+    /// Too many layers, or none.
+    #[error("{given} layers; an instance has 1 to {}", MOST_LAYERS)]
+    Layers {
+        /// What was asked for.
+        given: usize,
+    },
+    /// Something that is not there.
+    #[error("there is no {what} {given}; there are {count}")]
+    Missing {
+        /// An instance, a layer, a clip or a mask.
+        what: &'static str,
+        /// What was asked for.
+        given: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A weight outside 0 to 1.
+    #[error("the weight is {weight}; weights are 0 to 1")]
+    Weight {
+        /// What was given.
+        weight: f32,
+    },
+    /// A speed that is no number, or too fast.
+    #[error(
+        "the speed is {speed}; speeds lie between -{} and {}",
+        FASTEST,
+        FASTEST
+    )]
+    Speed {
+        /// What was given.
+        speed: f32,
+    },
+    /// A wrap mode that crowds do not have.
+    #[error("instances of a crowd hold, loop or mirror their clips, not {wrap:?}")]
+    Wrap {
+        /// What was given.
+        wrap: WrapMode,
+    },
+    /// A time that is no number, or out of reach.
+    #[error("{seconds} s; times and steps of a crowd are finite, and within 2^52 ticks")]
+    Seconds {
+        /// What was given.
+        seconds: f64,
+    },
+    /// The output given is not as large as the result.
+    #[error("the output has {given} values; the result has {needed}")]
+    OutputLength {
+        /// What it holds.
+        given: usize,
+        /// Values of the result.
+        needed: usize,
+    },
+    /// The output is of another precision than what was asked for.
+    #[error("the result is of half precision: {is_half}; use the function for it")]
+    Precision {
+        /// Whether the result is in 16 bits.
+        is_half: bool,
+    },
+    /// Nothing was submitted that could be waited for.
+    #[error("nothing is in flight; call submit first")]
+    NothingSubmitted,
+    /// The result of the submission before was not taken.
+    #[error("the result of the submission before was not taken; call wait_into first")]
+    StillSubmitted,
+    /// A buffer on a Vulkan device is given to an engine that is the CPU, or to another engine's crowd.
+    #[error(
+        "the crowd was not made by an engine on the buffer's Vulkan device; make it with Engine::from_vulkan"
+    )]
+    OtherDevice,
+    /// The range of a buffer that was given for a result does not fit it.
+    #[error(
+        "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {}",
+        OFFSET_STEP
+    )]
+    Buffer {
+        /// Where the range starts, bytes.
+        offset: u64,
+        /// Its length, bytes.
+        size: u64,
+        /// Bytes of the result.
+        needed: u64,
+    },
+    /// The Vulkan device could not be used, or stopped working; after it was lost, the crowd must be
+    /// made again.
+    #[error(transparent)]
+    Vulkan(#[from] VulkanError),
+    /// There is not the memory.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
+}
+
+impl OfDevice for CrowdError {
+    fn vulkan(&self) -> Option<&VulkanError> {
+        match self {
+            Self::Vulkan(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The entries of a crowd's instances, and which of them changed.
+
+use crate::crowd::layer::CrowdLayer;
+use crate::memory::{OutOfMemory, zeroed};
+use crate::shader::{CrowdClip, CrowdEntry};
+use crate::twin::crowd_times::ELAPSED_BITS;
+
+/// The entries, the clock, and the entries that the device does not know yet.
+#[derive(Debug)]
+pub(crate) struct Instances {
+    /// `[instance][layer]`
+    entries: Vec<CrowdEntry>,
+    /// A bit for each entry that changed.
+    changed: Vec<u64>,
+    /// Ticks.
+    clock: u64,
+    /// The time of the clock that no anchor lies before.
+    since: u64,
+}
+
+impl Instances {
+    /// Instances that stand at the start of the first clip; layers above the first are left out.
+    pub(crate) fn new(
+        instances: usize,
+        layers: usize,
+        still: CrowdEntry,
+    ) -> Result<Self, OutOfMemory> {
+        let count = instances * layers;
+        let mut entries: Vec<CrowdEntry> = zeroed(count, "a crowd")?;
+        let mut changed: Vec<u64> = zeroed(count.div_ceil(64), "a crowd")?;
+        for (place, entry) in entries.iter_mut().enumerate() {
+            *entry = still;
+            if place % layers > 0 {
+                entry.clip_and_weight &= 0xffff;
+            }
+            changed[place / 64] |= 1 << (place % 64);
+        }
+        Ok(Self {
+            entries,
+            changed,
+            clock: 0,
+            since: 0,
+        })
+    }
+
+    pub(crate) fn entries(&self) -> &[CrowdEntry] {
+        &self.entries
+    }
+
+    pub(crate) fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    pub(crate) fn set(&mut self, place: usize, entry: CrowdEntry) {
+        self.entries[place] = entry;
+        self.changed[place / 64] |= 1 << (place % 64);
+    }
+
+    /// Sets the clock. Entries tell times from their anchors on, up to 2^40 ticks later; where that would
+    /// not do, all get new anchors.
+    pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
+        let is_near = clock >= self.clock && clock - self.since < 1 << (ELAPSED_BITS - 1);
+        if !is_near {
+            for place in 0..self.entries.len() {
+                let layer = CrowdLayer::moved(&self.entries[place], clips, self.clock, clock);
+                // What an entry says can be said again.
+                if let Ok(mut entry) = layer.packed(clips, masks, clock) {
+                    entry.clip_and_weight = self.entries[place].clip_and_weight;
+                    self.set(place, entry);
+                }
+            }
+            self.since = clock;
+        }
+        self.clock = clock;
+    }
+
+    /// The ranges of entries that changed, which then count as known.
+    pub(crate) fn take_changes(&mut self) -> Changes<'_> {
+        Changes {
+            entries: &self.entries,
+            changed: &mut self.changed,
+            next: 0,
+        }
+    }
+
+    /// From now on the device knows nothing.
+    pub(crate) fn forget(&mut self) {
+        for place in 0..self.entries.len() {
+            self.changed[place / 64] |= 1 << (place % 64);
+        }
+    }
+}
+
+/// Walks over what changed.
+pub(crate) struct Changes<'a> {
+    entries: &'a [CrowdEntry],
+    changed: &'a mut Vec<u64>,
+    next: usize,
+}
+
+impl Changes<'_> {
+    /// The first entry from `from` on whose bit is `wanted`; the number of entries if there is none.
+    fn first_that(&self, from: usize, wanted: bool) -> usize {
+        let mut place = from;
+        while place < self.entries.len() {
+            let word = self.changed[place / 64];
+            let word = if wanted { word } else { !word };
+            let left = word >> (place % 64);
+            if left != 0 {
+                return (place + left.trailing_zeros() as usize).min(self.entries.len());
+            }
+            place = (place / 64 + 1) * 64;
+        }
+        self.entries.len()
+    }
+}
+
+impl<'a> Iterator for Changes<'a> {
+    type Item = (usize, &'a [CrowdEntry]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let first = self.first_that(self.next, true);
+        if first == self.entries.len() {
+            return None;
+        }
+        let end = self.first_that(first, false);
+        self.next = end;
+        Some((first, &self.entries[first..end]))
+    }
+}
+
+impl Drop for Changes<'_> {
+    fn drop(&mut self) {
+        self.changed.fill(0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable as _;
+
+    use super::*;
+
+    #[test]
+    fn changes_are_ranges_and_are_told_once() {
+        let still = CrowdEntry::zeroed();
+        let mut all = Instances::new(100, 2, still).unwrap();
+        let ranges = |all: &mut Instances| -> Vec<_> {
+            let ranges = all.take_changes().map(|(first, own)| (first, own.len()));
+            ranges.collect()
+        };
+        assert_eq!(ranges(&mut all), [(0, 200)]);
+        assert_eq!(ranges(&mut all), []);
+        for place in [0, 1, 63, 64, 65, 130, 199] {
+            all.set(place, still);
+        }
+        assert_eq!(ranges(&mut all), [(0, 2), (63, 3), (130, 1), (199, 1)]);
+        all.forget();
+        assert_eq!(ranges(&mut all), [(0, 200)]);
+    }
+}

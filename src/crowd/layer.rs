@@ -1,0 +1,252 @@
+//! What one layer of an instance plays, and the 16 bytes that say so to the kernels.
+
+use crate::crowd::error::{CrowdError, FASTEST, MOST_MASKS};
+use crate::shader::{
+    CrowdClip, CrowdEntry, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, WEIGHT_UNIT, WRAP_HOLD,
+    WRAP_LOOP, WRAP_MIRROR,
+};
+use crate::time::wrap::WrapMode;
+use crate::twin::crowd_times::{elapsed, tick_of};
+
+/// Units of a speed of 1.
+const SPEED_UNITS: f32 = 65536.0;
+
+/// What a layer of an instance plays.
+///
+/// A clip's own time counts in ticks from its first key
+/// ([`CrowdLibrary::ticks_per_second`](crate::crowd::library::CrowdLibrary::ticks_per_second)). Speeds
+/// are kept in units of 2^-16 and weights in units of 2^-15.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CrowdLayer {
+    /// The clip.
+    pub clip: usize,
+    /// Where in the clip it stands now, ticks; the wrap mode says what lies outside of the clip.
+    pub time: i64,
+    /// Ticks of the clip for a tick of the clock; negative to run backwards.
+    pub speed: f32,
+    /// Whether the clip holds its ends, starts again or runs there and back. The fourth mode,
+    /// [`WrapMode::Extrapolate`], is refused.
+    pub wrap: WrapMode,
+    /// How much of it is laid over the layers below, 0 to 1. The first layer has no weight.
+    pub weight: f32,
+    /// Whether the clip's difference from its reference pose is added to the layers below; else
+    /// they go over into it.
+    pub additive: bool,
+    /// A mask of the library; without one all joints take part.
+    pub mask: Option<usize>,
+}
+
+impl CrowdLayer {
+    /// A clip from its start, once a tick, in a loop, with a weight of 1.
+    #[must_use]
+    pub fn new(clip: usize) -> Self {
+        Self {
+            clip,
+            time: 0,
+            speed: 1.0,
+            wrap: WrapMode::Loop,
+            weight: 1.0,
+            additive: false,
+            mask: None,
+        }
+    }
+
+    /// At another time of its clip, ticks.
+    #[must_use]
+    pub fn at(self, time: i64) -> Self {
+        Self { time, ..self }
+    }
+
+    /// The bytes for the kernels, for a layer that stands at its time when the clock stands at
+    /// `clock`.
+    pub(crate) fn packed(
+        &self,
+        clips: &[CrowdClip],
+        masks: usize,
+        clock: u64,
+    ) -> Result<CrowdEntry, CrowdError> {
+        let missing = |what, given, count| Err(CrowdError::Missing { what, given, count });
+        let Some(clip) = clips.get(self.clip) else {
+            return missing("clip", self.clip, clips.len());
+        };
+        let mask = match self.mask {
+            None => 0,
+            Some(mask) if mask < masks.min(MOST_MASKS) => mask as u32 + 1,
+            Some(mask) => return missing("mask", mask, masks),
+        };
+        if !(0.0..=1.0).contains(&self.weight) {
+            let weight = self.weight;
+            return Err(CrowdError::Weight { weight });
+        }
+        if self.speed.is_nan() || self.speed.abs() >= FASTEST {
+            let speed = self.speed;
+            return Err(CrowdError::Speed { speed });
+        }
+        let wrap = match self.wrap {
+            WrapMode::Hold => WRAP_HOLD,
+            WrapMode::Loop => WRAP_LOOP,
+            WrapMode::Mirror => WRAP_MIRROR,
+            wrap @ WrapMode::Extrapolate => return Err(CrowdError::Wrap { wrap }),
+        };
+        let units = (self.speed.abs() * SPEED_UNITS).round() as u32;
+        let units = units.min(SPEED_MAGNITUDE);
+        let backwards = self.speed < 0.0;
+        let weight = (self.weight / WEIGHT_UNIT).round() as u32;
+        let modes = if backwards { RUNS_BACKWARDS } else { 0 }
+            | mask << 24
+            | wrap << 29
+            | u32::from(self.additive) << 31;
+        // The anchor lies up to 255 ticks before the clock; the layer has moved since.
+        let moved = i64::from(units) * (clock & 0xff) as i64;
+        let moved = match backwards {
+            true => -((moved + 0xffff) >> 16),
+            false => moved >> 16,
+        };
+        let time = folded(self.time, wrap, clip.period);
+        let start = match wrap {
+            WRAP_HOLD => time - moved,
+            wrap => folded(time - moved, wrap, clip.period),
+        };
+        Ok(CrowdEntry {
+            clip_and_weight: self.clip as u32 | weight << 16,
+            speed_and_modes: units | modes,
+            start: (start + i64::from(START_BIAS)) as u32,
+            anchor: (clock >> 8) as u32,
+        })
+    }
+
+    /// What an entry says, at this time of the clock.
+    pub(crate) fn unpacked(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64) -> Self {
+        Self::moved(entry, clips, clock, clock)
+    }
+
+    /// What an entry says at a time of the clock, `to`, before or after the one at which it stands.
+    pub(crate) fn moved(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64, to: u64) -> Self {
+        let modes = entry.speed_and_modes;
+        let units = i128::from(modes & SPEED_MAGNITUDE);
+        let backwards = modes & RUNS_BACKWARDS != 0;
+        let clip = (entry.clip_and_weight & 0xffff) as usize;
+        let (wrap, period) = ((modes >> 29) & 3, clips[clip].period);
+        let since = i128::from(elapsed(entry, clock)) + i128::from(to) - i128::from(clock);
+        let moved = if backwards { -units } else { units } * since;
+        let start = i128::from(entry.start) - i128::from(START_BIAS);
+        let ticks = ((start << 16) + moved) >> 16;
+        let time = match wrap {
+            WRAP_HOLD => ticks.clamp(0, period.into()) as i64,
+            wrap => ticks.rem_euclid(i128::from(period) << (wrap - WRAP_LOOP)) as i64,
+        };
+        let speed = units as f32 / SPEED_UNITS;
+        Self {
+            clip,
+            time,
+            speed: if backwards { -speed } else { speed },
+            wrap: match wrap {
+                WRAP_HOLD => WrapMode::Hold,
+                WRAP_LOOP => WrapMode::Loop,
+                _ => WrapMode::Mirror,
+            },
+            weight: (entry.clip_and_weight >> 16) as f32 * WEIGHT_UNIT,
+            additive: modes >> 31 != 0,
+            mask: (((modes >> 24) & 0x1f) as usize).checked_sub(1),
+        }
+    }
+}
+
+/// The tick of a clip at which an entry stands.
+pub(crate) fn tick(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64) -> u32 {
+    let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];
+    tick_of(entry, clip.period, clock)
+}
+
+/// A time as a wrap mode has it: within the clip, or within there and back.
+fn folded(time: i64, wrap: u32, period: u32) -> i64 {
+    let period = i64::from(period);
+    match wrap {
+        WRAP_HOLD => time.clamp(0, period),
+        WRAP_LOOP => time.rem_euclid(period),
+        _ => time.rem_euclid(2 * period),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// The integers of the kernels agree with whole numbers that never wrap, for days.
+        #[test]
+        fn ticks_are_those_of_the_formula(
+            (period, time) in (1u32..1 << 31, any::<i64>()),
+            (clock, passed) in (0u64..1 << 50, 0u64..1 << 39),
+            (speed, wrap) in (-127.9f32..127.9, 0usize..3),
+        ) {
+            let period = period.min(crate::crowd::error::MOST_TICKS);
+            let clips = [CrowdClip { period, first_base: 0, bases: 0 }];
+            let wrap = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror][wrap];
+            let layer = CrowdLayer { time: time >> 2, speed, wrap, ..CrowdLayer::new(0) };
+            let entry = layer.packed(&clips, 0, clock).unwrap();
+            let now = clock + passed;
+            let along = CrowdLayer::unpacked(&entry, &clips, now);
+            prop_assert!((along.speed - speed).abs() <= 1.0 / SPEED_UNITS);
+            let found = tick(&entry, &clips, now);
+            let expected = match along.time > i64::from(period) {
+                true => 2 * i64::from(period) - along.time,
+                false => along.time,
+            };
+            // A mirrored time between two ticks is cut to the tick below, on the way back too.
+            let back = i64::from(wrap == WrapMode::Mirror && along.time >= i64::from(period));
+            let off = expected - i64::from(found);
+            prop_assert!((0..=back).contains(&off), "{found}, {along:?}");
+        }
+
+        /// A layer that was just set stands where it was told to.
+        #[test]
+        fn what_is_set_is_where_it_says(
+            (period, time, clock) in (1u32..1 << 30, 0i64..1 << 30, 0u64..1 << 50),
+            speed in -127.9f32..127.9,
+        ) {
+            let clips = [CrowdClip { period, first_base: 0, bases: 0 }];
+            let time = time % i64::from(period);
+            for wrap in [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror] {
+                let layer = CrowdLayer { time, speed, wrap, ..CrowdLayer::new(0) };
+                let entry = layer.packed(&clips, 0, clock).unwrap();
+                prop_assert_eq!(i64::from(tick(&entry, &clips, clock)), time);
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_layers_are_refused_by_name() {
+        let clips = [CrowdClip {
+            period: 10,
+            first_base: 0,
+            bases: 0,
+        }];
+        let refused = |layer: CrowdLayer| layer.packed(&clips, 1, 0).unwrap_err();
+        let one = CrowdLayer::new(0);
+        for weight in [f32::NAN, -0.1, 1.1] {
+            let error = refused(CrowdLayer { weight, ..one });
+            assert!(matches!(error, CrowdError::Weight { .. }));
+        }
+        for speed in [f32::NAN, f32::INFINITY, -128.0] {
+            let error = refused(CrowdLayer { speed, ..one });
+            assert!(matches!(error, CrowdError::Speed { .. }));
+        }
+        let mask = Some(1);
+        assert!(matches!(
+            refused(CrowdLayer { mask, ..one }),
+            CrowdError::Missing { what: "mask", .. }
+        ));
+        assert!(matches!(
+            refused(CrowdLayer::new(1)),
+            CrowdError::Missing { what: "clip", .. }
+        ));
+        let wrap = WrapMode::Extrapolate;
+        assert_eq!(
+            refused(CrowdLayer { wrap, ..one }),
+            CrowdError::Wrap { wrap }
+        );
+    }
+}

@@ -1,0 +1,287 @@
+//! A library of clips for one skeleton, prepared for crowds.
+
+use glam::{Affine3A, Vec3};
+
+use crate::crowd::clip_tables::{ClipMethods, ClipTables};
+use crate::crowd::error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
+use crate::math::canonical::{canonical, round_f32};
+use crate::memory::reserved;
+use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
+use crate::pose::skeleton::Skeleton;
+use crate::shader::{CHANNELS, CrowdLink, ROOT, SCALE};
+use crate::tracks::set::TrackSet;
+use crate::twin::crowd_matrices::Rows;
+
+/// Ticks of a second, unless others are asked for: a whole number of them is a frame of 24, 25, 30, 48,
+/// 50, 60, 90, 100, 120, 144, 240 and 360 Hz, and a sample of 44.1 kHz.
+const TICKS_PER_SECOND: u32 = 705_600;
+
+/// A library of clips for one skeleton, prepared for crowds: masks and inverse bind matrices belong
+/// to it.
+///
+/// ```
+/// use tumble::glam::{Quat, Vec3};
+/// use tumble::{CrowdLayer, CrowdLibrary, CrowdValues, Device, Engine, Skeleton, TrackSet, VectorMethod, method};
+/// let mut walk = TrackSet::new();
+/// walk.push("hip", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
+/// walk.push("knee", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(0.5)])?;
+/// let skeleton = Skeleton::new(vec![None, Some(0)], vec![Vec3::ZERO, Vec3::new(0.0, -0.5, 0.0)])?;
+/// let mut library = CrowdLibrary::new(&skeleton)?;
+/// let walk = library.push(&walk, method::SLERP, VectorMethod::Linear)?;
+///
+/// let engine = Engine::new(Device::Cpu)?;
+/// let mut crowd = engine.crowd(&library, 1000, 1)?;
+/// for instance in 0..1000 {
+///     crowd.set(instance, 0, CrowdLayer::new(walk).at(instance as i64 * 700))?;
+/// }
+/// let mut matrices = vec![[0.0; 4]; 1000 * 2 * 3];
+/// crowd.advance(1.0 / 60.0)?;
+/// crowd.evaluate_into(CrowdValues::Model, &mut matrices)?;
+/// assert!((matrices[3 * 3][3] - 0.0).abs() < 1e-6); // knees hang below hips
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct CrowdLibrary {
+    pub(crate) tables: ClipTables,
+    offsets: Vec<Vec3>,
+    /// The joints that have a parent, level by level.
+    pub(crate) links: Vec<CrowdLink>,
+    /// Where each level starts among the links, and at last their end.
+    pub(crate) levels: Vec<u32>,
+    /// A weight for each joint of each mask; the first lets everything through.
+    masks: Vec<f32>,
+    /// The rows of each joint's inverse bind matrix; empty where there are none.
+    pub(crate) bind: Vec<Rows>,
+    /// `[clip][joint]`, a rotation, a translation and the reciprocals of a scale each.
+    references: Vec<[f32; 4]>,
+    ticks_per_second: u32,
+}
+
+impl CrowdLibrary {
+    /// An empty library for a skeleton, with 705 600 ticks a second: clips of up to 50 minutes.
+    ///
+    /// # Errors
+    /// When the skeleton has no joints.
+    pub fn new(skeleton: &Skeleton) -> Result<Self, CrowdError> {
+        Self::with_ticks(skeleton, TICKS_PER_SECOND)
+    }
+
+    /// An empty library for a skeleton, with other ticks: fewer of them for longer clips.
+    ///
+    /// # Errors
+    /// When the skeleton has no joints, or there are no ticks.
+    pub fn with_ticks(skeleton: &Skeleton, ticks_per_second: u32) -> Result<Self, CrowdError> {
+        if !(1..=MOST_TICKS).contains(&ticks_per_second) {
+            let given = ticks_per_second;
+            return Err(CrowdError::TicksPerSecond { given });
+        }
+        let joints = skeleton.len();
+        if joints == 0 {
+            return Err(CrowdError::NoJoints);
+        }
+        let mut offsets = vec![Vec3::ZERO; joints];
+        let mut depths = vec![0u32; joints];
+        let (mut links, mut levels) = (Vec::new(), vec![0]);
+        // Parents come before their children, and so does each level before the next.
+        for link in skeleton.links() {
+            let joint = link.track as usize;
+            offsets[joint] = Vec3::from_array(link.offset.map(canonical));
+            if link.parent == ROOT {
+                continue;
+            }
+            depths[joint] = depths[link.parent as usize] + 1;
+            if depths[joint] as usize > levels.len() {
+                levels.push(links.len() as u32);
+            }
+            links.push(CrowdLink {
+                joint: link.track,
+                parent: link.parent,
+            });
+        }
+        levels.push(links.len() as u32);
+        Ok(Self {
+            tables: ClipTables::default(),
+            offsets,
+            links,
+            levels,
+            masks: vec![1.0; joints],
+            bind: Vec::new(),
+            references: Vec::new(),
+            ticks_per_second,
+        })
+    }
+
+    /// Ticks of a second.
+    #[must_use]
+    pub fn ticks_per_second(&self) -> u32 {
+        self.ticks_per_second
+    }
+
+    /// Number of joints of the skeleton.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.offsets.len()
+    }
+
+    /// Number of clips.
+    #[must_use]
+    pub fn clips(&self) -> usize {
+        self.tables.clips.len()
+    }
+
+    /// Number of masks.
+    #[must_use]
+    pub fn masks(&self) -> usize {
+        self.masks.len() / self.joints() - 1
+    }
+
+    /// How long a clip is, ticks: from the first key of anything to the last, and at least 1. In a loop
+    /// it starts again after so many.
+    #[must_use]
+    pub fn ticks(&self, clip: usize) -> Option<u32> {
+        self.tables.clips.get(clip).map(|clip| clip.period)
+    }
+
+    /// Adds a clip: a track for each joint, the rotations by a method with its options and the
+    /// translations and scales by `vectors`. Joints without translations hang at their offsets in the
+    /// skeleton. Instances say what happens outside the keys, so the wrap modes of `interpolation` do
+    /// not count. The clip's reference pose, for additive layers, is its pose at its start. Returns the
+    /// clip's number.
+    ///
+    /// # Errors
+    /// When the tracks are not those of the skeleton, a track cannot be interpolated as asked or turns
+    /// so wildly that no polynomial fits, or the clip is too long for the ticks.
+    pub fn push(
+        &mut self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        vectors: VectorMethod,
+    ) -> Result<usize, CrowdError> {
+        let (given, joints) = (set.track_count(), self.joints());
+        if given != joints {
+            return Err(CrowdError::Tracks { given, joints });
+        }
+        let clip = self.clips();
+        if clip == MOST_CLIPS {
+            return Err(CrowdError::TooManyClips);
+        }
+        let methods = ClipMethods {
+            rotations: interpolation.into(),
+            vectors,
+        };
+        self.tables
+            .push(set, methods, self.ticks_per_second, &self.offsets)?;
+        let pose = self.tables.pose(joints, clip, 0);
+        self.references.extend(pose.map(reciprocal_scale));
+        Ok(clip)
+    }
+
+    /// Makes the pose of a clip `from` at a tick, held at its ends, the reference pose of a clip: what
+    /// additive layers of it differ from. A reference scale of 0 counts as 1.
+    ///
+    /// # Errors
+    /// When there are no such clips.
+    pub fn set_reference(&mut self, clip: usize, from: usize, tick: u32) -> Result<(), CrowdError> {
+        let (joints, count) = (self.joints(), self.clips());
+        if let Some(given) = [clip, from].into_iter().find(|&given| given >= count) {
+            let what = "clip";
+            return Err(CrowdError::Missing { what, given, count });
+        }
+        let pose: Vec<_> = self.tables.pose(joints, from, tick).collect();
+        let own = &mut self.references[clip * joints * CHANNELS as usize..];
+        for (reference, value) in own.iter_mut().zip(pose) {
+            *reference = reciprocal_scale(value);
+        }
+        Ok(())
+    }
+
+    /// Adds a mask, a weight from 0 to 1 for each joint, that layers' weights are multiplied with.
+    /// Returns its number.
+    ///
+    /// # Errors
+    /// When there is not a weight for each joint, one lies outside, or there are 31 masks already.
+    pub fn push_mask(&mut self, weights: &[f32]) -> Result<usize, CrowdError> {
+        let mask = self.masks();
+        self.check_joints("weights", weights.len())?;
+        if mask == MOST_MASKS {
+            return Err(CrowdError::TooManyMasks);
+        }
+        let outside = |weight: &f32| !(0.0..=1.0).contains(weight);
+        if let Some(joint) = weights.iter().position(outside) {
+            let weight = weights[joint];
+            return Err(CrowdError::MaskWeight { joint, weight });
+        }
+        self.masks
+            .extend(weights.iter().map(|&weight| canonical(weight)));
+        Ok(mask)
+    }
+
+    /// Gives every joint the inverse of its matrix in the model in the pose in which vertices were bound.
+    ///
+    /// # Errors
+    /// When there is not a matrix for each joint, or a number is not finite.
+    pub fn set_inverse_bind(&mut self, matrices: &[Affine3A]) -> Result<(), CrowdError> {
+        self.check_joints("inverse bind matrices", matrices.len())?;
+        if let Some(joint) = matrices.iter().position(|matrix| !matrix.is_finite()) {
+            return Err(CrowdError::BindNotFinite { joint });
+        }
+        let rows = |matrix: &Affine3A| {
+            let [x, y, z, moved] = matrix.to_cols_array_2d();
+            std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]].map(canonical))
+        };
+        self.bind = matrices.iter().map(rows).collect();
+        Ok(())
+    }
+
+    fn check_joints(&self, what: &'static str, given: usize) -> Result<(), CrowdError> {
+        let joints = self.joints();
+        match given == joints {
+            true => Ok(()),
+            false => Err(CrowdError::Joints {
+                what,
+                given,
+                joints,
+            }),
+        }
+    }
+
+    /// Constants of segments and keys, then the masks, then the reference poses.
+    pub(crate) fn cells(&self) -> Result<Cells, CrowdError> {
+        let own = &self.tables.cells;
+        let masks = own.len();
+        let references = masks + self.masks.len();
+        let count = references + self.references.len();
+        if count > 1 << 31 {
+            return Err(CrowdError::TooLarge);
+        }
+        let mut all = reserved(count, "a crowd's library")?;
+        all.extend_from_slice(own);
+        all.extend(self.masks.iter().map(|&weight| [weight, 0.0, 0.0, 0.0]));
+        all.extend_from_slice(&self.references);
+        Ok(Cells {
+            all,
+            masks: masks as u32,
+            references: references as u32,
+        })
+    }
+}
+
+/// All constants that kernels read, and where masks and reference poses start.
+#[derive(Debug)]
+pub(crate) struct Cells {
+    pub(crate) all: Vec<[f32; 4]>,
+    pub(crate) masks: u32,
+    pub(crate) references: u32,
+}
+
+/// A channel's value as reference poses hold it.
+fn reciprocal_scale((kind, value): (u32, [f32; 4])) -> [f32; 4] {
+    match kind {
+        SCALE => value.map(|scale| match scale == 0.0 {
+            true => 1.0,
+            false => round_f32(1.0 / f64::from(scale)),
+        }),
+        _ => value,
+    }
+}

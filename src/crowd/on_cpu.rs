@@ -1,0 +1,229 @@
+//! A crowd on the CPU: instances on all threads, rotations of neighbouring joints in vector lanes.
+
+use bytemuck::Zeroable as _;
+use rayon::prelude::*;
+
+use crate::crowd::clip_tables::ClipTables;
+use crate::crowd::library::{Cells, CrowdLibrary};
+use crate::crowd::output::CrowdValues;
+use crate::shader::{
+    CHANNELS, CrowdEntry, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
+};
+use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::simd::lanes::{Lanes, canonical};
+use crate::twin::crowd_layers::Layers;
+use crate::twin::crowd_matrices::{Rows, affine_product, transform};
+use crate::twin::crowd_times::places;
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
+
+/// Instances of one task.
+const TASK: usize = 32;
+
+/// What is evaluated: the same for all instances.
+#[derive(Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    pub(crate) library: &'a CrowdLibrary,
+    pub(crate) cells: &'a Cells,
+    /// `[instance][layer]`
+    pub(crate) entries: &'a [CrowdEntry],
+    pub(crate) layers: usize,
+    pub(crate) bases: usize,
+    pub(crate) clock: u64,
+    pub(crate) values: CrowdValues,
+}
+
+/// Evaluates all instances into vectors of four numbers, on rayon's current threads.
+pub(crate) fn evaluate(scene: Scene<'_>, width: VectorWidth, output: &mut [[f32; 4]]) {
+    let each = scene.library.joints() * scene.vectors();
+    let tasks = output.par_chunks_mut(each * TASK);
+    let entries = scene.entries.par_chunks(scene.layers * TASK);
+    tasks.zip(entries).for_each_init(
+        || (Vec::new(), Vec::new()),
+        |(places, rotations), (output, entries)| {
+            places.resize(entries.len() * scene.bases, CrowdPlace::zeroed());
+            rotations.resize(scene.library.joints(), [0.0; 4]);
+            let scene = Scene { entries, ..scene };
+            in_lanes_of(
+                width,
+                &mut Task {
+                    scene,
+                    places,
+                    rotations,
+                    output,
+                },
+            );
+        },
+    );
+}
+
+/// Some instances, and memory for what is found on the way.
+struct Task<'a, 'b> {
+    scene: Scene<'a>,
+    places: &'b mut Vec<CrowdPlace>,
+    rotations: &'b mut Vec<[f32; 4]>,
+    output: &'b mut [[f32; 4]],
+}
+
+impl InLanes for Task<'_, '_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Scene {
+            library,
+            entries,
+            layers,
+            bases,
+            ..
+        } = self.scene;
+        let tables = &library.tables;
+        let all = entries.iter().zip(self.places.chunks_exact_mut(bases));
+        for (place, (entry, own)) in all.enumerate() {
+            if place % layers == 0 || entry.clip_and_weight >> 16 != 0 {
+                let clock = self.scene.clock;
+                places(
+                    entry,
+                    clock,
+                    &tables.clips,
+                    &tables.bases,
+                    &tables.spans,
+                    own,
+                );
+            }
+        }
+        let scene = self.scene;
+        let context = scene.layers(self.places);
+        let each = library.joints() * scene.vectors();
+        for (instance, output) in self.output.chunks_exact_mut(each).enumerate() {
+            if scene.values == CrowdValues::Rotations {
+                rotations::<L>(&context, tables, instance, output);
+                continue;
+            }
+            rotations::<L>(&context, tables, instance, self.rotations);
+            let (matrices, _) = output.as_chunks_mut::<3>();
+            locals(&context, instance, self.rotations, matrices);
+            scene.walk(matrices);
+        }
+    }
+}
+
+impl<'a> Scene<'a> {
+    fn vectors(&self) -> usize {
+        match self.values {
+            CrowdValues::Rotations => 1,
+            _ => 3,
+        }
+    }
+
+    fn layers<'p>(&self, places: &'p [CrowdPlace]) -> Layers<'p>
+    where
+        'a: 'p,
+    {
+        Layers {
+            entries: self.entries,
+            channels: &self.library.tables.channels,
+            cells: &self.cells.all,
+            places,
+            joints: self.library.joints() as u32,
+            layers: self.layers as u32,
+            bases: self.bases as u32,
+            masks: self.cells.masks,
+            references: self.cells.references,
+        }
+    }
+
+    /// Makes matrices in the model of those in the parents' frames, and skinning matrices of these.
+    #[inline(always)]
+    fn walk(&self, matrices: &mut [Rows]) {
+        if self.values == CrowdValues::Local {
+            return;
+        }
+        for link in &self.library.links {
+            let joint = link.joint as usize;
+            matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
+        }
+        if self.values == CrowdValues::Skinning {
+            for (matrix, bind) in matrices.iter_mut().zip(&self.library.bind) {
+                *matrix = affine_product(matrix, bind);
+            }
+        }
+    }
+}
+
+/// The rotations of an instance.
+#[inline(always)]
+fn rotations<L: Lanes>(
+    context: &Layers<'_>,
+    tables: &ClipTables,
+    instance: usize,
+    output: &mut [[f32; 4]],
+) {
+    let first = instance * context.layers as usize;
+    let clip = context.entries[first].clip_and_weight & 0xffff;
+    for run in &tables.runs[clip as usize] {
+        let joints = run.first_joint..run.first_joint + run.count;
+        let own = &mut output[joints.start as usize..joints.end as usize];
+        let place = ((clip * context.joints + joints.start) * CHANNELS) as usize;
+        let channel = &context.channels[place];
+        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+        let stands = context.places[first * context.bases as usize + base];
+        if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
+            let middle = (channel.first + stands.span * channel.count * 2) as usize;
+            let tangent = middle + channel.count as usize;
+            let cells = |first: usize| &context.cells[first..first + own.len()];
+            arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
+            continue;
+        }
+        for (joint, value) in joints.zip(own) {
+            let entry = &context.entries[first];
+            *value = context.layer_value(first as u32, entry, joint, ROTATION);
+        }
+    }
+    if context.layers > 1 {
+        for (joint, value) in (0..).zip(output) {
+            *value = context.over(instance as u32, joint, ROTATION, *value);
+        }
+    }
+}
+
+/// Arcs of neighbouring joints at one parameter.
+#[inline(always)]
+fn arcs<L: Lanes>(
+    middles: &[[f32; 4]],
+    tangents: &[[f32; 4]],
+    parameter: f32,
+    output: &mut [[f32; 4]],
+) {
+    let s = L::all(parameter);
+    let arcs = |middles: &[[f32; 4]], tangents: &[[f32; 4]]| {
+        let (middle, tangent) = (L::load_rotations(middles), L::load_rotations(tangents));
+        L::rotations(canonical(on_arc(middle, tangent, norm_squared(tangent), s)))
+    };
+    let whole = output.len() / L::COUNT * L::COUNT;
+    for first in (0..whole).step_by(L::COUNT) {
+        let own = first..first + L::COUNT;
+        let found = arcs(&middles[own.clone()], &tangents[own.clone()]);
+        output[own].copy_from_slice(found.as_ref());
+    }
+    let rest = output.len() - whole;
+    if rest > 0 {
+        // The last vector is filled up with arcs that are left out.
+        let mut ends = [[[0.0; 4]; MOST_LANES]; 2];
+        ends[0][..rest].copy_from_slice(&middles[whole..]);
+        ends[1][..rest].copy_from_slice(&tangents[whole..]);
+        let found = arcs(&ends[0][..L::COUNT], &ends[1][..L::COUNT]);
+        output[whole..].copy_from_slice(&found.as_ref()[..rest]);
+    }
+}
+
+/// Lanes of the widest vectors.
+const MOST_LANES: usize = 16;
+
+/// The matrices of an instance in the parents' frames.
+#[inline(always)]
+fn locals(context: &Layers<'_>, instance: usize, rotations: &[[f32; 4]], matrices: &mut [Rows]) {
+    let instance = instance as u32;
+    for ((joint, &rotation), matrix) in (0..).zip(rotations).zip(matrices) {
+        let moved = context.layered(instance, joint, TRANSLATION);
+        let scale = context.layered(instance, joint, SCALE);
+        *matrix = transform(rotation, moved, scale);
+    }
+}

@@ -1,0 +1,59 @@
+//! What a crowd's evaluation leaves, and how large it is.
+
+/// What is left of every joint of every instance, `[instance][joint]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum CrowdValues {
+    /// The rotation in the parent's frame, `x y z w`.
+    Rotations,
+    /// The transform in the parent's frame, `T R S`: three rows of four numbers, for column vectors,
+    /// the last column the translation.
+    Local,
+    /// The transform in the model, as a matrix likewise.
+    Model,
+    /// The transform in the model times the inverse bind matrix, as vertices are skinned with.
+    Skinning,
+}
+
+/// What a crowd's evaluation leaves, and in which precision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct CrowdOutput {
+    /// What is left of every joint.
+    pub values: CrowdValues,
+    /// Whether numbers are of 16 bits, rounded to nearest from f32, not of 32.
+    pub is_half: bool,
+}
+
+impl From<CrowdValues> for CrowdOutput {
+    fn from(values: CrowdValues) -> Self {
+        Self {
+            values,
+            is_half: false,
+        }
+    }
+}
+
+impl CrowdOutput {
+    /// The same in 16 bits.
+    #[must_use]
+    pub fn half(values: CrowdValues) -> Self {
+        Self {
+            values,
+            is_half: true,
+        }
+    }
+
+    /// Vectors of four numbers for each joint.
+    #[must_use]
+    pub fn vectors(self) -> usize {
+        match self.values {
+            CrowdValues::Rotations => 1,
+            _ => 3,
+        }
+    }
+
+    /// Bytes for each joint.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        self.vectors() * if self.is_half { 8 } else { 16 }
+    }
+}

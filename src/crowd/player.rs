@@ -1,0 +1,460 @@
+//! Crowds: instances that play a library's clips.
+
+use std::sync::Arc;
+
+use crate::crowd::error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
+use crate::crowd::instances::Instances;
+use crate::crowd::layer::{CrowdLayer, tick};
+use crate::crowd::library::{Cells, CrowdLibrary};
+use crate::crowd::on_cpu::{self, Scene};
+use crate::crowd::output::{CrowdOutput, CrowdValues};
+use crate::engine::Engine;
+use crate::evaluate::backend::Backend;
+use crate::gpu::crowd::{CrowdShape, CrowdSource, CrowdSteps, DeviceCrowd};
+use crate::gpu::crowd_reader::CrowdReader;
+use crate::memory::zeroed;
+use crate::shader::CrowdEntry;
+use crate::twin::crowd_matrices::to_any_half;
+
+/// The farthest that a clock goes, ticks: whole numbers of f64.
+const FARTHEST: f64 = (1u64 << 52) as f64;
+
+/// Many instances of a library's skeleton, each of which plays clips at its own time and speed.
+///
+/// All of them follow one clock, which counts whole ticks: where an instance stands is a function of
+/// whole numbers, so that a clip in a loop gives the same bits in the first second and a day later.
+/// What an instance plays is [set](Crowd::set) when it changes, and costs nothing while it goes on.
+///
+/// The CPU and every Vulkan device give the same bits.
+pub struct Crowd {
+    engine: Engine,
+    library: CrowdLibrary,
+    cells: Cells,
+    instances: Instances,
+    layers: usize,
+    bases: usize,
+    pub(crate) device: Option<Arc<DeviceCrowd>>,
+    /// What is in flight, or was evaluated and not taken yet.
+    submitted: Option<Submitted>,
+    /// What evaluates on the device for the host, for the output that was asked for last.
+    reader: Option<(CrowdOutput, CrowdReader)>,
+}
+
+/// A submission that was not taken yet.
+enum Submitted {
+    /// On the CPU it is evaluated when it is taken, as everything stood when it was submitted.
+    OnCpu(CrowdOutput, Vec<[f32; 4]>),
+    OnDevice(CrowdOutput),
+}
+
+impl Engine {
+    /// A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the
+    /// start of the library's first clip until they are [set](Crowd::set). The library is copied, to the
+    /// device too.
+    ///
+    /// # Errors
+    /// When the library has no clips, there are too many instances or layers, or there is not the
+    /// memory.
+    pub fn crowd(
+        &self,
+        library: &CrowdLibrary,
+        instances: usize,
+        layers: usize,
+    ) -> Result<Crowd, CrowdError> {
+        if library.clips() == 0 {
+            return Err(CrowdError::NoClips);
+        }
+        if !(1..=MOST_INSTANCES).contains(&instances) {
+            return Err(CrowdError::Instances { given: instances });
+        }
+        if !(1..=MOST_LAYERS).contains(&layers) {
+            return Err(CrowdError::Layers { given: layers });
+        }
+        let cells = library.cells()?;
+        let still = CrowdLayer {
+            speed: 0.0,
+            ..CrowdLayer::new(0)
+        };
+        let still = still.packed(&library.tables.clips, 0, 0)?;
+        let bases = library.tables.clips.iter().map(|clip| clip.bases).max();
+        let mut crowd = Crowd {
+            engine: self.clone(),
+            library: library.clone(),
+            instances: Instances::new(instances, layers, still)?,
+            layers,
+            bases: bases.unwrap_or(1) as usize,
+            device: None,
+            submitted: None,
+            reader: None,
+            cells,
+        };
+        crowd.device = crowd.uploaded()?;
+        Ok(crowd)
+    }
+}
+
+impl Crowd {
+    /// The tables on the engine's device; `None` on the CPU.
+    fn uploaded(&self) -> Result<Option<Arc<DeviceCrowd>>, CrowdError> {
+        let Backend::Vulkan(opened) = &*self.engine.backend else {
+            return Ok(None);
+        };
+        let (tables, library) = (&self.library.tables, &self.library);
+        let source = CrowdSource {
+            clips: bytemuck::cast_slice(&tables.clips),
+            bases: bytemuck::cast_slice(&tables.bases),
+            spans: bytemuck::cast_slice(&tables.spans),
+            channels: bytemuck::cast_slice(&tables.channels),
+            cells: bytemuck::cast_slice(&self.cells.all),
+            links: bytemuck::cast_slice(&library.links),
+            bind: bytemuck::cast_slice(&library.bind),
+            shape: CrowdShape {
+                instances: self.instances() as u32,
+                layers: self.layers as u32,
+                joints: library.joints() as u32,
+                bases: self.bases as u32,
+                levels: library.levels.clone(),
+                masks: self.cells.masks,
+                references: self.cells.references,
+                only_arcs: tables.has_only_arcs(),
+            },
+        };
+        Ok(Some(Arc::new(DeviceCrowd::new(&opened.engine(), source)?)))
+    }
+
+    /// Number of instances.
+    #[must_use]
+    pub fn instances(&self) -> usize {
+        self.instances.entries().len() / self.layers
+    }
+
+    /// Layers of an instance.
+    #[must_use]
+    pub fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// The library that it was made of.
+    #[must_use]
+    pub fn library(&self) -> &CrowdLibrary {
+        &self.library
+    }
+
+    /// The clock, ticks.
+    #[must_use]
+    pub fn clock(&self) -> u64 {
+        self.instances.clock()
+    }
+
+    /// Sets the clock, ticks; all instances move with it, forwards or backwards.
+    ///
+    /// # Errors
+    /// From 2^52 ticks on, which is two centuries at 705 600 ticks a second.
+    pub fn set_clock(&mut self, ticks: u64) -> Result<(), CrowdError> {
+        let given = ticks as f64;
+        if given >= FARTHEST {
+            let seconds = given / f64::from(self.library.ticks_per_second());
+            return Err(CrowdError::Seconds { seconds });
+        }
+        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        self.instances.set_clock(ticks, clips, masks);
+        Ok(())
+    }
+
+    /// Moves the clock on by some ticks.
+    ///
+    /// # Errors
+    /// As [`Crowd::set_clock`].
+    pub fn advance_ticks(&mut self, ticks: u64) -> Result<(), CrowdError> {
+        self.set_clock(self.clock().saturating_add(ticks))
+    }
+
+    /// Moves the clock on by the ticks nearest to some seconds. Where the sum must not drift, as in a
+    /// film at 30000/1001 frames a second, [`Crowd::set_clock`] to the ticks of each frame's time.
+    ///
+    /// # Errors
+    /// When the seconds are negative or no number, and as [`Crowd::set_clock`].
+    pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
+        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
+        if !(0.0..FARTHEST).contains(&ticks) {
+            return Err(CrowdError::Seconds { seconds });
+        }
+        self.advance_ticks(ticks as u64)
+    }
+
+    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`].
+    ///
+    /// # Errors
+    /// When it is no number, or out of reach.
+    pub fn ticks_of(&self, seconds: f64) -> Result<i64, CrowdError> {
+        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
+        match ticks.abs() < FARTHEST {
+            true => Ok(ticks as i64),
+            false => Err(CrowdError::Seconds { seconds }),
+        }
+    }
+
+    /// Sets what a layer of an instance plays from now on: 16 bytes that reach the device with the next
+    /// evaluation.
+    ///
+    /// # Errors
+    /// When there is no such instance, layer, clip or mask, or a number is out of range; then
+    /// everything stays.
+    pub fn set(
+        &mut self,
+        instance: usize,
+        layer: usize,
+        plays: CrowdLayer,
+    ) -> Result<(), CrowdError> {
+        let place = self.place(instance, layer)?;
+        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        let weight = if layer == 0 { 1.0 } else { plays.weight };
+        let entry = CrowdLayer { weight, ..plays }.packed(clips, masks, self.clock())?;
+        self.instances.set(place, entry);
+        Ok(())
+    }
+
+    /// What a layer of an instance plays, and where it stands now. Speed and weight are as they were
+    /// rounded.
+    ///
+    /// # Errors
+    /// When there is no such instance or layer.
+    pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
+        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        Ok(CrowdLayer::unpacked(
+            entry,
+            &self.library.tables.clips,
+            self.clock(),
+        ))
+    }
+
+    /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's
+    /// length.
+    ///
+    /// # Errors
+    /// When there is no such instance or layer.
+    pub fn tick(&self, instance: usize, layer: usize) -> Result<u32, CrowdError> {
+        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        Ok(tick(entry, &self.library.tables.clips, self.clock()))
+    }
+
+    fn place(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
+        for (what, given, count) in [
+            ("instance", instance, self.instances()),
+            ("layer", layer, self.layers),
+        ] {
+            if given >= count {
+                return Err(CrowdError::Missing { what, given, count });
+            }
+        }
+        Ok(instance * self.layers + layer)
+    }
+
+    /// Vectors of four numbers of a result, `[instance][joint]`.
+    #[must_use]
+    pub fn output_len(&self, output: impl Into<CrowdOutput>) -> usize {
+        self.instances() * self.library.joints() * output.into().vectors()
+    }
+
+    /// Evaluates all instances at the clock's time, `[instance][joint]`: a rotation, or the three rows
+    /// of a matrix. Waits until it is done.
+    ///
+    /// # Errors
+    /// When `output` is not exactly as long as the result, skinning matrices are asked for and the
+    /// library has no inverse bind matrices, a submission is in flight, or the device fails.
+    pub fn evaluate_into(
+        &mut self,
+        values: CrowdValues,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), CrowdError> {
+        self.check_len(output.len(), values.into())?;
+        if self.device.is_some() {
+            self.submit(values)?;
+            return self.wait_into(output);
+        }
+        self.check(values.into())?;
+        self.on_cpu(values, output);
+        Ok(())
+    }
+
+    /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four halves.
+    ///
+    /// # Errors
+    /// As [`Crowd::evaluate_into`].
+    pub fn evaluate_half_into(
+        &mut self,
+        values: CrowdValues,
+        output: &mut [[u16; 4]],
+    ) -> Result<(), CrowdError> {
+        self.check_len(output.len(), values.into())?;
+        self.submit(CrowdOutput::half(values))?;
+        self.wait_half_into(output)
+    }
+
+    /// Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it
+    /// while instances and the clock are changed for the next one. The CPU evaluates before this
+    /// returns.
+    ///
+    /// # Errors
+    /// As [`Crowd::evaluate_into`], and when the result of the submission before was not taken.
+    pub fn submit(&mut self, output: impl Into<CrowdOutput>) -> Result<(), CrowdError> {
+        let output = output.into();
+        self.check(output)?;
+        if self.submitted.is_some() {
+            return Err(CrowdError::StillSubmitted);
+        }
+        let Some(device) = &self.device else {
+            let mut found = zeroed(self.output_len(output), "a crowd's poses")?;
+            self.on_cpu(output.values, &mut found);
+            self.submitted = Some(Submitted::OnCpu(output, found));
+            return Ok(());
+        };
+        let reader = match self.reader.take() {
+            Some((own, reader)) if own == output => reader,
+            _ => CrowdReader::new(device, steps(output))?,
+        };
+        let (_, reader) = self.reader.insert((output, reader));
+        let clock = self.instances.clock();
+        if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
+            // What was recorded may never have reached the device.
+            self.instances.forget();
+            self.reader = None;
+            return Err(error.into());
+        }
+        self.submitted = Some(Submitted::OnDevice(output));
+        Ok(())
+    }
+
+    /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
+    ///
+    /// # Errors
+    /// When nothing was submitted, or the device fails.
+    pub fn poll(&self) -> Result<bool, CrowdError> {
+        match (&self.submitted, &self.reader) {
+            (Some(Submitted::OnCpu(..)), _) => Ok(true),
+            (Some(Submitted::OnDevice(_)), Some((_, reader))) => Ok(reader.is_done()?),
+            _ => Err(CrowdError::NothingSubmitted),
+        }
+    }
+
+    /// Waits for what was submitted, and takes its result.
+    ///
+    /// # Errors
+    /// When nothing was submitted, it was in 16 bits, `output` is not as long as the result, or the
+    /// device fails.
+    pub fn wait_into(&mut self, output: &mut [[f32; 4]]) -> Result<(), CrowdError> {
+        let found = self.taken(output.len(), false)?;
+        match found {
+            Some(found) => output.copy_from_slice(&found),
+            None => self.read(bytemuck::cast_slice_mut(output))?,
+        }
+        Ok(())
+    }
+
+    /// Waits for what was submitted in 16 bits, and takes its result.
+    ///
+    /// # Errors
+    /// As [`Crowd::wait_into`].
+    pub fn wait_half_into(&mut self, output: &mut [[u16; 4]]) -> Result<(), CrowdError> {
+        let found = self.taken(output.len(), true)?;
+        match found {
+            Some(found) => {
+                for (half, value) in output.iter_mut().zip(found) {
+                    *half = value.map(to_any_half);
+                }
+            }
+            None => self.read(bytemuck::cast_slice_mut(output))?,
+        }
+        Ok(())
+    }
+
+    /// Takes a submission for memory of this length: its values, or `None` where the device has them.
+    fn taken(&mut self, given: usize, half: bool) -> Result<Option<Vec<[f32; 4]>>, CrowdError> {
+        let output = match &self.submitted {
+            None => return Err(CrowdError::NothingSubmitted),
+            Some(Submitted::OnCpu(output, _) | Submitted::OnDevice(output)) => *output,
+        };
+        if output.is_half != half {
+            let is_half = output.is_half;
+            return Err(CrowdError::Precision { is_half });
+        }
+        self.check_len(given, output)?;
+        Ok(match self.submitted.take() {
+            Some(Submitted::OnCpu(_, found)) => Some(found),
+            _ => None,
+        })
+    }
+
+    fn read(&mut self, output: &mut [u8]) -> Result<(), CrowdError> {
+        let Some((_, reader)) = &mut self.reader else {
+            return Err(CrowdError::NothingSubmitted);
+        };
+        let read = reader.wait_into(output);
+        if read.is_err() {
+            self.instances.forget();
+            self.reader = None;
+        }
+        Ok(read?)
+    }
+
+    fn check_len(&self, given: usize, output: CrowdOutput) -> Result<(), CrowdError> {
+        let needed = self.output_len(output);
+        match given == needed {
+            true => Ok(()),
+            false => Err(CrowdError::OutputLength { given, needed }),
+        }
+    }
+
+    pub(crate) fn check(&self, output: CrowdOutput) -> Result<(), CrowdError> {
+        match output.values == CrowdValues::Skinning && self.library.bind.is_empty() {
+            true => Err(CrowdError::NoInverseBind),
+            false => Ok(()),
+        }
+    }
+
+    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) {
+        let scene = Scene {
+            library: &self.library,
+            cells: &self.cells,
+            entries: self.instances.entries(),
+            layers: self.layers,
+            bases: self.bases,
+            clock: self.clock(),
+            values,
+        };
+        if let Backend::Cpu(engine) = &*self.engine.backend {
+            engine.on_threads(|| on_cpu::evaluate(scene, engine.width, output));
+        }
+    }
+
+    pub(crate) fn forget(&mut self) {
+        self.instances.forget();
+    }
+
+    /// What changed since the last evaluation, and the clock, for one that is recorded.
+    pub(crate) fn changes(&mut self) -> (u64, impl Iterator<Item = (usize, &[CrowdEntry])>) {
+        (self.instances.clock(), self.instances.take_changes())
+    }
+}
+
+/// The kernels that run for an output.
+pub(crate) fn steps(output: CrowdOutput) -> CrowdSteps {
+    use CrowdValues::{Model, Rotations, Skinning};
+    CrowdSteps {
+        matrices: output.values != Rotations,
+        walk: matches!(output.values, Model | Skinning),
+        skin: output.values == Skinning,
+        half: output.is_half,
+    }
+}
+
+impl std::fmt::Debug for Crowd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Crowd")
+            .field("engine", &self.engine)
+            .field("instances", &self.instances())
+            .field("layers", &self.layers)
+            .field("clock", &self.clock())
+            .finish_non_exhaustive()
+    }
+}

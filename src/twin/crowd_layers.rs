@@ -1,0 +1,162 @@
+//! Twin of `shaders/crowd/sampled.wgsl`, `shaders/crowd/layers.wgsl`, `shaders/crowd/alone.wgsl`,
+//! `shaders/crowd/arcs.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the same order.
+
+use glam::Vec4;
+
+use crate::math::canonical::canonical;
+use crate::math::quaternion::{product, step};
+use crate::shader::{
+    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPlace, FORM_ARC, FORM_CONSTANT,
+    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
+};
+use crate::simd::lanes::Number;
+use crate::twin::evaluate::Evaluate as _;
+use crate::twin::quaternion::{normalised, slerp};
+
+/// What the kernels over layers read. Entries and places are those of a window of instances.
+#[derive(Clone, Copy)]
+pub(crate) struct Layers<'a> {
+    pub(crate) entries: &'a [CrowdEntry],
+    pub(crate) channels: &'a [CrowdChannel],
+    pub(crate) cells: &'a [[f32; 4]],
+    pub(crate) places: &'a [CrowdPlace],
+    pub(crate) joints: u32,
+    /// Layers of an instance.
+    pub(crate) layers: u32,
+    /// The most time bases of a clip.
+    pub(crate) bases: u32,
+    /// The cell of the first mask, and that of the first reference pose.
+    pub(crate) masks: u32,
+    pub(crate) references: u32,
+}
+
+#[inline(always)]
+pub(crate) fn cubic<N: Number>([c0, c1, c2, c3]: [N; 4], s: N) -> N {
+    let z = s * s;
+    c0 + ((c3 * s + c2) * z + c1 * s)
+}
+
+#[inline(always)]
+pub(crate) fn turn_added(
+    base: [f32; 4],
+    layer: [f32; 4],
+    reference: [f32; 4],
+    weight: f32,
+) -> [f32; 4] {
+    let turn = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
+    normalised(product(base, turn)).map(canonical)
+}
+
+#[inline(always)]
+pub(crate) fn laid_over(
+    kind: u32,
+    is_additive: bool,
+    below: [f32; 4],
+    layer: [f32; 4],
+    reference: [f32; 4],
+    weight: f32,
+) -> [f32; 4] {
+    if kind == ROTATION {
+        return match is_additive {
+            true => turn_added(below, layer, reference, weight),
+            false => slerp(below, layer, weight).map(canonical),
+        };
+    }
+    let each = |f: fn(f32, f32, f32, f32) -> f32| {
+        std::array::from_fn(|c| canonical(f(below[c], layer[c], reference[c], weight)))
+    };
+    if !is_additive {
+        return each(|below, layer, _, weight| below + (layer - below) * weight);
+    }
+    if kind == TRANSLATION {
+        return each(|below, layer, reference, weight| below + (layer - reference) * weight);
+    }
+    each(|below, layer, inverse, weight| below + below * ((layer * inverse - 1.0) * weight))
+}
+
+/// A channel where its time base stands.
+#[inline(always)]
+pub(crate) fn sampled(cells: &[[f32; 4]], channel: &CrowdChannel, place: CrowdPlace) -> [f32; 4] {
+    let form = channel.form_and_base >> 24;
+    let span = place.span & TICKS;
+    let count = channel.count;
+    let s = place.parameter;
+    let cell = |place: u32| cells[place as usize];
+    if form == FORM_CONSTANT {
+        return cell(channel.first);
+    }
+    if place.span & ON_KEY != 0 {
+        return cell(channel.keys + span * count);
+    }
+    let value = if form == FORM_ARC {
+        let first = channel.first + span * count * 2;
+        let (middle, tangent) = (cell(first), cell(first + count));
+        ArcSegment { middle, tangent }.at(s)
+    } else if form == FORM_CUBIC {
+        let first = channel.first + span * count * 4;
+        let own = |power: u32| Vec4::from_array(cell(first + power * count));
+        cubic([own(0), own(1), own(2), own(3)], Vec4::splat(s))
+    } else {
+        let first = channel.first + span * count * POWERS as u32;
+        let own = |power: usize| cell(first + power as u32 * count);
+        let coefficients = std::array::from_fn(own);
+        PolynomialSegment { coefficients }.at(s)
+    };
+    value.to_array().map(canonical)
+}
+
+impl Layers<'_> {
+    fn cell(&self, place: u32) -> [f32; 4] {
+        self.cells[place as usize]
+    }
+
+    /// The `kind`th channel of a joint in one layer.
+    #[inline(always)]
+    pub(crate) fn layer_value(
+        &self,
+        layer: u32,
+        entry: &CrowdEntry,
+        joint: u32,
+        kind: u32,
+    ) -> [f32; 4] {
+        let clip = entry.clip_and_weight & 0xffff;
+        let channel = &self.channels[((clip * self.joints + joint) * CHANNELS + kind) as usize];
+        let place = layer * self.bases + (channel.form_and_base & 0x00ff_ffff);
+        sampled(self.cells, channel, self.places[place as usize])
+    }
+
+    /// Lays the layers above the first over its value of a channel.
+    #[inline(always)]
+    pub(crate) fn over(
+        &self,
+        instance: u32,
+        joint: u32,
+        kind: u32,
+        mut value: [f32; 4],
+    ) -> [f32; 4] {
+        let first = instance * self.layers;
+        for layer in first + 1..first + self.layers {
+            let entry = &self.entries[layer as usize];
+            let weight = entry.clip_and_weight >> 16;
+            if weight != 0 {
+                let modes = entry.speed_and_modes;
+                let mask = self.masks + ((modes >> 24) & 0x1f) * self.joints + joint;
+                let own = weight as f32 * WEIGHT_UNIT * self.cell(mask)[0];
+                let clip = entry.clip_and_weight & 0xffff;
+                let reference = self.references + (clip * self.joints + joint) * CHANNELS + kind;
+                let next = self.layer_value(layer, entry, joint, kind);
+                let reference = self.cell(reference);
+                value = laid_over(kind, modes >> 31 != 0, value, next, reference, own);
+            }
+        }
+        value
+    }
+
+    /// The `kind`th channel of a joint, with all layers.
+    #[inline(always)]
+    pub(crate) fn layered(&self, instance: u32, joint: u32, kind: u32) -> [f32; 4] {
+        let first = instance * self.layers;
+        let value = self.layer_value(first, &self.entries[first as usize], joint, kind);
+        self.over(instance, joint, kind, value)
+    }
+}

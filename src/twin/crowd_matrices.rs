@@ -1,0 +1,55 @@
+//! Twin of `shaders/crowd/locals.wgsl`, `shaders/crowd/affine.wgsl`, `shaders/crowd/walk.wgsl`,
+//! `shaders/crowd/skin.wgsl` and `shaders/crowd/half.wgsl`: the same names, the same order.
+
+use crate::math::canonical::canonical;
+use crate::shader::{HALF_INFINITE, HALF_OVERFLOW};
+use crate::twin::f16::to_half;
+use crate::twin::matrix;
+
+/// The three rows of an affine matrix for column vectors.
+pub(crate) type Rows = [[f32; 4]; 3];
+
+/// A row of a rotation's matrix with the columns scaled, and the translation behind it.
+#[inline(always)]
+pub(crate) fn transform_row(turned: [f32; 3], scale: [f32; 4], moved: f32) -> [f32; 4] {
+    let [x, y, z] = turned.map(canonical);
+    [x * scale[0], y * scale[1], z * scale[2], moved].map(canonical)
+}
+
+/// The transform T R S.
+#[inline(always)]
+pub(crate) fn transform(rotation: [f32; 4], moved: [f32; 4], scale: [f32; 4]) -> Rows {
+    let [first, second, third] = matrix::matrix_rows(rotation, 0);
+    [
+        transform_row(first, scale, moved[0]),
+        transform_row(second, scale, moved[1]),
+        transform_row(third, scale, moved[2]),
+    ]
+}
+
+/// A row of the product: this row times the rows of the other matrix.
+#[inline(always)]
+pub(crate) fn row_product(row: [f32; 4], [first, second, third]: &Rows) -> [f32; 4] {
+    let sum = |c: usize| (first[c] * row[0] + second[c] * row[1]) + third[c] * row[2];
+    [sum(0), sum(1), sum(2), sum(3) + row[3]].map(canonical)
+}
+
+/// The product of two affine matrices.
+#[inline(always)]
+pub(crate) fn affine_product(a: &Rows, b: &Rows) -> Rows {
+    [
+        row_product(a[0], b),
+        row_product(a[1], b),
+        row_product(a[2], b),
+    ]
+}
+
+/// The half nearest to a value of any magnitude, ties to even.
+#[inline(always)]
+pub(crate) fn to_any_half(value: f32) -> u16 {
+    let bits = value.to_bits();
+    match bits & 0x7fff_ffff >= HALF_OVERFLOW {
+        true => ((bits >> 16) & 0x8000 | HALF_INFINITE) as u16,
+        false => to_half(value),
+    }
+}

@@ -1,0 +1,495 @@
+//! Crowds: what the engine evaluates of each clip alone, at each instance's own time, with the same
+//! bits on every device, in any second of any day.
+
+mod own_device;
+mod refusals;
+
+use glam::{Affine3A, Quat, Vec3};
+use proptest::prelude::*;
+use tumble::{
+    Crowd, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Device, Engine, EngineOptions,
+    Frames, Layout, METHODS, Method, Skeleton, TrackSet, VectorMethod, VectorWidth, WrapMode,
+    method,
+};
+
+use crate::support::{Random, vulkan_devices};
+
+const ALL: [CrowdValues; 4] = [
+    CrowdValues::Rotations,
+    CrowdValues::Local,
+    CrowdValues::Model,
+    CrowdValues::Skinning,
+];
+
+/// A skeleton whose joints hang from random ones before them; some are roots.
+pub(crate) fn skeleton(random: &mut Random, joints: usize) -> Skeleton {
+    let parents = (0..joints)
+        .map(|joint| match random.next() % 8 {
+            0 => None,
+            _ => (joint > 0).then(|| (random.next() % joint as u64) as usize),
+        })
+        .collect();
+    let offsets = (0..joints)
+        .map(|_| (random.direction() * random.between(0.1, 1.0)).as_vec3())
+        .collect();
+    Skeleton::new(parents, offsets).unwrap()
+}
+
+/// Keys as games have them: most joints at the same times, some at times of their own, some still;
+/// a few with translations and scales.
+pub(crate) fn clip(random: &mut Random, joints: usize, keys: usize) -> TrackSet {
+    let mut shared = Vec::new();
+    let mut time = random.between(-1.0, 2.0);
+    for _ in 0..keys {
+        shared.push(time);
+        time += match random.next() % 4 {
+            0 => random.between(0.01, 0.7),
+            _ => 0.1,
+        };
+    }
+    let mut set = TrackSet::new();
+    for joint in 0..joints {
+        let own: Vec<f64> = match random.next() % 5 {
+            0 => shared.iter().step_by(3).copied().collect(),
+            1 => shared
+                .iter()
+                .take(1 + keys / 2)
+                .map(|t| t + 0.033)
+                .collect(),
+            2 => vec![shared[0]],
+            _ => shared.clone(),
+        };
+        let mut rotation = random.rotation();
+        let mut rotations = Vec::new();
+        for _ in &own {
+            rotations.push(rotation.as_quat());
+            let turn = glam::DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.9));
+            rotation = (rotation * turn).normalize();
+        }
+        set.push(format!("{joint}"), &own, &rotations).unwrap();
+        let vectors = |random: &mut Random, from: f64, to: f64| -> Vec<Vec3> {
+            let own = shared.iter().step_by(2);
+            own.map(|_| (random.direction() * random.between(from, to)).as_vec3())
+                .collect()
+        };
+        let times: Vec<f64> = shared.iter().step_by(2).copied().collect();
+        if joint % 3 == 0 {
+            let keys = vectors(random, 0.0, 2.0);
+            set.set_translations(joint, &times, &keys, &[]).unwrap();
+        }
+        if joint % 4 == 1 {
+            let keys: Vec<Vec3> = vectors(random, 0.0, 0.5);
+            let keys: Vec<Vec3> = keys.into_iter().map(|key| key + 1.0).collect();
+            set.set_scales(joint, &times, &keys, &[]).unwrap();
+        }
+    }
+    set
+}
+
+pub(crate) fn cpu() -> Engine {
+    Engine::new(Device::Cpu).unwrap()
+}
+
+pub(crate) fn bits(values: &[[f32; 4]]) -> Vec<[u32; 4]> {
+    values.iter().map(|own| own.map(f32::to_bits)).collect()
+}
+
+pub(crate) fn evaluated(crowd: &mut Crowd, values: CrowdValues) -> Vec<[f32; 4]> {
+    let mut found = vec![[f32::NAN; 4]; crowd.output_len(values)];
+    crowd.evaluate_into(values, &mut found).unwrap();
+    found
+}
+
+/// Every tick of a clip, each by an instance that stands there, beside the engine's frames.
+#[test]
+fn every_tick_is_the_engines_frame() {
+    const TICKS: u32 = 50;
+    let mut random = Random(1);
+    for method in METHODS {
+        for _ in 0..3 {
+            let joints = 7;
+            let skeleton = skeleton(&mut random, joints);
+            let set = clip(&mut random, joints, 9);
+            let mut library = CrowdLibrary::with_ticks(&skeleton, TICKS).unwrap();
+            let vectors = VectorMethod::BesselOverhauser;
+            match library.push(&set, method, vectors) {
+                Ok(_) => {}
+                Err(error) if error.to_string().contains("too wildly") => continue,
+                Err(error) => panic!("{method}: {error}"),
+            }
+            let period = library.ticks(0).unwrap();
+            let count = period as usize;
+            let mut crowd = cpu().crowd(&library, count, 1).unwrap();
+            for tick in 0..count {
+                let still = CrowdLayer {
+                    speed: 0.0,
+                    ..CrowdLayer::new(0)
+                };
+                crowd.set(tick, 0, still.at(tick as i64)).unwrap();
+            }
+            let frames = Frames::fps(TICKS);
+            let layout = Layout::FrameMajor;
+            let local = cpu()
+                .transforms(&set, method, vectors, &frames, layout)
+                .unwrap();
+            let rotations = evaluated(&mut crowd, CrowdValues::Rotations);
+            let expected = &local.rotations.as_arrays()[..rotations.len()];
+            assert_eq!(bits(&rotations), bits(expected), "{method}");
+
+            let model = cpu().local_to_model(&local, &skeleton, None).unwrap();
+            let found = evaluated(&mut crowd, CrowdValues::Model);
+            let expected = model.as_arrays().as_flattened();
+            for (place, (found, expected)) in found.iter().zip(expected).enumerate() {
+                for (found, expected) in found.iter().zip(expected) {
+                    let off = (found - expected).abs() / (1.0 + expected.abs());
+                    assert!(off < 2e-6, "{method}, {place}: {found}, {expected}");
+                }
+            }
+        }
+    }
+}
+
+/// A library of several clips, with masks, references and inverse bind matrices.
+pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) -> CrowdLibrary {
+    let mut library = CrowdLibrary::new(&skeleton(random, joints)).unwrap();
+    for (place, &method) in methods.iter().enumerate() {
+        let set = clip(random, joints, 2 + 3 * place);
+        library
+            .push(&set, method, VectorMethod::CatmullRom)
+            .unwrap();
+    }
+    for mask in 0..2 {
+        let weights: Vec<f32> = (0..joints)
+            .map(|joint| match (joint + mask) % 3 {
+                0 => 0.0,
+                1 => 1.0,
+                _ => random.unit() as f32,
+            })
+            .collect();
+        library.push_mask(&weights).unwrap();
+    }
+    library.set_reference(0, methods.len() - 1, 5000).unwrap();
+    let bind: Vec<Affine3A> = (0..joints)
+        .map(|_| {
+            let moved = random.direction().as_vec3();
+            Affine3A::from_rotation_translation(random.rotation().as_quat(), moved)
+        })
+        .collect();
+    library.set_inverse_bind(&bind).unwrap();
+    library
+}
+
+pub(crate) fn layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
+    let clip = (random.next() % library.clips() as u64) as usize;
+    CrowdLayer {
+        clip,
+        time: random.between(-3e6, 3e6) as i64,
+        speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
+        wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),
+        weight: random.pick(&[0.0, 1.0, 0.25, 0.7]),
+        additive: random.next() % 2 == 0,
+        mask: random.pick(&[None, Some(0), Some(1)]),
+    }
+}
+
+/// Crowds on the CPU at every width and on every Vulkan device, which play the same.
+fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(String, Crowd)> {
+    let mut all = Vec::new();
+    for width in VectorWidth::available() {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+        let crowd = engine.crowd(library, instances, layers).unwrap();
+        all.push((format!("CPU, {width:?}"), crowd));
+    }
+    for device in vulkan_devices() {
+        for transfer in [tumble::Transfer::InPlace, tumble::Transfer::Staged] {
+            let mut options = EngineOptions::default();
+            options.transfer = transfer;
+            if transfer == tumble::Transfer::Staged {
+                options.memory = Some(4096); // so that windows are as short as they may be
+            }
+            let engine = Engine::with_options(device.clone(), &options).unwrap();
+            let crowd = engine.crowd(library, instances, layers).unwrap();
+            all.push((format!("{}, {transfer:?}", engine.device_name()), crowd));
+        }
+    }
+    all
+}
+
+const SOME: [Method; 4] = [
+    method::SLERP,
+    method::BESSEL_OVERHAUSER,
+    method::STEP,
+    method::CATMULL_ROM,
+];
+
+/// Random libraries, instances, layers, wrap modes and times: the same bits everywhere, when some
+/// instances change and when only the clock moves.
+#[test]
+fn every_device_has_the_bits_of_the_cpu() {
+    let mut random = Random(7);
+    for (round, (joints, instances, layers)) in [(1, 3, 1), (60, 37, 1), (19, 150, 2), (33, 65, 4)]
+        .into_iter()
+        .enumerate()
+    {
+        let library = library(&mut random, joints, &SOME[..=round]);
+        let mut all = crowds(&library, instances, layers);
+        for step in 0..4 {
+            let changed: Vec<_> = (0..instances * layers)
+                .filter(|_| step == 0 || random.next() % 5 == 0)
+                .collect();
+            let plays: Vec<_> = (changed.into_iter())
+                .map(|place| (place, layer(&mut random, &library)))
+                .collect();
+            let ticks = [0, 11_760, 1 << 33, 61_000_000_000][step];
+            let mut expected: Vec<Vec<[u32; 4]>> = Vec::new();
+            for (name, crowd) in &mut all {
+                for &(place, plays) in &plays {
+                    crowd.set(place / layers, place % layers, plays).unwrap();
+                }
+                crowd.advance_ticks(ticks).unwrap();
+                for (place, values) in ALL.into_iter().enumerate() {
+                    let found = bits(&evaluated(crowd, values));
+                    match expected.get(place) {
+                        None => expected.push(found),
+                        Some(expected) => {
+                            let first = expected.iter().zip(&found).position(|(a, b)| a != b);
+                            assert_eq!(first, None, "{name}, {values:?}, step {step}");
+                        }
+                    }
+                    let mut half = vec![[0; 4]; crowd.output_len(values)];
+                    crowd.evaluate_half_into(values, &mut half).unwrap();
+                    let same = |(half, own): (&[u16; 4], &[u32; 4])| {
+                        (half.iter().zip(own)).all(|(&half, &own)| {
+                            let nearest = half::f16_bits(f32::from_bits(own));
+                            half == nearest
+                        })
+                    };
+                    let rounded = half.iter().zip(&expected[place]).all(same);
+                    assert!(rounded, "{name}, {values:?} in 16 bits");
+                }
+            }
+            // Nothing is left as it was before, and nothing is no number.
+            let numbers = expected.iter().flatten().flatten();
+            assert!(
+                numbers
+                    .into_iter()
+                    .all(|&own| f32::from_bits(own).is_finite())
+            );
+        }
+    }
+}
+
+/// Half precision, by the definition: the nearest half, ties to even.
+mod half {
+    pub(super) fn f16_bits(value: f32) -> u16 {
+        let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
+        let size = f64::from(value.abs());
+        // All halves from 0 on lie in the order of their bits.
+        let of = |bits: u16| match bits >> 10 {
+            0 => f64::from(bits) * 2f64.powi(-24),
+            exponent => f64::from(bits & 0x3ff | 0x400) * 2f64.powi(i32::from(exponent) - 25),
+        };
+        let (mut above, mut end) = (0u16, 0x7c00u16);
+        while above < end {
+            let middle = above.midpoint(end);
+            match of(middle) < size {
+                true => above = middle + 1,
+                false => end = middle,
+            }
+        }
+        if above == 0 {
+            return sign;
+        }
+        let below = above - 1;
+        let (down, up) = (size - of(below), of(above) - size);
+        let nearer = match down.partial_cmp(&up) {
+            Some(std::cmp::Ordering::Less) => below,
+            Some(std::cmp::Ordering::Greater) => above,
+            _ => below + below % 2,
+        };
+        sign | nearer
+    }
+}
+
+/// In a loop, days and whole periods change nothing.
+#[test]
+fn a_day_later_the_bits_are_those_of_the_first_second() {
+    let mut random = Random(11);
+    let library = library(&mut random, 12, &[method::SLERP]);
+    let period = u64::from(library.ticks(0).unwrap());
+    let day = 24 * 3600 * u64::from(library.ticks_per_second());
+    let whole = day.div_ceil(period) * period;
+    for (_, mut crowd) in crowds(&library, 40, 1) {
+        for instance in 0..40 {
+            let plays = CrowdLayer {
+                speed: random.pick(&[1.0, -1.0, 2.0]),
+                wrap: WrapMode::Loop,
+                ..CrowdLayer::new(0).at(instance as i64 * 12_345)
+            };
+            crowd.set(instance, 0, plays).unwrap();
+        }
+        crowd.set_clock(4_321).unwrap();
+        let first = bits(&evaluated(&mut crowd, CrowdValues::Model));
+        for days in [1, 2, 30, 400] {
+            crowd.set_clock(4_321 + days * whole).unwrap();
+            assert_eq!(
+                bits(&evaluated(&mut crowd, CrowdValues::Model)),
+                first,
+                "{days}"
+            );
+        }
+        // And back again.
+        crowd.set_clock(4_321).unwrap();
+        assert_eq!(bits(&evaluated(&mut crowd, CrowdValues::Model)), first);
+    }
+}
+
+/// Many steps and one jump come to the same place; a time in the clip and the clock's are the same.
+#[test]
+fn steps_add_up_without_a_rounding() {
+    let mut random = Random(13);
+    let library = library(&mut random, 5, &[method::SLERP, method::BESSEL_OVERHAUSER]);
+    let engine = cpu();
+    let [mut slow, mut fast] = [0; 2].map(|_| engine.crowd(&library, 60, 2).unwrap());
+    for place in 0..120 {
+        let plays = layer(&mut random, &library);
+        for crowd in [&mut slow, &mut fast] {
+            crowd.set(place / 2, place % 2, plays).unwrap();
+        }
+    }
+    for _ in 0..1000 {
+        slow.advance(1.0 / 60.0).unwrap();
+    }
+    fast.advance_ticks(1000 * 11_760).unwrap();
+    let [a, b] = [&mut slow, &mut fast].map(|own| bits(&evaluated(own, CrowdValues::Local)));
+    assert_eq!(a, b);
+    // What `get` says, set again, changes nothing where speeds are whole.
+    for place in 0..120 {
+        let own = slow.get(place / 2, place % 2).unwrap();
+        if own.speed.fract() == 0.0 {
+            slow.set(place / 2, place % 2, own).unwrap();
+        }
+    }
+    assert_eq!(bits(&evaluated(&mut slow, CrowdValues::Local)), a);
+}
+
+/// Layers are those of `mix` and `add`.
+#[test]
+fn layers_are_mixed_and_added_as_poses_are() {
+    let mut random = Random(17);
+    let joints = 9;
+    let skeleton = skeleton(&mut random, joints);
+    let sets = [0; 2].map(|_| clip(&mut random, joints, 6));
+    let mut library = CrowdLibrary::new(&skeleton).unwrap();
+    for set in &sets {
+        library
+            .push(set, method::SLERP, VectorMethod::Linear)
+            .unwrap();
+    }
+    let engine = cpu();
+    let mut crowd = engine.crowd(&library, 1, 2).unwrap();
+    let still = |clip| CrowdLayer {
+        speed: 0.0,
+        wrap: WrapMode::Hold,
+        ..CrowdLayer::new(clip)
+    };
+    let own = [0, 1].map(|clip| {
+        crowd.set(0, 0, still(clip).at(300_000)).unwrap();
+        evaluated(&mut crowd, CrowdValues::Rotations)
+    });
+    crowd.set(0, 0, still(1)).unwrap();
+    let reference = evaluated(&mut crowd, CrowdValues::Rotations);
+    let quats =
+        |own: &[[f32; 4]]| -> Vec<Quat> { own.iter().map(|&q| Quat::from_array(q)).collect() };
+    let rotations = |own: &[[f32; 4]]| {
+        let mut set = TrackSet::new();
+        for (joint, key) in quats(own).into_iter().enumerate() {
+            set.push(format!("{joint}"), &[0.0], &[key]).unwrap();
+        }
+        engine
+            .evaluate(&set, method::STEP, &Frames::at(vec![0.0]))
+            .unwrap()
+    };
+    let [below, above] = [&own[0], &own[1]].map(|own| rotations(own));
+    crowd.set(0, 0, still(0).at(300_000)).unwrap();
+    for weight in [0.25, 0.5, 1.0] {
+        let over = CrowdLayer {
+            weight,
+            ..still(1).at(300_000)
+        };
+        crowd.set(0, 1, over).unwrap();
+        let expected = engine.mix(&below, &above, weight).unwrap();
+        let found = evaluated(&mut crowd, CrowdValues::Rotations);
+        assert_eq!(bits(&found), bits(expected.as_arrays()));
+        let additive = CrowdLayer {
+            additive: true,
+            ..over
+        };
+        crowd.set(0, 1, additive).unwrap();
+        let expected = engine
+            .add(&below, &above, &quats(&reference), weight)
+            .unwrap();
+        let found = evaluated(&mut crowd, CrowdValues::Rotations);
+        assert_eq!(bits(&found), bits(expected.as_arrays()));
+    }
+}
+
+proptest! {
+    /// A time and the same time whole periods later are one, whatever the clock says.
+    #[test]
+    fn whole_periods_change_nothing(
+        (time, periods, clock) in (0i64..1 << 40, -1000i64..1000, 0u64..1 << 50),
+        speed in -100.0f32..100.0,
+    ) {
+        let mut set = TrackSet::new();
+        let keys = [0.0, 1.0, 0.3].map(Quat::from_rotation_x);
+        set.push("", &[0.0, 0.4, 1.1], &keys).unwrap();
+        let mut library = CrowdLibrary::new(&Skeleton::chain(1, 1.0).unwrap()).unwrap();
+        library.push(&set, method::SLERP, VectorMethod::Linear).unwrap();
+        let period = i64::from(library.ticks(0).unwrap());
+        let mut crowd = cpu().crowd(&library, 2, 1).unwrap();
+        crowd.set_clock(clock).unwrap();
+        for (instance, time) in [time, time + 2 * periods * period].into_iter().enumerate() {
+            for wrap in [WrapMode::Loop, WrapMode::Mirror] {
+                let plays = CrowdLayer { speed, wrap, ..CrowdLayer::new(0).at(time) };
+                crowd.set(instance, 0, plays).unwrap();
+            }
+        }
+        crowd.advance(0.7).unwrap();
+        let found = bits(&evaluated(&mut crowd, CrowdValues::Rotations));
+        prop_assert_eq!(found[0], found[1]);
+    }
+}
+
+/// Work in flight is polled, waited for and taken once; what changes meanwhile counts for the next.
+#[test]
+fn submissions_are_taken_once() {
+    let mut random = Random(19);
+    let library = library(&mut random, 8, &[method::SLERP]);
+    for (name, mut crowd) in crowds(&library, 20, 1) {
+        let still = evaluated(&mut crowd, CrowdValues::Rotations);
+        let mut found = vec![[0.0; 4]; still.len()];
+        assert!(crowd.poll().is_err() && crowd.wait_into(&mut found).is_err());
+        crowd.submit(CrowdValues::Rotations).unwrap();
+        crowd.set(3, 0, CrowdLayer::new(0).at(100_000)).unwrap();
+        assert!(crowd.submit(CrowdValues::Local).is_err(), "{name}");
+        let mut half = vec![[0; 4]; still.len()];
+        assert!(crowd.wait_half_into(&mut half).is_err());
+        while !crowd.poll().unwrap() {
+            std::thread::yield_now();
+        }
+        crowd.wait_into(&mut found).unwrap();
+        assert_eq!(bits(&found), bits(&still), "{name}");
+        crowd
+            .submit(CrowdOutput::from(CrowdValues::Rotations))
+            .unwrap();
+        crowd.wait_into(&mut found).unwrap();
+        let moved: Vec<_> = (0..still.len()).filter(|&i| found[i] != still[i]).collect();
+        assert!(
+            !moved.is_empty() && moved.iter().all(|place| place / 8 == 3),
+            "{name}"
+        );
+    }
+}

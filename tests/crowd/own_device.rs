@@ -1,0 +1,207 @@
+//! Crowds on an application's own device, recorded into its own command buffers.
+#![allow(unsafe_code)] // the device, the buffers and the commands are the application's
+
+use ash::vk;
+use tumble::{
+    CrowdError, CrowdLayer, CrowdOutput, CrowdTarget, CrowdValues, Mapping, VulkanBuffer, method,
+};
+
+use super::{ALL, cpu, layer, library};
+use crate::application::Application;
+use crate::support::{Random, vulkan_devices};
+
+/// Command buffers of an application.
+struct Commands<'a> {
+    application: &'a Application,
+    pool: vk::CommandPool,
+}
+
+impl<'a> Commands<'a> {
+    fn new(application: &'a Application) -> Self {
+        let info = vk::CommandPoolCreateInfo::default();
+        // SAFETY: plain creation; destroyed in `drop`.
+        let pool = unsafe { application.device.create_command_pool(&info, None) }.unwrap();
+        Self { application, pool }
+    }
+
+    /// A command buffer with what `record` leaves in it.
+    fn recorded(&self, record: impl FnOnce(vk::CommandBuffer)) -> vk::CommandBuffer {
+        let device = &self.application.device;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(self.pool)
+            .command_buffer_count(1);
+        // SAFETY: plain use of a device that is alive.
+        unsafe {
+            let commands = device.allocate_command_buffers(&info).unwrap()[0];
+            let info = vk::CommandBufferBeginInfo::default();
+            device.begin_command_buffer(commands, &info).unwrap();
+            record(commands);
+            device.end_command_buffer(commands).unwrap();
+            commands
+        }
+    }
+
+    /// Submits several without a wait between them, then waits.
+    fn run(&self, all: &[vk::CommandBuffer]) {
+        for &commands in all {
+            let own = [commands];
+            let submit = [vk::SubmitInfo::default().command_buffers(&own)];
+            let fence = vk::Fence::null();
+            // SAFETY: nobody else uses the queue.
+            unsafe {
+                let device = &self.application.device;
+                device
+                    .queue_submit(self.application.queue, &submit, fence)
+                    .unwrap();
+            }
+        }
+        // SAFETY: as above.
+        unsafe { self.application.device.device_wait_idle() }.unwrap();
+    }
+}
+
+impl Drop for Commands<'_> {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in flight.
+        unsafe {
+            self.application
+                .device
+                .destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+/// Several frames in flight, each into a buffer of its own, in every form: the bits of the CPU.
+#[test]
+fn frames_are_recorded_into_an_applications_commands() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    const FRAMES: usize = 3;
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let mut random = Random(29);
+    let library = library(&mut random, 21, &[method::SLERP, method::BESSEL_OVERHAUSER]);
+    let outputs = ALL
+        .into_iter()
+        .flat_map(|values| [CrowdOutput::from(values), CrowdOutput::half(values)]);
+    for output in outputs {
+        let (mut crowd, mut expected) = (
+            engine.crowd(&library, 33, 2).unwrap(),
+            cpu().crowd(&library, 33, 2).unwrap(),
+        );
+        let commands = Commands::new(&application);
+        let offset = 256;
+        let size = (crowd.output_len(output) * output.bytes() / output.vectors()) as u64;
+        let buffers = [0; FRAMES].map(|_| application.buffer(offset + size));
+        let targets: Vec<CrowdTarget> = (buffers.iter())
+            .map(|&(buffer, _)| {
+                let place = |offset, size| VulkanBuffer {
+                    buffer,
+                    offset,
+                    size,
+                };
+                // SAFETY: the buffer is as it must be, and outlives the target.
+                unsafe {
+                    for wrong in [place(offset + 16, size), place(offset, size - 1)] {
+                        let refused = crowd.target(output, wrong).unwrap_err();
+                        assert!(matches!(refused, CrowdError::Buffer { .. }));
+                    }
+                    crowd.target(output, place(offset, size)).unwrap()
+                }
+            })
+            .collect();
+        let (mut frames, mut wanted) = (Vec::new(), Vec::new());
+        for (frame, target) in targets.iter().enumerate() {
+            for place in 0..66 {
+                if frame == 0 || random.next() % 7 == 0 {
+                    let plays = layer(&mut random, &library);
+                    crowd.set(place / 2, place % 2, plays).unwrap();
+                    expected.set(place / 2, place % 2, plays).unwrap();
+                }
+            }
+            crowd.advance(0.1).unwrap();
+            expected.advance(0.1).unwrap();
+            // SAFETY: the commands are in recording, and submitted below in this order.
+            frames.push(commands.recorded(|own| unsafe { crowd.record(target, own) }.unwrap()));
+            let mut bytes = vec![0u8; size as usize];
+            match output.is_half {
+                true => {
+                    let values: &mut [[u16; 4]] = bytemuck::cast_slice_mut(&mut bytes);
+                    expected.evaluate_half_into(output.values, values).unwrap();
+                }
+                false => {
+                    let values: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut bytes);
+                    expected.evaluate_into(output.values, values).unwrap();
+                }
+            }
+            wanted.push(bytes);
+        }
+        commands.run(&frames);
+        for (&(_, memory), wanted) in buffers.iter().zip(&wanted) {
+            let found = application.bytes(memory, offset + size);
+            assert!(found[offset as usize..] == *wanted, "{output:?}");
+        }
+        drop(targets);
+        for (buffer, memory) in buffers {
+            // SAFETY: nothing is in flight.
+            unsafe {
+                application.device.destroy_buffer(buffer, None);
+                application.device.free_memory(memory, None);
+            }
+        }
+    }
+}
+
+/// A frame that is thrown away keeps changes from the device, until it is told so.
+#[test]
+fn thrown_away_frames_are_told() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let mut random = Random(31);
+    let library = library(&mut random, 3, &[method::SLERP]);
+    let mut crowd = engine.crowd(&library, 5, 1).unwrap();
+    let size = 5 * 3 * 16;
+    let (buffer, memory) = application.buffer(size);
+    let place = VulkanBuffer {
+        buffer,
+        offset: 0,
+        size,
+    };
+    // SAFETY: the buffer is as it must be, and outlives the target.
+    let target = unsafe { crowd.target(CrowdValues::Rotations, place) }.unwrap();
+    let commands = Commands::new(&application);
+    crowd.set(2, 0, CrowdLayer::new(0).at(77_777)).unwrap();
+    // SAFETY: thrown away, which is told.
+    commands.recorded(|own| unsafe { crowd.record(&target, own) }.unwrap());
+    crowd.forget_recorded();
+    // SAFETY: submitted below.
+    let own = commands.recorded(|own| unsafe { crowd.record(&target, own) }.unwrap());
+    commands.run(&[own]);
+    let found = application.bytes(memory, size);
+    let mut expected = cpu().crowd(&library, 5, 1).unwrap();
+    expected.set(2, 0, CrowdLayer::new(0).at(77_777)).unwrap();
+    let expected = super::evaluated(&mut expected, CrowdValues::Rotations);
+    assert!(found == bytemuck::cast_slice::<_, u8>(&expected));
+
+    // Another crowd's target, and the CPU, are refused.
+    let mut other = engine.crowd(&library, 5, 1).unwrap();
+    commands.recorded(|own| {
+        // SAFETY: nothing is recorded.
+        let refused = unsafe { other.record(&target, own) };
+        assert_eq!(refused.unwrap_err(), CrowdError::OtherDevice);
+    });
+    let crowd = cpu().crowd(&library, 5, 1).unwrap();
+    // SAFETY: nothing uses the buffer.
+    let refused = unsafe { crowd.target(CrowdValues::Rotations, place) };
+    assert_eq!(refused.unwrap_err(), CrowdError::OtherDevice);
+    drop(target);
+    // SAFETY: nothing is in flight.
+    unsafe {
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
+}

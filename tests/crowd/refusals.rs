@@ -1,0 +1,156 @@
+//! What a crowd refuses, by name and without a change.
+
+use glam::{Affine3A, Quat, Vec3};
+use tumble::{
+    Axes, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Interpolation, Quantity, Skeleton,
+    TrackSet, VectorMethod, method,
+};
+
+use super::{bits, clip, cpu, evaluated, library};
+use crate::support::Random;
+
+fn one(seconds: f64) -> TrackSet {
+    let mut set = TrackSet::new();
+    let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+    set.push("", &[0.0, seconds], &keys).unwrap();
+    set
+}
+
+#[test]
+fn libraries_refuse_what_does_not_fit() {
+    let linear = VectorMethod::Linear;
+    let none = Skeleton::new(vec![], vec![]).unwrap();
+    assert_eq!(CrowdLibrary::new(&none).unwrap_err(), CrowdError::NoJoints);
+    let single = Skeleton::chain(1, 1.0).unwrap();
+    for given in [0, u32::MAX] {
+        let refused = CrowdLibrary::with_ticks(&single, given).unwrap_err();
+        assert_eq!(refused, CrowdError::TicksPerSecond { given });
+    }
+    let mut library = CrowdLibrary::new(&single).unwrap();
+    assert_eq!(
+        cpu().crowd(&library, 1, 1).unwrap_err(),
+        CrowdError::NoClips
+    );
+    let empty = TrackSet::new();
+    let refused = library.push(&empty, method::SLERP, linear).unwrap_err();
+    assert_eq!(
+        refused,
+        CrowdError::Tracks {
+            given: 0,
+            joints: 1
+        }
+    );
+    let refused = library.push(&one(1e6), method::SLERP, linear).unwrap_err();
+    assert!(matches!(refused, CrowdError::TooLong { .. }), "{refused}");
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::Parent),
+        ..method::SLERP.into()
+    };
+    let refused = library.push(&one(1.0), velocity, linear).unwrap_err();
+    assert_eq!(refused, CrowdError::NotRotations);
+    let mut wild = TrackSet::new();
+    let keys = [0.0, 3.0, 0.5, 2.5, 1.0].map(Quat::from_rotation_x);
+    wild.push("", &[0.0, 0.001, 2.0, 2.001, 5.0], &keys)
+        .unwrap();
+    let refused = library.push(&wild, method::CATMULL_ROM, linear);
+    let bessel = library.push(&wild, method::BESSEL_OVERHAUSER, linear);
+    let is_wild = |result: &Result<usize, CrowdError>| {
+        matches!(result, Err(CrowdError::TooWild { track: 0, .. }))
+    };
+    assert!(
+        is_wild(&refused) || is_wild(&bessel),
+        "{refused:?} {bessel:?}"
+    );
+    // What was refused left nothing behind.
+    let before = library.clips();
+    let clip = library.push(&one(1.0), method::SLERP, linear).unwrap();
+    assert_eq!((clip, library.clips()), (before, before + 1));
+    assert!(library.push_mask(&[]).is_err());
+    for weight in [f32::NAN, -0.5, 2.0] {
+        let refused = library.push_mask(&[weight]).unwrap_err();
+        assert!(matches!(refused, CrowdError::MaskWeight { joint: 0, .. }));
+    }
+    for _ in 0..31 {
+        library.push_mask(&[0.5]).unwrap();
+    }
+    assert_eq!(
+        library.push_mask(&[0.5]).unwrap_err(),
+        CrowdError::TooManyMasks
+    );
+    let nowhere = Affine3A::from_translation(Vec3::NAN);
+    let refused = library.set_inverse_bind(&[nowhere]).unwrap_err();
+    assert_eq!(refused, CrowdError::BindNotFinite { joint: 0 });
+    assert!(library.set_inverse_bind(&[]).is_err());
+    assert!(library.set_reference(0, 99, 0).is_err());
+}
+
+#[test]
+fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
+    let mut random = Random(23);
+    let library = library(&mut random, 4, &[method::SLERP]);
+    let engine = cpu();
+    for (instances, layers) in [(0, 1), (1_000_001, 1), (1, 0), (1, 5)] {
+        assert!(engine.crowd(&library, instances, layers).is_err());
+    }
+    let mut crowd = engine.crowd(&library, 3, 2).unwrap();
+    crowd.set(1, 1, CrowdLayer::new(0)).unwrap();
+    let before = bits(&evaluated(&mut crowd, CrowdValues::Skinning));
+    let plays = CrowdLayer::new(0);
+    let hostile = [
+        CrowdLayer::new(1),
+        CrowdLayer {
+            speed: f32::NAN,
+            ..plays
+        },
+        CrowdLayer {
+            speed: f32::INFINITY,
+            ..plays
+        },
+        CrowdLayer {
+            weight: f32::NAN,
+            ..plays
+        },
+        CrowdLayer {
+            weight: -1.0,
+            ..plays
+        },
+        CrowdLayer {
+            mask: Some(7),
+            ..plays
+        },
+    ];
+    for plays in hostile {
+        crowd.set(1, 1, plays).unwrap_err();
+    }
+    assert!(crowd.set(3, 0, plays).is_err() && crowd.set(0, 2, plays).is_err());
+    assert!(crowd.get(3, 0).is_err() && crowd.tick(0, 2).is_err());
+    for seconds in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
+        let refused = crowd.advance(seconds).unwrap_err();
+        assert!(matches!(refused, CrowdError::Seconds { .. }));
+    }
+    assert!(crowd.ticks_of(f64::NAN).is_err() && crowd.set_clock(u64::MAX).is_err());
+    let needed = crowd.output_len(CrowdValues::Model);
+    let mut short = vec![[0.0; 4]; needed - 1];
+    let refused = crowd.evaluate_into(CrowdValues::Model, &mut short);
+    let given = needed - 1;
+    assert_eq!(
+        refused.unwrap_err(),
+        CrowdError::OutputLength { given, needed }
+    );
+    assert_eq!(bits(&evaluated(&mut crowd, CrowdValues::Skinning)), before);
+    // Times far outside are folded, not refused.
+    for time in [i64::MIN, i64::MAX] {
+        crowd.set(0, 0, plays.at(time)).unwrap();
+        let found = evaluated(&mut crowd, CrowdValues::Rotations);
+        assert!(found.as_flattened().iter().all(|number| number.is_finite()));
+    }
+
+    let skeleton = super::skeleton(&mut random, 4);
+    let mut plain = CrowdLibrary::new(&skeleton).unwrap();
+    let set = clip(&mut random, 4, 5);
+    plain.push(&set, method::SLERP, VectorMethod::Step).unwrap();
+    let mut crowd = engine.crowd(&plain, 1, 1).unwrap();
+    let mut output = vec![[0.0; 4]; crowd.output_len(CrowdValues::Skinning)];
+    let refused = crowd.evaluate_into(CrowdValues::Skinning, &mut output);
+    assert_eq!(refused.unwrap_err(), CrowdError::NoInverseBind);
+}

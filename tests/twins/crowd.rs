@@ -1,0 +1,653 @@
+//! The kernels over a crowd, each function beside its twin.
+
+use crate::shader::{
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPlace, CrowdSpan, FORM_ARC,
+    FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, ROTATION, RUNS_BACKWARDS, SCALE,
+    START_BIAS, TRANSLATION,
+};
+use crate::twin::crowd_layers::{Layers, cubic, laid_over, sampled, turn_added};
+use crate::twin::crowd_matrices::{
+    Rows, affine_product, row_product, to_any_half, transform, transform_row,
+};
+use crate::twin::crowd_times::{in_parts, place_at, places, span_at, tick_of, wide_remainder};
+
+use super::cells::Cells;
+use super::random::Random;
+use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
+
+const TIMES: &str = "crowd_times";
+const LAYERS: &str = "crowd_rotations";
+const LOCALS: &str = "crowd_locals";
+
+impl Cells for CrowdEntry {
+    fn put(&self, cells: &mut Vec<u64>) {
+        let own = [
+            self.clip_and_weight,
+            self.speed_and_modes,
+            self.start,
+            self.anchor,
+        ];
+        own.put(cells);
+    }
+}
+
+impl Cells for CrowdPlace {
+    fn put(&self, cells: &mut Vec<u64>) {
+        (self.span, self.parameter).put(cells);
+    }
+}
+
+impl Cells for CrowdChannel {
+    fn put(&self, cells: &mut Vec<u64>) {
+        [self.first, self.count, self.form_and_base, self.keys].put(cells);
+    }
+}
+
+impl Cells for CrowdSpan {
+    fn put(&self, cells: &mut Vec<u64>) {
+        (self.start, self.whole, self.scale, self.offset).put(cells);
+    }
+}
+
+impl Cells for CrowdBase {
+    fn put(&self, cells: &mut Vec<u64>) {
+        [self.first, self.count, self.step].put(cells);
+    }
+}
+
+impl Cells for CrowdClip {
+    fn put(&self, cells: &mut Vec<u64>) {
+        [self.period, self.first_base, self.bases].put(cells);
+    }
+}
+
+fn words(value: u64) -> [u32; 2] {
+    [value as u32, (value >> 32) as u32]
+}
+
+/// A number below 2^`bits`, of any magnitude.
+fn number(random: &mut Random, bits: u32) -> u64 {
+    let word = u64::from(random.word()) << 32 | u64::from(random.word());
+    let own = random.below(bits + 1);
+    word.checked_shr(64 - own).unwrap_or(0)
+}
+
+/// What comes with a dispatch.
+#[derive(Default)]
+struct Dispatch {
+    count: u32,
+    first_instance: u32,
+    joints: u32,
+    layers: u32,
+    bases: u32,
+    first_link: u32,
+    clock: u64,
+    masks: u32,
+    references: u32,
+}
+
+impl Dispatch {
+    fn put(&self, trial: &mut Trial) {
+        let [low, high] = words(self.clock);
+        trial.global(
+            "dispatch",
+            [
+                self.count,
+                self.first_instance,
+                self.joints,
+                self.layers,
+                self.bases,
+                self.first_link,
+                low,
+                high,
+                self.masks,
+                self.references,
+            ],
+        );
+    }
+}
+
+/// An entry that may stand anywhere in a clip of a period, and a time of the clock.
+fn entry(random: &mut Random, period: u32) -> (CrowdEntry, u64) {
+    let wrap = random.below(3);
+    let within = number(random, 32) % (u64::from(period) * u64::from(wrap.max(1)) + 1);
+    let early = match wrap {
+        0 if random.once_in(8) => random.below(1 << 15),
+        _ => 0,
+    };
+    let backwards = if random.once_in(2) { RUNS_BACKWARDS } else { 0 };
+    let (speed, mask, additive) = (number(random, 23) as u32, random.below(3), random.below(2));
+    let anchor = random.word();
+    let elapsed = number(random, 40) + (u64::from(random.word()) << 40);
+    let own = CrowdEntry {
+        clip_and_weight: random.below(2) | random.below(0x8001) << 16,
+        speed_and_modes: speed | backwards | mask << 24 | wrap << 29 | additive << 31,
+        start: START_BIAS + within as u32 - early,
+        anchor,
+    };
+    (own, (u64::from(anchor) << 8).wrapping_add(elapsed))
+}
+
+fn period(random: &mut Random) -> u32 {
+    1 + number(random, 30) as u32
+}
+
+/// Time bases and their spans, for clips of a period.
+fn time_bases(random: &mut Random, period: u32, count: u32) -> (Vec<CrowdBase>, Vec<CrowdSpan>) {
+    let (mut bases, mut spans) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let length = 1 + random.below(6);
+        let first = spans.len() as u32;
+        let mut starts: Vec<u32> = (1..length)
+            .map(|_| (number(random, 31) % u64::from(period + 1)) as u32)
+            .collect();
+        starts.push(0);
+        starts.sort_unstable();
+        spans.extend(starts.into_iter().map(|start| CrowdSpan {
+            start: start | if random.once_in(2) { ON_KEY } else { 0 },
+            whole: (start as i32).wrapping_add(random.below(1 << 20) as i32),
+            scale: random.number(),
+            offset: random.parameter(),
+        }));
+        bases.push(CrowdBase {
+            first,
+            count: length,
+            step: if length < 2 {
+                0
+            } else {
+                1 << (length - 1).ilog2()
+            },
+        });
+    }
+    (bases, spans)
+}
+
+pub(super) fn times() -> Vec<Twin> {
+    let two = |random: &mut Random| {
+        let (a, mut b) = (number(random, 64), number(random, 64));
+        if random.once_in(4) {
+            b = a & 0xffff_ffff | b << 32; // the same lower word
+        }
+        if random.once_in(4) {
+            b = a >> 32 << 32 | b & 0xffff_ffff;
+        }
+        [words(a), words(b)]
+    };
+    let whole = |[low, high]: [u32; 2]| u64::from(low) | u64::from(high) << 32;
+    let both = move |[a, b]: [[u32; 2]; 2]| (whole(a), whole(b));
+    vec![
+        twin(TIMES, "wide_less", two, move |own| {
+            let (a, b) = both(own);
+            a < b
+        }),
+        twin(TIMES, "wide_sum", two, move |own| {
+            let (a, b) = both(own);
+            words(a.wrapping_add(b))
+        }),
+        twin(TIMES, "wide_difference", two, move |own| {
+            let (a, b) = both(own);
+            words(a.wrapping_sub(b))
+        }),
+        twin(
+            TIMES,
+            "wide_product",
+            |random| (number(random, 32) as u32, number(random, 32) as u32),
+            |(a, b)| words(u64::from(a) * u64::from(b)),
+        ),
+        twin(
+            TIMES,
+            "wide_remainder",
+            |random| {
+                let (x, q) = (number(random, 63), 1 + number(random, 62));
+                [words(x), words(q)]
+            },
+            move |own| {
+                let (x, q) = both(own);
+                words(wide_remainder(x, q))
+            },
+        ),
+        twin(
+            TIMES,
+            "in_parts",
+            |random| random.word(),
+            |ticks| words(in_parts(ticks)),
+        ),
+        with_globals(TIMES, "tick_of", |random, trial| {
+            let period = period(random);
+            let (entry, clock) = entry(random, period);
+            trial.argument(entry);
+            trial.argument(period);
+            let dispatch = Dispatch {
+                clock,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            trial.expect(tick_of(&entry, period, clock));
+        }),
+        with_globals(TIMES, "span_at", |random, trial| {
+            let period = period(random);
+            let (bases, spans) = time_bases(random, period, 2);
+            let base = bases[random.below(2) as usize];
+            let tick = match random.once_in(2) {
+                true => spans[random.below(spans.len() as u32) as usize].start & !ON_KEY,
+                false => random.below(period + 1),
+            };
+            trial.argument(base);
+            trial.argument(tick);
+            trial.expect(span_at(&base, &spans, tick));
+            trial.global("spans", spans);
+        }),
+        with_globals(TIMES, "crowd_work", |random, trial| {
+            const BASES: u32 = 3;
+            let periods = [period(random), period(random)];
+            let counts = [1 + random.below(BASES), 1 + random.below(BASES)];
+            let (mut bases, mut spans, mut clips) = (Vec::new(), Vec::new(), Vec::new());
+            for (period, count) in periods.into_iter().zip(counts) {
+                let (mut own, more) = time_bases(random, period, count);
+                own.iter_mut()
+                    .for_each(|base| base.first += spans.len() as u32);
+                clips.push(CrowdClip {
+                    period,
+                    first_base: bases.len() as u32,
+                    bases: count,
+                });
+                bases.extend(own);
+                spans.extend(more);
+            }
+            let (first_instance, layers) = (random.below(2), 1 + random.below(2));
+            let (layer, base) = (random.below(2), random.below(BASES));
+            let place = layer * BASES + base;
+            let mut entries = vec![[0u32; 4]; (first_instance * layers + layer) as usize];
+            let (mut own, clock) = entry(random, periods[0].min(periods[1]));
+            if random.once_in(4) {
+                // It stands at a key.
+                own.speed_and_modes &= !0x7f_ffff;
+            }
+            entries.push([
+                own.clip_and_weight,
+                own.speed_and_modes,
+                own.start,
+                own.anchor,
+            ]);
+            trial.argument(place);
+            let dispatch = Dispatch {
+                first_instance,
+                layers,
+                bases: BASES,
+                clock,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            trial.output("places");
+            trial.expect(vec![[UNTOUCHED; 2]; place as usize]);
+            let clip = (own.clip_and_weight & 0xffff) as usize;
+            if base < counts[clip] {
+                let mut found = [CrowdPlace {
+                    span: 0,
+                    parameter: 0.0,
+                }; BASES as usize];
+                places(&own, clock, &clips, &bases, &spans, &mut found);
+                let at = &bases[(clips[clip].first_base + base) as usize];
+                let tick = tick_of(&own, clips[clip].period, clock);
+                assert_eq!(found[base as usize], place_at(at, &spans, tick));
+                trial.expect(found[base as usize]);
+            } else {
+                trial.expect([UNTOUCHED; 2]);
+            }
+            trial.global("entries", entries);
+            trial.global("clips", clips);
+            trial.global("time_bases", bases);
+            trial.global("spans", spans);
+        }),
+    ]
+}
+
+const JOINTS: u32 = 2;
+const BASES: u32 = 2;
+const CLIPS: u32 = 2;
+/// Cells of segments and keys, before the masks.
+const CELLS: u32 = 72;
+
+/// Everything that the kernels over layers read.
+struct Scene {
+    entries: Vec<CrowdEntry>,
+    channels: Vec<CrowdChannel>,
+    cells: Vec<[f32; 4]>,
+    places: Vec<CrowdPlace>,
+    layers: u32,
+    first_instance: u32,
+}
+
+fn channel(random: &mut Random) -> CrowdChannel {
+    let forms = [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL];
+    let form = forms[random.below(4) as usize];
+    CrowdChannel {
+        first: random.below(3),
+        count: 1 + random.below(2),
+        form_and_base: form << 24 | random.below(BASES),
+        keys: random.below(60),
+    }
+}
+
+fn place(random: &mut Random) -> CrowdPlace {
+    CrowdPlace {
+        span: random.below(2) | if random.once_in(4) { ON_KEY } else { 0 },
+        parameter: random.parameter(),
+    }
+}
+
+fn cells(random: &mut Random, count: u32) -> Vec<[f32; 4]> {
+    (0..count).map(|_| random.rotation()).collect()
+}
+
+impl Scene {
+    /// For two instances of a window.
+    fn new(random: &mut Random) -> Self {
+        let (layers, first_instance) = (1 + random.below(3), random.below(2));
+        let masks = 3 * JOINTS;
+        let references = CLIPS * JOINTS * CHANNELS;
+        let mut entries: Vec<_> = (0..(2 + first_instance) * layers)
+            .map(|_| entry(random, 1 << 20).0)
+            .collect();
+        for entry in &mut entries {
+            if random.once_in(4) {
+                entry.clip_and_weight &= 0xffff;
+            }
+        }
+        Self {
+            entries,
+            channels: (0..CLIPS * JOINTS * CHANNELS)
+                .map(|_| channel(random))
+                .collect(),
+            cells: cells(random, CELLS + masks + references),
+            places: (0..2 * layers * BASES).map(|_| place(random)).collect(),
+            layers,
+            first_instance,
+        }
+    }
+
+    fn twin(&self) -> Layers<'_> {
+        Layers {
+            entries: &self.entries[(self.first_instance * self.layers) as usize..],
+            channels: &self.channels,
+            cells: &self.cells,
+            places: &self.places,
+            joints: JOINTS,
+            layers: self.layers,
+            bases: BASES,
+            masks: CELLS,
+            references: CELLS + 3 * JOINTS,
+        }
+    }
+
+    fn put(&self, trial: &mut Trial) {
+        trial.global("entries", self.entries.as_slice().to_cells());
+        trial.global("channels", self.channels.as_slice().to_cells());
+        trial.global("cells", self.cells.as_slice().to_cells());
+        trial.global("places", self.places.as_slice().to_cells());
+        let dispatch = Dispatch {
+            first_instance: self.first_instance,
+            joints: JOINTS,
+            layers: self.layers,
+            bases: BASES,
+            masks: CELLS,
+            references: CELLS + 3 * JOINTS,
+            ..Dispatch::default()
+        };
+        dispatch.put(trial);
+    }
+}
+
+impl Scene {
+    /// One layer, whose rotations are arcs and constants.
+    fn make_arcs(&mut self) {
+        self.layers = 1;
+        self.cells[0] = [0.0; 4];
+        for channel in &mut self.channels {
+            *channel = as_arc(*channel);
+        }
+    }
+}
+
+/// The channel as an arc, or as a constant where its keys lie at an even place.
+fn as_arc(channel: CrowdChannel) -> CrowdChannel {
+    let is_constant = channel.keys.is_multiple_of(2);
+    let form = if is_constant { FORM_CONSTANT } else { FORM_ARC };
+    let first = channel.first + 1;
+    CrowdChannel {
+        first,
+        count: if is_constant { 0 } else { channel.count },
+        form_and_base: form << 24 | channel.form_and_base & 0x00ff_ffff,
+        keys: if is_constant { first } else { channel.keys },
+    }
+}
+
+fn twin_of_arc_value() -> Twin {
+    with_globals("crowd_arcs", "arc_value", |random, trial| {
+        let (channel, place) = (as_arc(channel(random)), place(random));
+        let mut cells = cells(random, CELLS);
+        cells[0] = [0.0; 4];
+        trial.argument(channel);
+        trial.argument(place);
+        trial.expect(sampled(&cells, &channel, place));
+        trial.global("cells", cells);
+    })
+}
+
+trait ToCells {
+    fn to_cells(&self) -> Vec<u64>;
+}
+
+impl<T: Cells> ToCells for [T] {
+    fn to_cells(&self) -> Vec<u64> {
+        let mut cells = Vec::new();
+        self.put(&mut cells);
+        cells
+    }
+}
+
+pub(super) fn layers() -> Vec<Twin> {
+    let four = |random: &mut Random| [0; 4].map(|_| random.vector::<4>());
+    vec![
+        twin(
+            LAYERS,
+            "cubic",
+            move |random| (four(random), random.parameter()),
+            |(c, s)| -> [f32; 4] { std::array::from_fn(|i| cubic(c.map(|own| own[i]), s)) },
+        ),
+        twin(
+            LAYERS,
+            "turn_added",
+            |random| {
+                let own = [random.rotation(), random.rotation(), random.rotation()];
+                (own, random.number())
+            },
+            |([base, layer, reference], weight)| turn_added(base, layer, reference, weight),
+        ),
+        twin(
+            LAYERS,
+            "laid_over",
+            |random| {
+                let kind = [ROTATION, TRANSLATION, SCALE][random.below(3) as usize];
+                let own = [random.rotation(), random.rotation(), random.rotation()];
+                (kind, random.once_in(2), own, random.number())
+            },
+            |(kind, additive, [below, layer, reference], weight)| {
+                laid_over(kind, additive, below, layer, reference, weight)
+            },
+        ),
+        with_globals(LAYERS, "sampled", |random, trial| {
+            let (channel, place, cells) = (channel(random), place(random), cells(random, CELLS));
+            trial.argument(channel);
+            trial.argument(place);
+            trial.expect(sampled(&cells, &channel, place));
+            trial.global("cells", cells);
+        }),
+        with_globals(LAYERS, "layer_value", |random, trial| {
+            let scene = Scene::new(random);
+            let (joint, kind) = (random.below(JOINTS), random.below(CHANNELS));
+            let layer = random.below(2 * scene.layers);
+            let entry = scene.entries[0];
+            trial.argument(layer);
+            trial.argument(entry);
+            trial.argument((joint, kind));
+            scene.put(trial);
+            trial.expect(scene.twin().layer_value(layer, &entry, joint, kind));
+        }),
+        with_globals(LAYERS, "layered", |random, trial| {
+            let scene = Scene::new(random);
+            let (instance, joint) = (random.below(2), random.below(JOINTS));
+            let kind = random.below(CHANNELS);
+            trial.argument((instance, joint, kind));
+            scene.put(trial);
+            trial.expect(scene.twin().layered(instance, joint, kind));
+        }),
+        with_globals(LAYERS, "crowd_work", |random, trial| {
+            let scene = Scene::new(random);
+            let (instance, joint) = (random.below(2), random.below(JOINTS));
+            let place = instance * JOINTS + joint;
+            trial.argument(place);
+            scene.put(trial);
+            trial.output("turned");
+            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
+            trial.expect(scene.twin().layered(instance, joint, ROTATION));
+        }),
+        twin_of_arc_value(),
+        with_globals("crowd_arcs", "crowd_work", |random, trial| {
+            let mut scene = Scene::new(random);
+            scene.make_arcs();
+            let (instance, joint) = (random.below(2), random.below(JOINTS));
+            let place = instance * JOINTS + joint;
+            trial.argument(place);
+            scene.put(trial);
+            trial.output("turned");
+            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
+            trial.expect(scene.twin().layered(instance, joint, ROTATION));
+        }),
+        with_globals("crowd_locals_alone", "layered", |random, trial| {
+            let mut scene = Scene::new(random);
+            scene.layers = 1;
+            let (instance, joint) = (random.below(2), random.below(JOINTS));
+            let kind = random.below(CHANNELS);
+            trial.argument((instance, joint, kind));
+            scene.put(trial);
+            trial.expect(scene.twin().layered(instance, joint, kind));
+        }),
+        with_globals(LOCALS, "crowd_work", |random, trial| {
+            let scene = Scene::new(random);
+            let (instance, joint) = (random.below(2), random.below(JOINTS));
+            let place = instance * JOINTS + joint;
+            trial.argument(place);
+            scene.put(trial);
+            trial.output("matrices");
+            trial.expect(vec![[UNTOUCHED; 12]; place as usize]);
+            let own = |kind| scene.twin().layered(instance, joint, kind);
+            trial.expect(transform(own(ROTATION), own(TRANSLATION), own(SCALE)));
+        }),
+    ]
+}
+
+fn rows(random: &mut Random) -> Rows {
+    [random.vector(), random.vector(), random.vector()]
+}
+
+pub(super) fn matrices() -> Vec<Twin> {
+    vec![
+        twin(
+            LOCALS,
+            "transform_row",
+            |random| (random.vector(), random.vector(), random.number()),
+            |(turned, scale, moved)| transform_row(turned, scale, moved),
+        ),
+        twin(
+            "crowd_walk",
+            "row_product",
+            |random| (random.vector(), rows(random)),
+            |(row, other)| row_product(row, &other),
+        ),
+        with_globals("crowd_walk", "crowd_work", |random, trial| {
+            const JOINTS: u32 = 3;
+            const LEVEL: u32 = 2;
+            let mut all: Vec<Rows> = (0..2 * JOINTS).map(|_| rows(random)).collect();
+            let first_link = random.below(2);
+            let (joint, parent) = [(0, 1), (1, 2), (2, 0)][random.below(3) as usize];
+            let (instance, own) = (random.below(2), random.below(LEVEL));
+            let mut links = vec![[9u32; 2]; (first_link + LEVEL) as usize];
+            links[(first_link + own) as usize] = [joint, parent];
+            trial.argument(instance * LEVEL + own);
+            let dispatch = Dispatch {
+                joints: LEVEL,
+                layers: JOINTS,
+                first_link,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            trial.global("links", links);
+            trial.global("matrices", all.as_slice().to_cells());
+            trial.output("matrices");
+            let at = |joint: u32| (instance * JOINTS + joint) as usize;
+            all[at(joint)] = affine_product(&all[at(parent)], &all[at(joint)]);
+            trial.expect(all);
+        }),
+        with_globals("crowd_skin", "crowd_work", |random, trial| {
+            const JOINTS: u32 = 2;
+            let mut all: Vec<Rows> = (0..2 * JOINTS).map(|_| rows(random)).collect();
+            let bind = [rows(random), rows(random)];
+            let place = random.below(2 * JOINTS * 3);
+            trial.argument(place);
+            let dispatch = Dispatch {
+                joints: JOINTS,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            trial.global("bind", bind);
+            trial.global("matrices", all.as_slice().to_cells());
+            trial.output("matrices");
+            let (matrix, row) = (place / 3, place % 3);
+            let own = &mut all[matrix as usize];
+            own[row as usize] = row_product(own[row as usize], &bind[(matrix % JOINTS) as usize]);
+            trial.expect(all);
+        }),
+        twin(
+            "crowd_half",
+            "to_any_half",
+            |random| [0; 4].map(|_| half_of(random)),
+            |value| value.map(|own| u32::from(to_any_half(own))),
+        ),
+        with_globals("crowd_half", "crowd_work", |random, trial| {
+            trial.argument(1u32);
+            half(random, trial, 1);
+        }),
+        with_globals("crowd_half", "main", |random, trial| {
+            // The second row of workgroups, of one each.
+            trial.argument([1, 1, 0]);
+            trial.argument([1u32, 2, 1]);
+            let dispatch = Dispatch {
+                count: 66,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            half(random, trial, 65);
+        }),
+    ]
+}
+
+/// A number near the largest half, or any.
+fn half_of(random: &mut Random) -> f32 {
+    match random.once_in(4) {
+        true => 65_520.0 + 100.0 * random.number(),
+        false => random.finite(),
+    }
+}
+
+/// Rounds the values at a place.
+fn half(random: &mut Random, trial: &mut Trial, place: usize) {
+    let mut values = vec![[0.0; 4]; place];
+    let own = [0; 4].map(|_| half_of(random));
+    values.push(own);
+    trial.global("values", values);
+    trial.output("halves");
+    trial.expect(vec![[UNTOUCHED; 2]; place]);
+    let [x, y, z, w] = own.map(|own| u32::from(to_any_half(own)));
+    trial.expect([x | y << 16, z | w << 16]);
+}
