@@ -1,16 +1,12 @@
 #!/usr/bin/env bash
 # The tests of the Python package, in an environment of their own under target/python. The extension
 # is built as the tests' other programs are, so that it shares what they are built of; wheels are
-# built by scripts/wheel.sh. Arguments go to pytest.
+# built by scripts/wheel.sh. Arguments go to pytest; `--environment` makes the environment and nothing else.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 target=${CARGO_TARGET_DIR:-target}
 environment=target/python
-# Naming a test makes cargo choose the features that `cargo test --workspace` has, and nothing is
-# built a second time.
-cargo build --quiet --workspace --lib --test cost
-
 requirements=python/tests/requirements.txt
 if ! cmp -s "$requirements" "$environment/requirements.txt"; then
     echo "installing NumPy, SciPy, Ray, moto, pytest, mypy and matplotlib into $environment" >&2
@@ -26,6 +22,12 @@ if ! cmp -s "$requirements" "$environment/requirements.txt"; then
         exit
     fi
 fi
+
+[ "${1:-}" != --environment ] || exit 0
+
+# Naming a test makes cargo choose the features that `cargo test --workspace` has, and nothing is
+# built a second time.
+cargo build --quiet --workspace --lib --test cost
 
 # As `pip install` lays it out.
 site=$("$environment/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')

@@ -9,6 +9,7 @@ cd "$(dirname "$0")/.."
 # first one slower.
 if [ -n "${CI:-}" ]; then export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=0; fi
 
+fetching=()
 has_driver() { compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null; }
 has_layer() { compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null; }
 has_browser() { command -v chromium || command -v chromium-browser || command -v google-chrome; }
@@ -40,46 +41,63 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
 fi
 
 # Peers to compare with, in an environment of their own (cli/tests/peers).
-peers=target/peers
-if ! "$peers/bin/python" -c 'import numpy, scipy, splines, pygeodesic' 2>/dev/null; then
-    if ! python3 -c 'import venv, ensurepip' 2>/dev/null && command -v apt-get >/dev/null; then
-        sudo=""
-        [ "$(id -u)" -eq 0 ] || sudo="sudo"
-        $sudo apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
-            python3-venv >/dev/null
-    fi
-    echo "installing SciPy, splines and pygeodesic into $peers" >&2
-    rm -rf "$peers"
-    if ! { python3 -m venv "$peers" &&
-        "$peers/bin/pip" install --quiet --requirement cli/tests/peers/requirements.txt; }; then
+fetch_peers() {
+    peers=target/peers
+    if ! "$peers/bin/python" -c 'import numpy, scipy, splines, pygeodesic' 2>/dev/null; then
+        if ! python3 -c 'import venv, ensurepip' 2>/dev/null && command -v apt-get >/dev/null; then
+            sudo=""
+            [ "$(id -u)" -eq 0 ] || sudo="sudo"
+            $sudo apt-get update -qq
+            DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
+                python3-venv >/dev/null
+        fi
+        echo "installing SciPy, splines and pygeodesic into $peers" >&2
         rm -rf "$peers"
-        echo "the peers' test wants python3 with venv, and SciPy, splines and pygeodesic from PyPI; without" >&2
-        echo "them it says so and compares nothing (where CI is set it fails)" >&2
+        if ! { python3 -m venv "$peers" &&
+            "$peers/bin/pip" install --quiet --requirement cli/tests/peers/requirements.txt; }; then
+            rm -rf "$peers"
+            echo "the peers' test wants python3 with venv, and SciPy, splines and pygeodesic from PyPI; without" >&2
+            echo "them it says so and compares nothing (where CI is set it fails)" >&2
+        fi
     fi
-fi
+}
 
 # Khronos' validator of glTF files (formats/tests/validator).
-validator=target/validator
-package=formats/tests/validator/package.json
-if ! cmp -s "$package" "$validator/package.json" ||
-    ! (cd "$validator" && node -e 'require("gltf-validator")') 2>/dev/null; then
-    if ! { command -v node && command -v npm; } >/dev/null && command -v apt-get >/dev/null; then
-        sudo=""
-        [ "$(id -u)" -eq 0 ] || sudo="sudo"
-        $sudo apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
-            nodejs npm >/dev/null
-    fi
-    echo "installing gltf-validator into $validator" >&2
-    rm -rf "$validator"
-    mkdir -p "$validator"
-    if ! { cp "$package" "$validator" &&
-        npm install --silent --no-audit --no-fund --prefix "$validator"; }; then
+fetch_validator() {
+    validator=target/validator
+    package=formats/tests/validator/package.json
+    if ! cmp -s "$package" "$validator/package.json" ||
+        ! (cd "$validator" && node -e 'require("gltf-validator")') 2>/dev/null; then
+        if ! { command -v node && command -v npm; } >/dev/null && command -v apt-get >/dev/null; then
+            sudo=""
+            [ "$(id -u)" -eq 0 ] || sudo="sudo"
+            $sudo apt-get update -qq
+            DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends \
+                nodejs npm >/dev/null
+        fi
+        echo "installing gltf-validator into $validator" >&2
         rm -rf "$validator"
-        echo "the validator's tests want node, npm and gltf-validator from npm; without them they" >&2
-        echo "say so and validate nothing (where CI is set they fail)" >&2
+        mkdir -p "$validator"
+        if ! { cp "$package" "$validator" &&
+            npm install --silent --no-audit --no-fund --prefix "$validator"; }; then
+            rm -rf "$validator"
+            echo "the validator's tests want node, npm and gltf-validator from npm; without them they" >&2
+            echo "say so and validate nothing (where CI is set they fail)" >&2
+        fi
     fi
+}
+
+# One after another where something of the system's is missing, for apt takes turns; else beside each
+# other and beside what is compiled first.
+if command -v node >/dev/null && command -v npm >/dev/null &&
+    python3 -c 'import venv, ensurepip' 2>/dev/null; then
+    for fetch in fetch_peers fetch_validator './scripts/python.sh --environment'; do
+        $fetch &
+        fetching+=($!)
+    done
+else
+    fetch_peers
+    fetch_validator
 fi
 
 # The oldest Rust that Cargo.toml promises, where it is at hand and not the one in use.
@@ -99,6 +117,7 @@ if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --workspace --all-targets --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
+for fetch in "${fetching[@]}"; do wait "$fetch"; done
 # Ten seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
 FUZZ_SECONDS=${FUZZ_SECONDS:-10} cargo test --workspace
 # The Python package.
