@@ -230,7 +230,8 @@ def test_workers_are_killed(machines, library):
         )
         ended.set()
         thread.join()
-        assert (report.made, report.failed) == (CLIPS, [])
+        # A shard whose end was not heard of is found to be done.
+        assert (report.made + report.skipped, report.failed) == (CLIPS, [])
     assert kills >= KILLS
     rename_inputs(out, f"{library}/", "")
     assert_equal(library / "one", out)
@@ -259,7 +260,8 @@ def test_nodes_are_lost(machines, library):
         )
         losing.join()
         assert begun[0] < CLIPS, "it was lost in the middle"
-        assert (report.made, report.failed) == (CLIPS, [])
+        # A shard whose end was not heard of is found to be done.
+        assert (report.made + report.skipped, report.failed) == (CLIPS, [])
         rename_inputs(out, f"{library}/", "")
         assert_equal(library / "one", out)
         machines.nodes.append(machines.add())
