@@ -80,10 +80,6 @@ class Machines:
     """A head and a node, of one processor each."""
 
     def __init__(self):
-        environment = os.environ
-        environment["RAY_USAGE_STATS_ENABLED"] = "0"
-        # Workers that start with a fault look here.
-        environment["PYTHONPATH"] = os.pathsep.join([str(FAULTS), environment.get("PYTHONPATH", "")])
         self.cluster = Cluster(
             initialize_head=True, head_node_args={"num_cpus": 1, **QUIET}, connect=False
         )
@@ -104,9 +100,13 @@ class Machines:
 
 @pytest.fixture(scope="module")
 def machines():
-    found = Machines()
-    yield found
-    found.cluster.shutdown()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        # Workers that start with a fault look here.
+        patch.setenv("PYTHONPATH", str(FAULTS), prepend=os.pathsep)
+        found = Machines()
+        yield found
+        found.cluster.shutdown()
 
 
 @pytest.fixture(autouse=True)
