@@ -29,6 +29,7 @@ from conftest import ROOT, unit
 import tumble
 import tumble.distributed
 from tumble.distributed import DistributedError, _job, _stores, evaluate
+from tumble.distributed.__main__ import main as cluster_program
 
 if sys.platform != "linux":
     pytest.skip("processes are found and killed as Linux has them", allow_module_level=True)
@@ -452,7 +453,7 @@ def bucket(monkeypatch):
         server.wait()
 
 
-def test_object_stores(machines, library, bucket, tmp_path):
+def test_object_stores(machines, library, bucket, tmp_path, capsys):
     """From a bucket into a bucket, with a kill; then from files, and into files."""
     clips = sorted((library / "clips").rglob("*.dat"))[:60]
     source = _stores.store(bucket("library"))
@@ -489,6 +490,16 @@ def test_object_stores(machines, library, bucket, tmp_path):
         assert entry["output_sha256"] == hashlib.sha256(found[entry["output"]]).hexdigest()
     again = evaluate(url, out, **options)
     assert (again.made, again.skipped) == (0, 60)
+
+    assert cluster_program(["--check", out]) == 0
+    (tmp_path / "flipped").write_bytes(b"other bits")
+    name = entries[0]["output"]
+    there.put(str(tmp_path / "flipped"), name)
+    assert cluster_program(["--check", out]) == 8
+    assert f"{name}: other bits" in capsys.readouterr().err
+    repaired = evaluate(url, out, **options)
+    assert repaired.made > 0 and there.read(name) == one[name]
+    assert cluster_program(["--check", out]) == 0
 
     evaluate(url, tmp_path / "local", **options)
     tumble_program("check", tmp_path / "local")
