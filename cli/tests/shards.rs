@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::process::{Child, Stdio};
 
-use crate::program::{command, run, sample_folder, succeed};
+use crate::program::{command, finish, run, sample_folder, succeed};
 use crate::tree::{names, tree};
 
 /// Twelve clips in two folders, in shards of about four.
@@ -65,11 +66,14 @@ fn parts_may_run_at_once() {
     for round in 0..5 {
         let out = format!("out{round}");
         let parts: Vec<String> = (1..=4).map(|part| format!("{part}/4")).collect();
-        let running = parts
-            .iter()
-            .map(|part| command(at, &shard(&out, &bytes, part, &[])).spawn());
-        for child in running.collect::<Vec<_>>() {
-            assert!(child.unwrap().wait().unwrap().success());
+        let start = |part: &String| {
+            let mut command = command(at, &shard(&out, &bytes, part, &[]));
+            command.stderr(Stdio::piped()).spawn().unwrap()
+        };
+        let running: Vec<Child> = parts.iter().map(start).collect();
+        for child in running {
+            let ended = finish(child.wait_with_output().unwrap());
+            assert_eq!(ended.code, 0, "{}", ended.words);
         }
         succeed(at, &["merge", &out]);
         assert_eq!(tree(&at.join(&out)), tree(&at.join("one")), "round {round}");
@@ -222,7 +226,7 @@ fn killed_shards_are_made_again() {
         let out = format!("out{}", round % 3);
         let line = shard(&out, &bytes, "1/1", &["--resume"]);
         let mut child = command(at, &[&line[..], &more].concat());
-        child.stderr(std::process::Stdio::null());
+        child.stderr(Stdio::null());
         let mut child = child.spawn().unwrap();
         std::thread::sleep(Duration::from_micros(random.next() % longest));
         kills += i32::from(child.try_wait().unwrap().is_none());

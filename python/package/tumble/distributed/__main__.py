@@ -11,13 +11,14 @@ import time
 from types import FrameType
 
 from tumble import _tumble
-from tumble.distributed import DistributedError, Progress, Report, _driver
-from tumble.distributed._job import USAGE, local
+from tumble.distributed import DistributedError, Progress, Report, _check, _driver
+from tumble.distributed._job import DIFFERENCE, USAGE, is_url, local
 
 HELP = """\
 Evaluate a library of clips over a Ray cluster; the bytes are those of `tumble eval` on one machine
 
 Usage: python -m tumble.distributed LIBRARY OUT [OPTIONS] [OPTIONS OF `tumble eval`]
+       python -m tumble.distributed --check OUT
 
 LIBRARY and OUT are directories that every machine sees, or URLs such as s3://bucket/clips.
 
@@ -29,6 +30,7 @@ Options:
                              the cluster has any) [default: auto]
       --shard-bytes SIZE     The input of a shard, at most [default: 32MiB]
       --into files|parquet   A file for each clip, or a file of rows for each shard [default: files]
+      --check OUT            Check results against their manifest, as `tumble check`, in object stores too
       --json                 Print the report as JSON on standard output
   -h, --help                 Print this help; `tumble eval --help` has the other options
 
@@ -37,7 +39,7 @@ Examples:
   python -m tumble.distributed s3://bucket/clips s3://bucket/out --resume --into parquet
 
 Exit codes are those of `tumble`: 0 done, 2 the command line is wrong, 3 some inputs failed, 4 all did,
-6 a device failed, 7 output could not be written, 130 and 143 stopped by a signal: --resume goes on.
+6 a device failed, 7 output could not be written, 8 --check found a difference, 130 and 143 stopped by a signal: --resume goes on.
 """
 
 VALUES = {"--address": "auto", "--device": "auto", "--shard-bytes": "32MiB", "--into": "files"}
@@ -52,6 +54,8 @@ def main(arguments: list[str]) -> int:
         print(HELP, end="")
         return 0 if arguments else USAGE
     try:
+        if arguments[0] == "--check" and len(arguments) == 2:
+            return _check_all(local(arguments[1]))
         return _run(arguments)
     except DistributedError as error:
         _say(str(error) if str(error).startswith("error:") else f"error: {error}")
@@ -96,6 +100,23 @@ def _run(arguments: list[str]) -> int:
         fields = {**dataclasses.asdict(report), "exit_code": report.exit_code}
         print(json.dumps(fields, indent=2))
     return report.exit_code
+
+
+def _check_all(out: str) -> int:
+    if not is_url(out):
+        return _tumble.run(["tumble", "check", out])
+    checked = _check.check(out)
+    for fault in checked.faults:
+        _say(f"error: {fault}")
+    if checked.faults:
+        _say(f"error: {len(checked.faults)} of {checked.results} results differ; --resume makes them again")
+        return DIFFERENCE
+    print(f"{checked.results} results, every bit as written")
+    if checked.shards is None:
+        return 0
+    done, shards = checked.shards
+    _say(f"error: {out}: {done} of {shards} shards are done; --resume goes on")
+    return DIFFERENCE
 
 
 def _stop_on_signals() -> None:

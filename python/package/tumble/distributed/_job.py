@@ -13,7 +13,7 @@ from tumble import _tumble
 # A file's line of the manifest, or an input's refusal, as JSON has it.
 Entry = dict[str, Any]
 
-DONE, USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT = 0, 2, 3, 4, 6, 7
+USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT, DIFFERENCE = 2, 3, 4, 6, 7, 8
 
 
 class DistributedError(tumble.Error, RuntimeError):

@@ -1,0 +1,65 @@
+"""Are the results in an object store still what they were? What `tumble check` does for directories."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from tumble.distributed._job import ALL_INPUTS, DistributedError, Entry, lines_of, split_record
+from tumble.distributed._stores import Store, read_text, store
+
+# Objects that are read at once; each waits for the network most of its time.
+_AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What checking came to."""
+
+    results: int
+    faults: list[str]
+    """What differs, and how."""
+    shards: tuple[int, int] | None
+    """Where they are not merged: how many are done, of how many."""
+
+
+def check(out: str) -> Checked:
+    """Compares every object with its line of the manifest, or of a shard that is not merged yet."""
+    place = store(out)
+    manifest = read_text(place, "manifest.jsonl")
+    plan = read_text(place, "manifest.d/plan.json")
+    if manifest is None and plan is None:
+        raise DistributedError(f"{out}: has no manifest.jsonl", ALL_INPUTS)
+    entries: dict[str, Entry] = {}
+    lines = lines_of(manifest or "")
+    shards = None
+    if plan is not None:
+        own = json.loads(plan)
+        done = 0
+        for name in place.list("manifest.d"):
+            text = read_text(place, name) if name.endswith(".jsonl") else None
+            if text is None:
+                continue
+            header, more = split_record(text)
+            done += header["plan"] == own["plan"]
+            lines += more
+        shards = (done, own["shards"])
+    for line in lines:
+        entry = json.loads(line)
+        entries[entry["output"]] = entry
+    with ThreadPoolExecutor(_AT_ONCE) as threads:
+        found = threads.map(lambda entry: _fault(place, entry), entries.values())
+        faults = [fault for fault in found if fault is not None]
+    return Checked(len(entries), faults, shards)
+
+
+def _fault(place: Store, entry: Entry) -> str | None:
+    name = str(entry["output"])
+    content = place.read(name)
+    if content is None:
+        return f"{name}: is not there"
+    if hashlib.sha256(content).hexdigest() != entry["output_sha256"]:
+        return f"{name}: other bits than when it was written"
+    return None
