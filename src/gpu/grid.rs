@@ -137,13 +137,7 @@ impl GroupGrid {
 
     /// Writes its blocks; `first_item` is the place of its first item in the list of all, and
     /// `nothing` that of an item without samples.
-    fn write(
-        &self,
-        list: &GroupWork,
-        first_item: u32,
-        nothing: u32,
-        blocks: &mut [Block],
-    ) {
+    fn write(&self, list: &GroupWork, first_item: u32, nothing: u32, blocks: &mut [Block]) {
         blocks.fill(Block {
             first: nothing,
             starts: 0,
@@ -259,7 +253,13 @@ mod tests {
                 let rows = GridRows::new(&window, shift).unwrap();
                 let list = listed(rows, tracks);
                 let grid = rows.of_group(&list, 0).unwrap();
-                let mut blocks = vec![Block { first: 0, starts: 0 }; grid.blocks() as usize];
+                let mut blocks = vec![
+                    Block {
+                        first: 0,
+                        starts: 0
+                    };
+                    grid.blocks() as usize
+                ];
                 let nothing = list.item_count() as u32 + 3;
                 grid.write(&list, 3, nothing, &mut blocks);
                 let all: Vec<Item> = items(&list).copied().collect();
@@ -279,7 +279,11 @@ mod tests {
                             own == row && (at..at + count(item)).contains(&position)
                         };
                         let own = all.get((index - 3) as usize).filter(|item| has(item));
-                        assert_eq!(own, all.iter().find(|item| has(item)), "{layout:?}, {place}");
+                        assert_eq!(
+                            own,
+                            all.iter().find(|item| has(item)),
+                            "{layout:?}, {place}"
+                        );
                         found += u32::from(own.is_some());
                     }
                 }

@@ -107,7 +107,11 @@ impl VulkanEngine {
         let is_timed = matches!(work.list, List::Times | List::TimesCoalesced);
         if !self.in_place {
             let device = Residence::Device;
-            room(&mut evaluation.device_items, evaluation.items.size(), device)?;
+            room(
+                &mut evaluation.device_items,
+                evaluation.items.size(),
+                device,
+            )?;
             let distances = evaluation.distances.size();
             room(&mut evaluation.device_distances, distances, device)?;
             if let Some(blocks) = evaluation.blocks.as_ref().filter(|_| is_grid) {

@@ -68,7 +68,10 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
     let rows = (tile * LINE + within + random.below(4)).saturating_sub(first_row % LINE);
     let samples = first + random.below(6);
     let first_output = first_row.wrapping_sub(first * stride);
-    trial.global("dispatch", [0, stride, samples, rows, first_output, first_block]);
+    trial.global(
+        "dispatch",
+        [0, stride, samples, rows, first_output, first_block],
+    );
     let before = first / BLOCK_SAMPLES * rows + first_block;
     let cell = |turn: u32| {
         let (sample, row) = (first + turn, first_row + turn * stride);
@@ -124,7 +127,14 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
             let output = turns[0].position.saturating_sub(random.below(20)) + random.below(4);
             let first = random.below(9) as i32 - if is_listed { 0 } else { 4 };
             let (scale, offset) = (random.number() * 0.25, random.parameter());
-            (source, output, random.below(50) | bits, first, scale, offset)
+            (
+                source,
+                output,
+                random.below(50) | bits,
+                first,
+                scale,
+                offset,
+            )
         });
         trial.global("items", items);
         let last = turns.iter().filter(|cell| cell.is_inside);

@@ -26,8 +26,8 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::request::Request;
 use crate::shader::{
-    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample,
-    TangentWeights, WORKGROUP,
+    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample, TangentWeights,
+    WORKGROUP,
 };
 use crate::time::frames::{Frames, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
@@ -111,7 +111,7 @@ fn store(ranges: &[Range<u64>], line: u64) -> Lines {
 fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     ranges.sort_by_key(|range| range.start);
     let (mut least, mut stretch) = (0, 0..0);
-    for range in ranges.iter() {
+    for range in &*ranges {
         if range.start >= stretch.end + line || stretch.is_empty() {
             least += (stretch.end - stretch.start).div_ceil(line);
             stretch = range.clone();
@@ -146,8 +146,8 @@ impl Launch {
         let output = global(&program, "rotations");
         machine.globals[output] = vec![0; 4 * self.rotations];
         let main = program.functions.len() - 1;
-        let pushed = ["dispatch", "rows"]
-            .map(|name| program.globals.iter().position(|own| own == name));
+        let pushed =
+            ["dispatch", "rows"].map(|name| program.globals.iter().position(|own| own == name));
         let [x, y, z] = self.groups;
         let all = x * y * z;
         let mut count = Count::default();
@@ -176,7 +176,12 @@ impl Launch {
                 }
             }
         }
-        assert!(count.rotations > 100, "{}: {}", self.kernel, count.rotations);
+        assert!(
+            count.rotations > 100,
+            "{}: {}",
+            self.kernel,
+            count.rotations
+        );
         count
     }
 
@@ -205,7 +210,10 @@ fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
     let lanes: Vec<_> = wave.iter().map(stores).collect();
     let mut lines = Lines::default();
     for step in 0.. {
-        let ranges: Vec<_> = lanes.iter().filter_map(|lane| lane.get(step).cloned()).collect();
+        let ranges: Vec<_> = lanes
+            .iter()
+            .filter_map(|lane| lane.get(step).cloned())
+            .collect();
         if ranges.is_empty() {
             return lines;
         }
@@ -259,7 +267,8 @@ fn dense(tracks: usize) -> (TrackSet, Frames) {
     let (mut random, mut set) = (Rng::with_seed(2), TrackSet::new());
     let times: Vec<f64> = (0..2400).map(|key| f64::from(key) / 120.0).collect();
     for _ in 0..tracks {
-        set.push("", &times, &walk(&mut random, 2400, 0.05)).unwrap();
+        set.push("", &times, &walk(&mut random, 2400, 0.05))
+            .unwrap();
     }
     let start = 1.0 / 240.0;
     (set, Frames::fps(60).between(start, start + 1198.0 / 60.0))
@@ -269,7 +278,8 @@ fn dense(tracks: usize) -> (TrackSet, Frames) {
 fn crowd(tracks: usize) -> (TrackSet, Frames) {
     let (mut random, mut set) = (Rng::with_seed(3), TrackSet::new());
     for _ in 0..tracks {
-        set.push("", &[0.0, 1.0], &walk(&mut random, 2, 1.0)).unwrap();
+        set.push("", &[0.0, 1.0], &walk(&mut random, 2, 1.0))
+            .unwrap();
     }
     let times = (0..tracks).map(|_| random.f64()).collect();
     (set, Frames::at_each(times))
@@ -291,7 +301,9 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         ..Wanted::all(set)
     };
     let clip = ClipData::new(set, method.into(), wanted).unwrap();
-    let timeline = frames.resolve(clip.track_count(), clip.time_span()).unwrap();
+    let timeline = frames
+        .resolve(clip.track_count(), clip.time_span())
+        .unwrap();
     let window = Window::whole(clip.track_count(), timeline.len(), layout);
     let [group] = &clip.groups[..] else {
         panic!("one group");
@@ -308,7 +320,13 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
     let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
     let rotations = window.len();
     if let Some(list) = SampleList::new(&clip, &timeline, &window) {
-        let mut samples = vec![ListedSample { source: 0, parameter: 0.0 }; list.count()];
+        let mut samples = vec![
+            ListedSample {
+                source: 0,
+                parameter: 0.0
+            };
+            list.count()
+        ];
         list.write(&mut samples, 0).unwrap();
         globals.push(("samples", cells(bytemuck::cast_slice(&samples))));
         let dispatch = dispatch_of(samples.len(), 1);
@@ -347,8 +365,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         };
     };
     let grids = rows.of_groups(&lists).expect("items in order");
-    let mut blocks: Vec<Block> =
-        vec![bytemuck::Zeroable::zeroed(); grids[0].blocks() as usize];
+    let mut blocks: Vec<Block> = vec![bytemuck::Zeroable::zeroed(); grids[0].blocks() as usize];
     write_blocks(&lists, &grids, count as u32, &mut blocks);
     globals.push(("blocks", cells(bytemuck::cast_slice(&blocks))));
     let arguments = grids[0].arguments(0);
