@@ -111,7 +111,7 @@ fn store(ranges: &[Range<u64>], line: u64) -> Lines {
 fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     ranges.sort_by_key(|range| range.start);
     let (mut least, mut stretch) = (0, 0..0);
-    for range in ranges.iter() {
+    for range in &*ranges {
         if range.start >= stretch.end + line || stretch.is_empty() {
             least += (stretch.end - stretch.start).div_ceil(line);
             stretch = range.clone();

@@ -80,6 +80,7 @@ pub(super) fn binary(operator: BinaryOperator, of: Scalar) -> &'static dyn Binar
         (Operator::Equal, Scalar::U32) => on!(a b => (a == b).into()),
         (Operator::NotEqual, Scalar::U32) => on!(a b => (a != b).into()),
         (Operator::Less, Scalar::U32) => on!(a b => (a < b).into()),
+        (Operator::LessEqual, Scalar::U32) => on!(a b => (a <= b).into()),
         (Operator::GreaterEqual, Scalar::U32) => on!(a b => (a >= b).into()),
         (Operator::And, Scalar::U32 | Scalar::I32 | Scalar::BOOL) => on!(a b => a & b),
         (Operator::InclusiveOr, Scalar::U32 | Scalar::U64) => on!(a b => a | b),
