@@ -153,7 +153,14 @@ fn every_tick_is_the_engines_frame() {
 pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) -> CrowdLibrary {
     let mut library = CrowdLibrary::new(&skeleton(random, joints)).unwrap();
     for (place, &method) in methods.iter().enumerate() {
-        let set = clip(random, joints, 2 + 3 * place);
+        // What turns too wildly is refused, and leaves nothing behind.
+        while library.clips() == place {
+            let set = clip(random, joints, 2 + 3 * place);
+            match library.push(&set, method, VectorMethod::CatmullRom) {
+                Ok(_) | Err(CrowdError::TooWild { .. }) => {}
+                Err(error) => panic!("{method}: {error}"),
+            }
+        }
     }
     for mask in 0..2 {
         let weights: Vec<f32> = (0..joints)
