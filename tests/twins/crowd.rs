@@ -209,7 +209,7 @@ pub(super) fn times() -> Vec<Twin> {
         twin(
             TIMES,
             "in_parts",
-            |random| random.word(),
+            Random::word,
             |ticks| words(in_parts(ticks)),
         ),
         with_globals(TIMES, "tick_of", |random, trial| {
