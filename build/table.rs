@@ -181,7 +181,7 @@ const POSES: [&str; 6] = [
 ];
 
 /// What evaluates the channels of a crowd's joints.
-const CHANNELS: [&str; 8] = [
+const CHANNELS: [&str; 9] = [
     "math/canonical",
     "math/sine_cosine",
     "math/arc_tangent",
@@ -189,49 +189,50 @@ const CHANNELS: [&str; 8] = [
     "math/polynomial",
     "forms/evaluate_arc",
     "crowd/entry",
+    "crowd/cubic",
     "crowd/sampled",
 ];
 
-/// Kernels over a crowd, each with the files that it needs, those of [`CHANNELS`] before them or not.
-const CROWD: [(&str, bool, &[&str]); 8] = [
+/// The same where it is simple.
+const PLAIN_CHANNELS: [&str; 6] = [
+    "math/canonical",
+    "math/sine_cosine",
+    "forms/evaluate_arc",
+    "crowd/entry",
+    "crowd/cubic",
+    "crowd/plain",
+];
+
+/// Kernels over a crowd, each with the files that it needs behind some that it shares.
+const CROWD: [(&str, &[&str], &[&str]); 8] = [
     (
         "times",
-        false,
+        &[],
         &["crowd/entry", "lists/frame_distance", "crowd/times"],
     ),
-    (
-        "arcs",
-        false,
-        &[
-            "math/canonical",
-            "math/sine_cosine",
-            "forms/evaluate_arc",
-            "crowd/entry",
-            "crowd/arcs",
-        ],
-    ),
-    ("rotations", true, &["crowd/layers", "crowd/rotations"]),
+    ("rotations", &CHANNELS, &["crowd/layers", "crowd/rotations"]),
+    ("plain_rotations", &PLAIN_CHANNELS, &["crowd/rotations"]),
     (
         "locals",
-        true,
+        &CHANNELS,
         &["math/matrix", "crowd/layers", "crowd/locals"],
     ),
     (
-        "locals_alone",
-        true,
-        &["math/matrix", "crowd/alone", "crowd/locals"],
+        "plain_locals",
+        &PLAIN_CHANNELS,
+        &["math/matrix", "crowd/locals"],
     ),
     (
         "walk",
-        false,
+        &[],
         &["math/canonical", "crowd/affine", "crowd/walk"],
     ),
     (
         "skin",
-        false,
+        &[],
         &["math/canonical", "crowd/affine", "crowd/skin"],
     ),
-    ("half", false, &["math/half", "crowd/half"]),
+    ("half", &[], &["math/half", "crowd/half"]),
 ];
 
 /// The files of the self-test.
@@ -292,11 +293,10 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
         });
     }
-    for (name, has_channels, own) in CROWD {
-        let channels: &[&str] = if has_channels { &CHANNELS } else { &[] };
+    for (name, shared, own) in CROWD {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [channels, own, &["crowd"]].concat(),
+            files: [shared, own, &["crowd"]].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

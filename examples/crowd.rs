@@ -236,20 +236,25 @@ struct Slot {
 /// What was found on the device.
 struct Found {
     name: String,
-    matrices: Vec<[f32; 4]>,
+    /// The result of the last frame.
+    values: Vec<[f32; 4]>,
     /// The host's time for a frame, its allocations, and the time from frame to frame.
     host: Duration,
     allocations: usize,
     wall: Duration,
 }
 
-fn on_device(library: &CrowdLibrary, characters: usize) -> Result<Found, Box<dyn Error>> {
+fn on_device(
+    library: &CrowdLibrary,
+    characters: usize,
+    values: CrowdValues,
+) -> Result<Found, Box<dyn Error>> {
     let renderer = Renderer::new()?;
     let device = &renderer.device;
     let engine = renderer.engine()?;
     let mut crowd = engine.crowd(library, characters, 1)?;
     start(&mut crowd)?;
-    let rows = crowd.output_len(CrowdValues::Model);
+    let rows = crowd.output_len(values);
     let size = rows as u64 * 16;
     let info = vk::CommandPoolCreateInfo::default()
         .queue_family_index(renderer.family)
@@ -281,7 +286,7 @@ fn on_device(library: &CrowdLibrary, characters: usize) -> Result<Found, Box<dyn
             size,
         };
         // SAFETY: the buffer is the device's, has memory and this usage, and outlives the target.
-        unsafe { crowd.target(CrowdValues::Model, place) }
+        unsafe { crowd.target(values, place) }
     };
     let targets: Vec<CrowdTarget> = slots.iter().map(target).collect::<Result<_, _>>()?;
 
@@ -313,7 +318,7 @@ fn on_device(library: &CrowdLibrary, characters: usize) -> Result<Found, Box<dyn
     // SAFETY: nobody else uses the device.
     unsafe { device.device_wait_idle()? };
     let wall = began.elapsed();
-    let matrices = renderer.read(slots[(FRAMES - 1) % IN_FLIGHT].memory, rows)?;
+    let found = renderer.read(slots[(FRAMES - 1) % IN_FLIGHT].memory, rows)?;
     let name = engine.device_name().to_owned();
     drop((targets, crowd, engine));
     // SAFETY: the engine is gone, and nothing is in flight.
@@ -329,19 +334,22 @@ fn on_device(library: &CrowdLibrary, characters: usize) -> Result<Found, Box<dyn
     }
     Ok(Found {
         name,
-        matrices,
+        values: found,
         host: host / (FRAMES - 1) as u32,
         allocations,
         wall: wall / FRAMES as u32,
     })
 }
 
+/// A result, and how long it took.
+type Timed = (Vec<[f32; 4]>, Duration);
+
 /// The same frames on the CPU: the matrices of the last one, and the time of a frame.
 fn on_cpu(
     library: &CrowdLibrary,
     characters: usize,
     values: CrowdValues,
-) -> Result<(Vec<[f32; 4]>, Duration), Box<dyn Error>> {
+) -> Result<Timed, Box<dyn Error>> {
     let engine = Engine::new(Device::Cpu)?;
     let mut crowd = engine.crowd(library, characters, 1)?;
     start(&mut crowd)?;
@@ -398,30 +406,31 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let characters = arguments.next().map_or(Ok(1000), |given| given.parse())?;
     let library = library()?;
-    let (expected, matrices_time) = on_cpu(&library, characters, CrowdValues::Model)?;
-    let (_, rotations_time) = on_cpu(&library, characters, CrowdValues::Rotations)?;
     let joints = library.joints();
     println!("{characters} characters of {joints} joints, {CLIPS} clips, slerp; a frame takes");
-    println!("  the CPU {rotations_time:.2?} for rotations, {matrices_time:.2?} for matrices");
-    if let Some(path) = arguments.next() {
-        std::fs::write(&path, picture(&skeleton()?, &expected)?)?;
-        println!("  {path} shows some of them in the last frame");
-    }
-    let found = on_device(&library, characters)?;
-    println!(
-        "  {} {:.2?} for matrices, and of the host {:.1?}",
-        found.name, found.wall, found.host
-    );
-    let bits = |row: &[f32; 4]| row.map(f32::to_bits);
-    let pairs = found.matrices.iter().zip(&expected);
-    let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();
-    println!(
-        "{} rows of matrices in the last frame, {differing} differ from the CPU's, {} allocations in {FRAMES} frames",
-        found.matrices.len(),
-        found.allocations
-    );
-    if differing > 0 || found.allocations > 0 {
-        return Err("bits differ, or recording allocates".into());
+    let picture_path = arguments.next();
+    for values in [CrowdValues::Rotations, CrowdValues::Model] {
+        let (expected, time) = on_cpu(&library, characters, values)?;
+        let found = on_device(&library, characters, values)?;
+        println!(
+            "  {values:?}: the CPU {time:.2?}, {} {:.2?}, and of the host {:.1?}",
+            found.name, found.wall, found.host
+        );
+        let bits = |row: &[f32; 4]| row.map(f32::to_bits);
+        let pairs = found.values.iter().zip(&expected);
+        let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+        println!(
+            "{} vectors in the last frame, {differing} differ from the CPU's, {} allocations in {FRAMES} frames",
+            found.values.len(),
+            found.allocations
+        );
+        if differing > 0 || found.allocations > 0 {
+            return Err("bits differ, or recording allocates".into());
+        }
+        if let (CrowdValues::Model, Some(path)) = (values, &picture_path) {
+            std::fs::write(path, picture(&skeleton()?, &found.values)?)?;
+            println!("{path} shows some of them in the last frame");
+        }
     }
     Ok(())
 }

@@ -84,7 +84,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
                 results += 1;
             }
         }
-        assert!(results > 10, "{name} has only {results} float operations");
+        assert!(results > 0, "{name} has no float operations");
         assert_eq!(
             results,
             decorations.len(),

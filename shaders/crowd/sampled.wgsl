@@ -18,12 +18,6 @@ const ROTATION: u32 = 0;
 const TRANSLATION: u32 = 1;
 const SCALE: u32 = 2;
 
-// A cubic about the middle of its span.
-fn cubic(c0: vec4f, c1: vec4f, c2: vec4f, c3: vec4f, s: f32) -> vec4f {
-    let z = s * s;
-    return c0 + ((c3 * s + c2) * z + c1 * s);
-}
-
 // A channel where its time base stands.
 fn sampled(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
     let form = channel.form_and_base >> 24u;

@@ -24,6 +24,9 @@ use crate::tracks::vectors::Channel;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::place_at;
 
+/// Places in a table are counted in 32 bits, with some to spare.
+const MOST_PLACES: usize = 1 << 31;
+
 /// The tables of all clips.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ClipTables {
@@ -253,11 +256,24 @@ impl ClipTables {
             });
             curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
         }
-        self.add(clock.period, &curves)
+        // Every curve has its constants and keys, and may have spans of its own.
+        let constants = |curve: &Curve| curve.constants.len() + curve.keys.len();
+        let more: usize = curves.iter().map(constants).sum();
+        let spans: usize = curves.iter().map(|curve| curve.spans.len()).sum();
+        let counts = [
+            self.cells.len() + more,
+            self.spans.len() + spans + 1,
+            self.channels.len() + curves.len(),
+        ];
+        if counts.iter().any(|&count| count > MOST_PLACES) || curves.len() >= 1 << 24 {
+            return Err(CrowdError::TooLarge);
+        }
+        self.add(clock.period, &curves);
+        Ok(())
     }
 
     /// Gives the curves of a clip their places.
-    fn add(&mut self, period: u32, curves: &[Curve]) -> Result<(), CrowdError> {
+    fn add(&mut self, period: u32, curves: &[Curve]) {
         let first_base = self.bases.len();
         if self.cells.is_empty() {
             self.cells.push([0.0; 4]); // kernels use the first cell as 0
@@ -357,18 +373,12 @@ impl ClipTables {
                 };
             }
         }
-        let counts = [self.cells.len(), self.spans.len(), self.channels.len()];
-        if counts.iter().any(|&count| count > (1 << 31)) || self.bases.len() - first_base > 1 << 24
-        {
-            return Err(CrowdError::TooLarge);
-        }
         self.clips.push(CrowdClip {
             period,
             first_base: first_base as u32,
             bases: (self.bases.len() - first_base) as u32,
         });
         self.runs.push(self.runs_from(first_channel));
-        Ok(())
     }
 
     /// Whether no rotation is anything but an arc or a constant.

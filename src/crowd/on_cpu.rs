@@ -77,7 +77,7 @@ impl InLanes for Task<'_, '_> {
         let tables = &library.tables;
         let all = entries.iter().zip(self.places.chunks_exact_mut(bases));
         for (place, (entry, own)) in all.enumerate() {
-            if place % layers == 0 || entry.clip_and_weight >> 16 != 0 {
+            if place.is_multiple_of(layers) || entry.clip_and_weight >> 16 != 0 {
                 let clock = self.scene.clock;
                 places(
                     entry,
@@ -184,6 +184,20 @@ fn rotations<L: Lanes>(
     }
 }
 
+/// As many arcs as there are lanes, at one parameter. No closure: its body would not be compiled for the
+/// vector width.
+#[inline(always)]
+fn block<L: Lanes>(middles: &[[f32; 4]], tangents: &[[f32; 4]], parameter: f32) -> L::Rotations {
+    let (middle, tangent) = (L::load_rotations(middles), L::load_rotations(tangents));
+    let square = norm_squared(tangent);
+    L::rotations(canonical(on_arc(
+        middle,
+        tangent,
+        square,
+        L::all(parameter),
+    )))
+}
+
 /// Arcs of neighbouring joints at one parameter.
 #[inline(always)]
 fn arcs<L: Lanes>(
@@ -192,15 +206,10 @@ fn arcs<L: Lanes>(
     parameter: f32,
     output: &mut [[f32; 4]],
 ) {
-    let s = L::all(parameter);
-    let arcs = |middles: &[[f32; 4]], tangents: &[[f32; 4]]| {
-        let (middle, tangent) = (L::load_rotations(middles), L::load_rotations(tangents));
-        L::rotations(canonical(on_arc(middle, tangent, norm_squared(tangent), s)))
-    };
     let whole = output.len() / L::COUNT * L::COUNT;
     for first in (0..whole).step_by(L::COUNT) {
         let own = first..first + L::COUNT;
-        let found = arcs(&middles[own.clone()], &tangents[own.clone()]);
+        let found = block::<L>(&middles[own.clone()], &tangents[own.clone()], parameter);
         output[own].copy_from_slice(found.as_ref());
     }
     let rest = output.len() - whole;
@@ -209,7 +218,7 @@ fn arcs<L: Lanes>(
         let mut ends = [[[0.0; 4]; MOST_LANES]; 2];
         ends[0][..rest].copy_from_slice(&middles[whole..]);
         ends[1][..rest].copy_from_slice(&tangents[whole..]);
-        let found = arcs(&ends[0][..L::COUNT], &ends[1][..L::COUNT]);
+        let found = block::<L>(&ends[0][..L::COUNT], &ends[1][..L::COUNT], parameter);
         output[whole..].copy_from_slice(&found.as_ref()[..rest]);
     }
 }

@@ -6,7 +6,7 @@ use ash::vk;
 
 use crate::crowd::error::{CrowdError, OFFSET_STEP};
 use crate::crowd::output::CrowdOutput;
-use crate::crowd::player::{Crowd, steps};
+use crate::crowd::player::Crowd;
 use crate::gpu::crowd_target::CrowdTarget as DeviceTarget;
 use crate::gpu::handles::VulkanBuffer;
 
@@ -55,7 +55,7 @@ impl Crowd {
         let device = self.device.as_ref().ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
         let (offset, size) = (buffer.offset, buffer.size);
-        let needed = DeviceTarget::bytes(device, steps(output));
+        let needed = DeviceTarget::bytes(device, output.steps());
         if !offset.is_multiple_of(OFFSET_STEP) || size < needed {
             return Err(CrowdError::Buffer {
                 offset,
@@ -63,7 +63,7 @@ impl Crowd {
                 needed,
             });
         }
-        let own = DeviceTarget::new(device, steps(output), buffer.buffer, offset)?;
+        let own = DeviceTarget::new(device, output.steps(), buffer.buffer, offset)?;
         Ok(CrowdTarget { own, output })
     }
 

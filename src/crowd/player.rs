@@ -10,7 +10,7 @@ use crate::crowd::on_cpu::{self, Scene};
 use crate::crowd::output::{CrowdOutput, CrowdValues};
 use crate::engine::Engine;
 use crate::evaluate::backend::Backend;
-use crate::gpu::crowd::{CrowdShape, CrowdSource, CrowdSteps, DeviceCrowd};
+use crate::gpu::crowd::{CrowdShape, CrowdSource, DeviceCrowd};
 use crate::gpu::crowd_reader::CrowdReader;
 use crate::memory::zeroed;
 use crate::shader::CrowdEntry;
@@ -311,7 +311,7 @@ impl Crowd {
         };
         let reader = match self.reader.take() {
             Some((own, reader)) if own == output => reader,
-            _ => CrowdReader::new(device, steps(output))?,
+            _ => CrowdReader::new(device, output.steps())?,
         };
         let (_, reader) = self.reader.insert((output, reader));
         let clock = self.instances.clock();
@@ -434,17 +434,6 @@ impl Crowd {
     /// What changed since the last evaluation, and the clock, for one that is recorded.
     pub(crate) fn changes(&mut self) -> (u64, impl Iterator<Item = (usize, &[CrowdEntry])>) {
         (self.instances.clock(), self.instances.take_changes())
-    }
-}
-
-/// The kernels that run for an output.
-pub(crate) fn steps(output: CrowdOutput) -> CrowdSteps {
-    use CrowdValues::{Model, Rotations, Skinning};
-    CrowdSteps {
-        matrices: output.values != Rotations,
-        walk: matches!(output.values, Model | Skinning),
-        skin: output.values == Skinning,
-        half: output.is_half,
     }
 }
 

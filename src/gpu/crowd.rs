@@ -10,6 +10,7 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
+use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPlace, Kernel};
 
@@ -18,6 +19,9 @@ const UPDATE: usize = 1 << 16;
 
 /// The fewest instances of a window: so many that windows start at multiples of 256 bytes.
 const LEAST_WINDOW: u64 = 32;
+
+/// Bytes of a window's matrices on a software device.
+const SOFTWARE_WINDOW: u64 = 8 << 20;
 
 /// What a crowd's kernels read, as bytes.
 pub(crate) struct CrowdSource<'a> {
@@ -142,7 +146,11 @@ impl DeviceCrowd {
             .max_storage_buffer_range
             .min(info.max_memory_allocation_size);
         let budget = self.engine.clip_bytes().map_or(range, |bytes| bytes as u64);
-        let range = range.min(budget);
+        let mut range = range.min(budget);
+        if info.kind == DeviceKind::Cpu {
+            // Every kernel goes over a window while it is in the processor's cache.
+            range = range.min(SOFTWARE_WINDOW);
+        }
         // Vectors are counted in 32 bits.
         let most = (range / bytes).min(u64::from(u32::MAX / 4) / (bytes / 8));
         let all = u64::from(shape.instances).next_multiple_of(LEAST_WINDOW);
@@ -233,14 +241,15 @@ pub(crate) struct CrowdPipelines {
 impl CrowdPipelines {
     pub(crate) fn new(crowd: &DeviceCrowd, steps: CrowdSteps) -> Result<Self, VulkanError> {
         let (engine, shape) = (&crowd.engine, &crowd.shape);
+        let is_plain = shape.layers == 1 && shape.only_arcs;
         let if_wanted = |wanted: bool, kernel| wanted.then(|| engine.pipeline(kernel)).transpose();
         Ok(Self {
             times: engine.pipeline(Kernel::CrowdTimes)?,
-            joints: engine.pipeline(match (steps.matrices, shape.layers) {
-                (true, 1) => Kernel::CrowdLocalsAlone,
-                (true, _) => Kernel::CrowdLocals,
-                (false, 1) if shape.only_arcs => Kernel::CrowdArcs,
-                (false, _) => Kernel::CrowdRotations,
+            joints: engine.pipeline(match (steps.matrices, is_plain) {
+                (true, true) => Kernel::CrowdPlainLocals,
+                (true, false) => Kernel::CrowdLocals,
+                (false, true) => Kernel::CrowdPlainRotations,
+                (false, false) => Kernel::CrowdRotations,
             })?,
             walk: if_wanted(steps.walk, Kernel::CrowdWalk)?,
             skin: if_wanted(steps.skin, Kernel::CrowdSkin)?,

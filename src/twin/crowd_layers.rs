@@ -1,5 +1,5 @@
-//! Twin of `shaders/crowd/sampled.wgsl`, `shaders/crowd/layers.wgsl`, `shaders/crowd/alone.wgsl`,
-//! `shaders/crowd/arcs.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the same order.
+//! Twin of `shaders/crowd/cubic.wgsl`, `shaders/crowd/sampled.wgsl`, `shaders/crowd/layers.wgsl`,
+//! `shaders/crowd/plain.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the same order.
 
 use glam::Vec4;
 

@@ -1,8 +1,10 @@
 //! Twin of `shaders/crowd/locals.wgsl`, `shaders/crowd/affine.wgsl`, `shaders/crowd/walk.wgsl`,
 //! `shaders/crowd/skin.wgsl` and `shaders/crowd/half.wgsl`: the same names, the same order.
 
-use crate::math::canonical::canonical;
+use glam::Vec4;
+
 use crate::shader::{HALF_INFINITE, HALF_OVERFLOW};
+use crate::simd::lanes::Number as _;
 use crate::twin::f16::to_half;
 use crate::twin::matrix;
 
@@ -12,8 +14,9 @@ pub(crate) type Rows = [[f32; 4]; 3];
 /// A row of a rotation's matrix with the columns scaled, and the translation behind it.
 #[inline(always)]
 pub(crate) fn transform_row(turned: [f32; 3], scale: [f32; 4], moved: f32) -> [f32; 4] {
-    let [x, y, z] = turned.map(canonical);
-    [x * scale[0], y * scale[1], z * scale[2], moved].map(canonical)
+    let [x, y, z] = turned;
+    let row = Vec4::new(x, y, z, 0.0).canonical() * Vec4::from_array(scale);
+    row.with_w(moved).canonical().to_array()
 }
 
 /// The transform T R S.
@@ -27,11 +30,16 @@ pub(crate) fn transform(rotation: [f32; 4], moved: [f32; 4], scale: [f32; 4]) ->
     ]
 }
 
-/// A row of the product: this row times the rows of the other matrix.
+/// A row of the product: this row times the rows of the other matrix. What is added to the first three
+/// numbers is 0, which changes none but -0, and the last step makes that +0.
 #[inline(always)]
-pub(crate) fn row_product(row: [f32; 4], [first, second, third]: &Rows) -> [f32; 4] {
-    let sum = |c: usize| (first[c] * row[0] + second[c] * row[1]) + third[c] * row[2];
-    [sum(0), sum(1), sum(2), sum(3) + row[3]].map(canonical)
+pub(crate) fn row_product(row: [f32; 4], other: &Rows) -> [f32; 4] {
+    let [first, second, third] = other.map(Vec4::from_array);
+    let [x, y, z, moved] = row;
+    let sum = (first * x + second * y) + third * z;
+    (sum + Vec4::new(0.0, 0.0, 0.0, moved))
+        .canonical()
+        .to_array()
 }
 
 /// The product of two affine matrices.

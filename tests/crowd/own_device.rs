@@ -114,7 +114,7 @@ fn frames_are_recorded_into_an_applications_commands() {
         let (mut frames, mut wanted) = (Vec::new(), Vec::new());
         for (frame, target) in targets.iter().enumerate() {
             for place in 0..66 {
-                if frame == 0 || random.next() % 7 == 0 {
+                if frame == 0 || random.next().is_multiple_of(7) {
                     let plays = layer(&mut random, &library);
                     crowd.set(place / 2, place % 2, plays).unwrap();
                     expected.set(place / 2, place % 2, plays).unwrap();

@@ -206,12 +206,9 @@ pub(super) fn times() -> Vec<Twin> {
                 words(wide_remainder(x, q))
             },
         ),
-        twin(
-            TIMES,
-            "in_parts",
-            |random| random.word(),
-            |ticks| words(in_parts(ticks)),
-        ),
+        twin(TIMES, "in_parts", Random::word, |ticks| {
+            words(in_parts(ticks))
+        }),
         with_globals(TIMES, "tick_of", |random, trial| {
             let period = period(random);
             let (entry, clock) = entry(random, period);
@@ -399,20 +396,23 @@ impl Scene {
 }
 
 impl Scene {
-    /// One layer, whose rotations are arcs and constants.
-    fn make_arcs(&mut self) {
+    /// One layer, whose rotations are arcs and constants, and all others cubics and constants.
+    fn make_plain(&mut self) {
         self.layers = 1;
         self.cells[0] = [0.0; 4];
-        for channel in &mut self.channels {
-            *channel = as_arc(*channel);
+        for (kind, channel) in (0..).zip(&mut self.channels) {
+            *channel = match kind % CHANNELS == ROTATION {
+                true => plain(*channel, FORM_ARC),
+                false => plain(*channel, FORM_CUBIC),
+            };
         }
     }
 }
 
-/// The channel as an arc, or as a constant where its keys lie at an even place.
-fn as_arc(channel: CrowdChannel) -> CrowdChannel {
+/// The channel in a form, or as a constant where its keys lie at an even place.
+fn plain(channel: CrowdChannel, form: u32) -> CrowdChannel {
     let is_constant = channel.keys.is_multiple_of(2);
-    let form = if is_constant { FORM_CONSTANT } else { FORM_ARC };
+    let form = if is_constant { FORM_CONSTANT } else { form };
     let first = channel.first + 1;
     CrowdChannel {
         first,
@@ -422,9 +422,9 @@ fn as_arc(channel: CrowdChannel) -> CrowdChannel {
     }
 }
 
-fn twin_of_arc_value() -> Twin {
-    with_globals("crowd_arcs", "arc_value", |random, trial| {
-        let (channel, place) = (as_arc(channel(random)), place(random));
+fn plain_value(function: &'static str, form: u32) -> Twin {
+    with_globals("crowd_plain_locals", function, move |random, trial| {
+        let (channel, place) = (plain(channel(random), form), place(random));
         let mut cells = cells(random, CELLS);
         cells[0] = [0.0; 4];
         trial.argument(channel);
@@ -512,21 +512,11 @@ pub(super) fn layers() -> Vec<Twin> {
             trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
             trial.expect(scene.twin().layered(instance, joint, ROTATION));
         }),
-        twin_of_arc_value(),
-        with_globals("crowd_arcs", "crowd_work", |random, trial| {
+        plain_value("arc_value", FORM_ARC),
+        plain_value("cubic_value", FORM_CUBIC),
+        with_globals("crowd_plain_locals", "layered", |random, trial| {
             let mut scene = Scene::new(random);
-            scene.make_arcs();
-            let (instance, joint) = (random.below(2), random.below(JOINTS));
-            let place = instance * JOINTS + joint;
-            trial.argument(place);
-            scene.put(trial);
-            trial.output("turned");
-            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
-            trial.expect(scene.twin().layered(instance, joint, ROTATION));
-        }),
-        with_globals("crowd_locals_alone", "layered", |random, trial| {
-            let mut scene = Scene::new(random);
-            scene.layers = 1;
+            scene.make_plain();
             let (instance, joint) = (random.below(2), random.below(JOINTS));
             let kind = random.below(CHANNELS);
             trial.argument((instance, joint, kind));
