@@ -40,6 +40,9 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
+# A newer lavapipe, and AMD's compiler for cards of today (tests/mesa).
+./scripts/mesa.sh
+
 # Peers to compare with, in an environment of their own (cli/tests/peers).
 fetch_peers() {
     peers=target/peers

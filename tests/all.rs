@@ -11,6 +11,7 @@ mod external_vectors;
 mod extremes;
 mod follow;
 mod golden;
+mod mesa;
 mod motion;
 mod original;
 mod outside;

@@ -9,7 +9,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
 #[allow(dead_code, unreachable_pub)] // the pass that the build and the engine have
 #[path = "../src/shader/spirv.rs"]
-mod pass;
+pub(crate) mod pass;
 
 use pass::{
     FloatControls, SpirvError, float_controls, no_contraction, texel_buffers, without_decorations,

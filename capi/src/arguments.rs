@@ -1,0 +1,145 @@
+//! Pointers and sizes of the caller's, checked before they are used.
+
+use std::ffi::{CStr, c_char};
+
+use crate::result::{Failure, TumbleResult};
+
+fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
+    if pointer.is_null() {
+        let message = format!("`{what}` is null");
+        return Err(Failure::new(TumbleResult::InvalidPointer, message));
+    }
+    if !pointer.is_aligned() {
+        let message = format!("`{what}` is not aligned to {} bytes", align_of::<T>());
+        return Err(Failure::new(TumbleResult::InvalidPointer, message));
+    }
+    Ok(())
+}
+
+/// How many numbers `count` times `each` are; an error where no memory holds so many.
+pub(crate) fn product<T>(count: usize, each: usize, what: &str) -> Result<usize, Failure> {
+    let bytes = count
+        .checked_mul(each)
+        .and_then(|all| all.checked_mul(size_of::<T>()))
+        .and_then(|bytes| isize::try_from(bytes).ok());
+    match bytes {
+        Some(_) => Ok(count * each),
+        None => Err(Failure::argument(format!(
+            "`{what}` would have {count} × {each} numbers, which no memory holds"
+        ))),
+    }
+}
+
+/// A list of the caller's; none where there is nothing in it, whatever the pointer is.
+///
+/// # Safety
+/// Where `count` is not 0 and `pointer` is neither null nor unaligned, `count` values are there and
+/// stay as they are during the call.
+pub(crate) unsafe fn list<'a, T: Copy>(
+    pointer: *const T,
+    count: usize,
+    what: &str,
+) -> Result<&'a [T], Failure> {
+    product::<T>(count, 1, what)?;
+    if count == 0 {
+        return Ok(&[]);
+    }
+    check(pointer, what)?;
+    // SAFETY: not null, aligned, of a size that can be; the rest is the caller's promise.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// Memory of the caller's for numbers.
+///
+/// # Safety
+/// As [`list`]; nothing else uses the memory during the call.
+pub(crate) unsafe fn list_mut<'a>(
+    pointer: *mut f32,
+    count: usize,
+    what: &str,
+) -> Result<&'a mut [f32], Failure> {
+    product::<f32>(count, 1, what)?;
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    check(pointer, what)?;
+    // SAFETY: as in `list`; every pattern of bits is a number.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A structure of the caller's that begins with its own size; `None` where the pointer is null.
+///
+/// # Safety
+/// The pointer is null, unaligned, or that of a structure whose first member is its size in bytes,
+/// with so many bytes behind it.
+pub(crate) unsafe fn sized<T: Copy>(
+    pointer: *const T,
+    size: impl FnOnce(*const T) -> *const usize,
+    what: &str,
+) -> Result<Option<T>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    check(pointer, what)?;
+    // SAFETY: aligned and not null; the first member is there in every version of the structure.
+    let size = unsafe { size(pointer).read() };
+    if size != size_of::<T>() {
+        return Err(Failure::argument(format!(
+            "`{what}->size` is {size}, and this version's structure has {} bytes; set it to \
+             `sizeof`, with the header of the library's version",
+            size_of::<T>()
+        )));
+    }
+    // SAFETY: it has the size that this version's has.
+    Ok(Some(unsafe { pointer.read() }))
+}
+
+/// Text of the caller's; `None` where the pointer is null.
+///
+/// # Safety
+/// The pointer is null, or that of bytes which end with a zero and stay as they are during the call.
+pub(crate) unsafe fn text<'a>(
+    pointer: *const c_char,
+    what: &str,
+) -> Result<Option<&'a str>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    let text = text.to_str();
+    text.map(Some)
+        .map_err(|_| Failure::argument(format!("`{what}` is not UTF-8")))
+}
+
+/// Where a value goes.
+pub(crate) struct Out<T> {
+    pointer: *mut T,
+}
+
+impl<T> Out<T> {
+    /// Checked before the work, so that nothing is done that could not be given.
+    pub(crate) fn new(pointer: *mut T, what: &str) -> Result<Self, Failure> {
+        check(pointer, what)?;
+        Ok(Self { pointer })
+    }
+
+    /// # Safety
+    /// The pointer is that of memory for such a value, which nothing else uses during the call.
+    pub(crate) unsafe fn set(self, value: T) {
+        // SAFETY: not null and aligned; the rest is the caller's promise. Nothing is dropped that
+        // was there before: it may never have been written.
+        unsafe { self.pointer.write(value) };
+    }
+}
+
+/// What a constant of C's stands for.
+pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], what: &str) -> Result<T, Failure> {
+    let found = known.iter().find(|&&(own, _)| own == value);
+    found.map(|&(_, value)| value).ok_or_else(|| {
+        let last = known.len() - 1;
+        Failure::argument(format!(
+            "`{what}` is {value}; its constants are 0 to {last}"
+        ))
+    })
+}

@@ -1,0 +1,172 @@
+//! Evaluating: a set in one go, or a clip that stays on a device.
+
+use tumble::{Clip, Frames, Timeline, TrackSet};
+
+use crate::arguments::{Out, list_mut};
+use crate::engine::TumbleEngine;
+use crate::handle::{self, Object};
+use crate::interpolation::TumbleInterpolation;
+use crate::result::{Failure, TumbleResult, code};
+use crate::samples::{TumbleSamples, layout};
+use crate::set::TumbleSet;
+
+/// A set prepared for one method, on an engine's device. Any number of threads may use it at once.
+pub struct TumbleClip {
+    own: Clip,
+}
+
+impl Object for TumbleClip {
+    const NAME: &'static str = "clip";
+}
+
+/// How many floats a result has, four for each sample, of which `floats` must be exactly as many.
+fn check_size(tracks: usize, timeline: &Timeline, floats: usize) -> Result<(), Failure> {
+    let needed = tracks as u128 * timeline.len() as u128 * 4;
+    if floats as u128 == needed {
+        return Ok(());
+    }
+    let message = format!(
+        "`output_count` is {floats}; the result has {needed} floats: {tracks} tracks × {} samples × 4",
+        timeline.len()
+    );
+    Err(Failure::new(TumbleResult::WrongSize, message))
+}
+
+fn timeline(set: &TrackSet, frames: &Frames) -> Result<Timeline, Failure> {
+    Ok(frames.resolve(set.track_count(), set.time_span())?)
+}
+
+/// How many samples each track of a set has: a result has 4 × tracks × samples floats.
+///
+/// # Safety
+/// `samples` is such a structure, and `count` has room for a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_set_sample_count(
+    set: *const TumbleSet,
+    samples: *const TumbleSamples,
+    count: *mut usize,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(count, "count")?;
+        let set = handle::get(set)?;
+        // SAFETY: as the caller promises.
+        let frames = unsafe { TumbleSamples::read(samples)? };
+        let timeline = timeline(&set.read(), &frames)?;
+        // SAFETY: as the caller promises.
+        unsafe { out.set(timeline.len()) };
+        Ok(())
+    })
+}
+
+/// Prepares and evaluates a set in one go, into the caller's memory: `output_count` floats, exactly
+/// 4 × tracks × samples. Memory that is aligned to 16 bytes is filled without a copy. All arguments are
+/// checked before anything is written.
+///
+/// # Safety
+/// `interpolation` is null (the defaults) or such a structure, `samples` is such a structure, and
+/// `output` has room for `output_count` floats, which nothing else uses during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_evaluate(
+    engine: *const TumbleEngine,
+    set: *const TumbleSet,
+    interpolation: *const TumbleInterpolation,
+    samples: *const TumbleSamples,
+    layout: u32,
+    output: *mut f32,
+    output_count: usize,
+) -> TumbleResult {
+    code(|| {
+        let (engine, set) = (handle::get(engine)?, handle::get(set)?);
+        // SAFETY: as the caller promises.
+        let (interpolation, frames) = unsafe {
+            let interpolation = TumbleInterpolation::read(interpolation)?;
+            (interpolation, TumbleSamples::read(samples)?)
+        };
+        let layout = self::layout(layout)?;
+        let set = set.read();
+        let timeline = timeline(&set, &frames)?;
+        check_size(set.track_count(), &timeline, output_count)?;
+        // SAFETY: as the caller promises.
+        let output = unsafe { list_mut(output, output_count, "output")? };
+        let (rows, _) = output.as_chunks_mut::<4>();
+        let (engine, how) = (&engine.own, interpolation);
+        Ok(engine.evaluate_into(&set, how, &frames, layout, rows)?)
+    })
+}
+
+/// Prepares a set for a method and brings it to the engine's device, where it stays.
+///
+/// # Safety
+/// `interpolation` is null (the defaults) or such a structure, and `clip` has room for a handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_upload(
+    engine: *const TumbleEngine,
+    set: *const TumbleSet,
+    interpolation: *const TumbleInterpolation,
+    clip: *mut *mut TumbleClip,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(clip, "clip")?;
+        let (engine, set) = (handle::get(engine)?, handle::get(set)?);
+        // SAFETY: as the caller promises.
+        let interpolation = unsafe { TumbleInterpolation::read(interpolation)? };
+        let own = engine.own.upload(&set.read(), interpolation)?;
+        // SAFETY: as the caller promises.
+        unsafe { out.set(handle::give(TumbleClip { own })) };
+        Ok(())
+    })
+}
+
+/// How many samples each track of a clip has: a result has 4 × tracks × samples floats.
+///
+/// # Safety
+/// `samples` is such a structure, and `count` has room for a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_clip_sample_count(
+    clip: *const TumbleClip,
+    samples: *const TumbleSamples,
+    count: *mut usize,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(count, "count")?;
+        let clip = handle::get(clip)?;
+        // SAFETY: as the caller promises.
+        let frames = unsafe { TumbleSamples::read(samples)? };
+        let timeline = clip.own.timeline(&frames)?;
+        // SAFETY: as the caller promises.
+        unsafe { out.set(timeline.len()) };
+        Ok(())
+    })
+}
+
+/// Evaluates a clip into the caller's memory, as `tumble_evaluate` does a set.
+///
+/// # Safety
+/// As `tumble_evaluate`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_clip_evaluate(
+    clip: *const TumbleClip,
+    samples: *const TumbleSamples,
+    layout: u32,
+    output: *mut f32,
+    output_count: usize,
+) -> TumbleResult {
+    code(|| {
+        let clip = handle::get(clip)?;
+        // SAFETY: as the caller promises.
+        let frames = unsafe { TumbleSamples::read(samples)? };
+        let layout = self::layout(layout)?;
+        let timeline = clip.own.timeline(&frames)?;
+        check_size(clip.own.track_count(), &timeline, output_count)?;
+        // SAFETY: as the caller promises.
+        let output = unsafe { list_mut(output, output_count, "output")? };
+        let (rows, _) = output.as_chunks_mut::<4>();
+        Ok(clip.own.evaluate_into(&frames, layout, rows)?)
+    })
+}
+
+/// Gives a clip back. Null is allowed.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_clip_free(clip: *mut TumbleClip) -> TumbleResult {
+    code(|| handle::free(clip))
+}

@@ -1,0 +1,157 @@
+//! Engines: the devices that evaluate.
+
+use std::ffi::{CString, c_char};
+
+use tumble::{Device, Engine, EngineOptions, Error, VulkanError};
+
+use crate::arguments::{Out, sized, text};
+use crate::handle::{self, Object};
+use crate::result::{Failure, TumbleResult, code, guarded};
+
+/// One device, open. Any number of threads may use it at once.
+pub struct TumbleEngine {
+    pub(crate) own: Engine,
+    name: CString,
+}
+
+impl Object for TumbleEngine {
+    const NAME: &'static str = "engine";
+}
+
+/// How a device is opened. All zeros but `size` are the defaults.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct TumbleEngineOptions {
+    /// `sizeof(TumbleEngineOptions)`.
+    pub size: usize,
+    /// Bytes of a Vulkan device's memory that segments may take; 0: as many as it has.
+    pub memory: u64,
+    /// Threads of the CPU; 0: one for each core, shared by all engines.
+    pub threads: u32,
+    /// 1: a device that fails its self-test is used all the same, and its bits may differ.
+    pub allow_inexact: u32,
+}
+
+/// Opens a device.
+///
+/// `device`: "auto" (or null), the device that is measured to be the fastest; "cpu"; "vulkan", the
+/// first Vulkan device that is exact; or a Vulkan device by its index or by a part of its name. All
+/// give the same bits. `options` may be null.
+///
+/// # Safety
+/// `device` is null or text that ends with a zero, `options` null or such a structure, and `engine`
+/// has room for a handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_engine_open(
+    device: *const c_char,
+    options: *const TumbleEngineOptions,
+    engine: *mut *mut TumbleEngine,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(engine, "engine")?;
+        // SAFETY: as the caller promises.
+        let (device, options) = unsafe {
+            let size = |own: *const TumbleEngineOptions| (&raw const (*own).size).cast();
+            (text(device, "device")?, sized(options, size, "options")?)
+        };
+        let options = options.map_or_else(|| Ok(EngineOptions::default()), engine_options)?;
+        let own = open(device.unwrap_or("auto"), &options)?;
+        let name = own.device_name().replace('\0', "");
+        let name = CString::new(name).unwrap_or_default();
+        // SAFETY: as the caller promises.
+        unsafe { out.set(handle::give(TumbleEngine { own, name })) };
+        Ok(())
+    })
+}
+
+fn engine_options(given: TumbleEngineOptions) -> Result<EngineOptions, Failure> {
+    let mut options = EngineOptions::default();
+    options.memory = (given.memory > 0).then_some(given.memory);
+    options.threads = (given.threads > 0).then_some(given.threads as usize);
+    options.allow_inexact = match given.allow_inexact {
+        0 => false,
+        1 => true,
+        other => {
+            let message = format!("`options->allow_inexact` is {other}; it is 0 or 1");
+            return Err(Failure::argument(message));
+        }
+    };
+    Ok(options)
+}
+
+fn open(name: &str, options: &EngineOptions) -> Result<Engine, Failure> {
+    match name.to_lowercase().as_str() {
+        "auto" => auto(options),
+        "cpu" => Ok(Engine::with_options(Device::Cpu, options)?),
+        "vulkan" => first_exact(options),
+        _ => Ok(Engine::with_options(named(name)?, options)?),
+    }
+}
+
+/// The fastest device, with the options.
+fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
+    let found = Engine::auto()?;
+    let name = found.device_info().map(|info| info.name.clone());
+    let Some(name) = name else {
+        return Ok(Engine::with_options(Device::Cpu, options)?);
+    };
+    if options.memory.is_none() {
+        return Ok(found);
+    }
+    let mut all = Device::list()?.into_iter();
+    match all.find(|device| device.name() == name) {
+        Some(device) => Ok(Engine::with_options(device, options)?),
+        None => Ok(found),
+    }
+}
+
+/// The first Vulkan device that opens; else why the first one does not.
+fn first_exact(options: &EngineOptions) -> Result<Engine, Failure> {
+    let mut reason = None;
+    for device in Device::list()? {
+        match Engine::with_options(device, options) {
+            Ok(engine) => return Ok(engine),
+            Err(error) => reason = reason.or(Some(error)),
+        }
+    }
+    Err(reason
+        .unwrap_or(Error::Vulkan(VulkanError::NoDevice))
+        .into())
+}
+
+fn named(name: &str) -> Result<Device, Failure> {
+    let devices = Device::list()?;
+    let index = name.parse().ok();
+    let wanted = name.to_lowercase();
+    let is_it = |device: &&Device| device.name().to_lowercase().contains(&wanted);
+    let found = match index {
+        Some(index) => devices.get::<usize>(index),
+        None if name.is_empty() => None,
+        None => devices.iter().find(is_it),
+    };
+    found.cloned().ok_or_else(|| {
+        let names: Vec<&str> = devices.iter().map(Device::name).collect();
+        let message = format!(
+            "there is no device `{name}`; there are auto, cpu, vulkan and {}",
+            match names.is_empty() {
+                true => "no Vulkan devices".to_owned(),
+                false => names.join(", "),
+            }
+        );
+        Failure::new(TumbleResult::Device, message)
+    })
+}
+
+/// The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for what
+/// is no engine.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_engine_device_name(engine: *const TumbleEngine) -> *const c_char {
+    let name = guarded(|| Ok(handle::get(engine)?.name.as_ptr()));
+    name.unwrap_or(std::ptr::null())
+}
+
+/// Gives an engine back; clips that were uploaded to it keep its device. Null is allowed.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_engine_free(engine: *mut TumbleEngine) -> TumbleResult {
+    code(|| handle::free(engine))
+}

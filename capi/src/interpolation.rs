@@ -1,0 +1,225 @@
+//! How tracks are interpolated.
+
+use std::ffi::{CString, c_char};
+use std::sync::LazyLock;
+
+use glam::DVec3;
+use tumble::{
+    Axes, Ends, Interpolation, METHODS, Method, Path, Quantity, Speed, Tcb, WrapMode, method,
+};
+
+use crate::arguments::{constant, sized, text};
+use crate::result::Failure;
+
+/// Which of the two quaternions of each key counts.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumblePath {
+    /// The one nearer to the key before: no rotation goes the long way round.
+    Shortest = 0,
+    /// The one that was given. Methods that have a path of their own keep it.
+    AsAuthored = 1,
+}
+
+/// The curve in the first and the last segment.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleEnds {
+    /// The method's own.
+    OfMethod = 0,
+    /// The parabola through the last three keys.
+    Parabolic = 1,
+    /// No angular acceleration.
+    Natural = 2,
+    /// The angular velocities `start_velocity` and `end_velocity`.
+    Clamped = 3,
+    /// The angular velocity of slerp between the last two keys.
+    Secant = 4,
+    /// The last key repeats the first; neighbours are taken across the seam.
+    Loop = 5,
+    /// The first and the last segment hold their first key.
+    Frozen = 6,
+}
+
+/// What is evaluated: four numbers for each sample.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleQuantity {
+    /// The rotation, a unit quaternion `x y z w`.
+    Rotation = 0,
+    /// The angular velocity in the body's axes, rad/s, `x y z 0`.
+    VelocityInBody = 1,
+    /// The angular velocity in the parent's axes, rad/s, `x y z 0`.
+    VelocityInParent = 2,
+    /// The angular acceleration in the body's axes, rad/s², `x y z 0`.
+    AccelerationInBody = 3,
+    /// The angular acceleration in the parent's axes, rad/s², `x y z 0`.
+    AccelerationInParent = 4,
+}
+
+/// How fast a track runs through its curve.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleSpeed {
+    /// As the key times say.
+    AsKeyed = 0,
+    /// At one angular speed from the first key to the last.
+    Constant = 1,
+}
+
+/// What happens outside the keys.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleWrap {
+    /// The end value is held.
+    Hold = 0,
+    /// The track starts again.
+    Loop = 1,
+    /// The track runs backwards, then forwards again.
+    Mirror = 2,
+    /// The rotation goes on at the angular velocity that it has at that end.
+    Extrapolate = 3,
+}
+
+/// A method with its options. All zeros but `size` are the defaults.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct TumbleInterpolation {
+    /// `sizeof(TumbleInterpolation)`.
+    pub size: usize,
+    /// The method's name, such as "slerp" (`tumble_method_name`); null: "bessel-overhauser".
+    pub method: *const c_char,
+    /// A `TumblePath`.
+    pub path: u32,
+    /// A `TumbleEnds`.
+    pub ends: u32,
+    /// A `TumbleQuantity`.
+    pub quantity: u32,
+    /// A `TumbleSpeed`.
+    pub speed: u32,
+    /// A `TumbleWrap`: before the first key.
+    pub before: u32,
+    /// A `TumbleWrap`: after the last key.
+    pub after: u32,
+    /// The angular velocity at the first key for `TUMBLE_ENDS_CLAMPED`, rad/s, in the body's axes.
+    pub start_velocity: [f64; 3],
+    /// The same at the last key.
+    pub end_velocity: [f64; 3],
+    /// The tension of "kochanek-bartels".
+    pub tension: f64,
+    /// Its continuity.
+    pub continuity: f64,
+    /// Its bias.
+    pub bias: f64,
+}
+
+impl TumbleInterpolation {
+    /// What the structure says; null is all defaults.
+    ///
+    /// # Safety
+    /// The pointer is null or that of such a structure, whose `method` is null or text that ends with
+    /// a zero.
+    pub(crate) unsafe fn read(pointer: *const Self) -> Result<Interpolation, Failure> {
+        // SAFETY: as the caller promises.
+        let given = unsafe {
+            let size = |own: *const Self| (&raw const (*own).size).cast();
+            sized(pointer, size, "interpolation")?
+        };
+        let Some(given) = given else {
+            return Ok(method::BESSEL_OVERHAUSER.into());
+        };
+        // SAFETY: as the caller promises.
+        let name = unsafe { text(given.method, "interpolation->method")? };
+        let method = match name {
+            None => method::BESSEL_OVERHAUSER,
+            Some(name) => name
+                .parse::<Method>()
+                .map_err(|error| Failure::argument(error.to_string()))?,
+        };
+        given.with(method)
+    }
+
+    fn with(&self, method: Method) -> Result<Interpolation, Failure> {
+        let body = Axes::Body;
+        let parent = Axes::Parent;
+        let paths = [
+            (TumblePath::Shortest as u32, Path::Shortest),
+            (TumblePath::AsAuthored as u32, Path::AsAuthored),
+        ];
+        let path = constant(self.path, &paths, "interpolation->path")?;
+        let clamped = Ends::Clamped {
+            start: DVec3::from_array(self.start_velocity),
+            end: DVec3::from_array(self.end_velocity),
+        };
+        let ends = [
+            (TumbleEnds::OfMethod as u32, method.ends),
+            (TumbleEnds::Parabolic as u32, Ends::Parabolic),
+            (TumbleEnds::Natural as u32, Ends::Natural),
+            (TumbleEnds::Clamped as u32, clamped),
+            (TumbleEnds::Secant as u32, Ends::Secant),
+            (TumbleEnds::Loop as u32, Ends::Loop),
+            (TumbleEnds::Frozen as u32, Ends::Frozen),
+        ];
+        let quantities = [
+            (TumbleQuantity::Rotation as u32, Quantity::Rotation),
+            (
+                TumbleQuantity::VelocityInBody as u32,
+                Quantity::Velocity(body),
+            ),
+            (
+                TumbleQuantity::VelocityInParent as u32,
+                Quantity::Velocity(parent),
+            ),
+            (
+                TumbleQuantity::AccelerationInBody as u32,
+                Quantity::Acceleration(body),
+            ),
+            (
+                TumbleQuantity::AccelerationInParent as u32,
+                Quantity::Acceleration(parent),
+            ),
+        ];
+        let speeds = [
+            (TumbleSpeed::AsKeyed as u32, Speed::AsKeyed),
+            (TumbleSpeed::Constant as u32, Speed::Constant),
+        ];
+        let wraps = [
+            (TumbleWrap::Hold as u32, WrapMode::Hold),
+            (TumbleWrap::Loop as u32, WrapMode::Loop),
+            (TumbleWrap::Mirror as u32, WrapMode::Mirror),
+            (TumbleWrap::Extrapolate as u32, WrapMode::Extrapolate),
+        ];
+        Ok(Interpolation {
+            method,
+            path: method.path.unwrap_or(path),
+            ends: constant(self.ends, &ends, "interpolation->ends")?,
+            tcb: Tcb {
+                tension: self.tension,
+                continuity: self.continuity,
+                bias: self.bias,
+            },
+            quantity: constant(self.quantity, &quantities, "interpolation->quantity")?,
+            speed: constant(self.speed, &speeds, "interpolation->speed")?,
+            before: constant(self.before, &wraps, "interpolation->before")?,
+            after: constant(self.after, &wraps, "interpolation->after")?,
+        })
+    }
+}
+
+static METHOD_NAMES: LazyLock<Vec<CString>> = LazyLock::new(|| {
+    let names = METHODS.iter().map(|method| CString::new(method.name));
+    names.map(Result::unwrap_or_default).collect()
+});
+
+/// The number of methods.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_method_count() -> usize {
+    METHODS.len()
+}
+
+/// The name of a method, from 0; null where there is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_method_name(index: usize) -> *const c_char {
+    let name = METHOD_NAMES.get(index);
+    name.map_or(std::ptr::null(), |name| name.as_ptr())
+}

@@ -1,0 +1,20 @@
+//! Tumble for C and C++: the interface that `include/tumble.h` declares.
+//!
+//! Handles are places in a table of this library and are never dereferenced, so that one that was
+//! freed, or is of another kind, is an error (`handle`). Every function that can fail gives a
+//! [`TumbleResult`](result::TumbleResult), with words for it in [`result::tumble_last_error`]; a
+//! panic, which is a mistake of ours, ends in the code `INTERNAL` and not in the caller.
+#![allow(unsafe_code)] // pointers of the caller's, and names that C links
+
+mod arguments;
+pub mod clip;
+pub mod engine;
+pub mod file;
+mod handle;
+pub mod interpolation;
+pub mod result;
+pub mod samples;
+pub mod set;
+#[cfg(test)]
+mod tests;
+pub mod version;

@@ -1,0 +1,142 @@
+//! Codes, the words of the last error, and the line that no panic crosses.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::{CString, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use tumble::{Error, TrackError, VulkanError};
+use tumble_formats::Diagnostic;
+
+/// What became of a call.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TumbleResult {
+    /// It did what it says.
+    Ok = 0,
+    /// A pointer is null, or not aligned for what it points to.
+    InvalidPointer = 1,
+    /// A handle was freed, was never given, or is of another kind.
+    InvalidHandle = 2,
+    /// An argument has a value that it cannot have: an unknown constant or name, a size that
+    /// overflows, a structure of another version, text that is not UTF-8.
+    InvalidArgument = 3,
+    /// Memory for a result is not exactly as large as the result.
+    WrongSize = 4,
+    /// There is nothing at that index.
+    OutOfRange = 5,
+    /// Keys, times, samples or a file are refused; the message names the place.
+    InvalidInput = 6,
+    /// There is not the memory.
+    OutOfMemory = 7,
+    /// There is no such device, it cannot be opened, it is not exact, or it failed.
+    Device = 8,
+    /// A mistake of the library's; please report it.
+    Internal = 9,
+}
+
+/// Why a call failed.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) code: TumbleResult,
+    pub(crate) message: String,
+}
+
+impl Failure {
+    pub(crate) fn new(code: TumbleResult, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            message: message.into(),
+        }
+    }
+
+    pub(crate) fn argument(message: impl Into<String>) -> Self {
+        Self::new(TumbleResult::InvalidArgument, message)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let code = match &error {
+            Error::Vulkan(_) | Error::Threads { .. } => TumbleResult::Device,
+            Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
+            Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
+            Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
+            _ => TumbleResult::InvalidInput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<VulkanError> for Failure {
+    fn from(error: VulkanError) -> Self {
+        Self::new(TumbleResult::Device, error.to_string())
+    }
+}
+
+impl From<TrackError> for Failure {
+    fn from(error: TrackError) -> Self {
+        let code = match error {
+            TrackError::NoSuchTrack { .. } => TumbleResult::OutOfRange,
+            _ => TumbleResult::InvalidInput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<tumble::FramesError> for Failure {
+    fn from(error: tumble::FramesError) -> Self {
+        Self::new(TumbleResult::InvalidInput, error.to_string())
+    }
+}
+
+impl From<Diagnostic> for Failure {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::new(TumbleResult::InvalidInput, diagnostic.to_string())
+    }
+}
+
+thread_local! {
+    static LAST: RefCell<CString> = RefCell::default();
+}
+
+/// What was wrong with the last call of this thread that failed, in words: UTF-8, empty before the
+/// first. It stays valid until another call of this thread fails.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_last_error() -> *const c_char {
+    // A thread that ends has no message any more.
+    let message = LAST.try_with(|last| last.borrow().as_ptr());
+    message.unwrap_or(c"".as_ptr())
+}
+
+fn remember(message: &str) {
+    let bytes: Vec<u8> = message.bytes().filter(|&byte| byte != 0).collect();
+    let message = CString::new(bytes).unwrap_or_default();
+    let _ = LAST.try_with(|last| last.replace(message));
+}
+
+/// Does some work; `None` and words for it where it fails or panics.
+pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
+    // What a panic leaves half done is dropped, or lies behind a lock that is then poisoned.
+    let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
+    done.map_err(|failure| {
+        remember(&failure.message);
+        failure.code
+    })
+}
+
+/// The code of some work.
+pub(crate) fn code(work: impl FnOnce() -> Result<(), Failure>) -> TumbleResult {
+    guarded(work).err().unwrap_or(TumbleResult::Ok)
+}
+
+fn of_panic(panic: &(dyn Any + Send)) -> Failure {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let what = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let message = format!(
+        "internal error: {}; this is a mistake in tumble {}: please report it with the call",
+        what.unwrap_or("no reason given"),
+        env!("CARGO_PKG_VERSION"),
+    );
+    Failure::new(TumbleResult::Internal, message)
+}

@@ -1,0 +1,96 @@
+//! Which samples are evaluated, and where they lie in memory.
+
+use tumble::{FrameRate, Frames, Layout};
+
+use crate::arguments::{constant, list, sized};
+use crate::result::{Failure, TumbleResult};
+
+/// The order of a result in memory, four numbers for each sample of each track.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleLayout {
+    /// `[track][sample]`: the samples of a track lie together.
+    TrackMajor = 0,
+    /// `[sample][track]`: the tracks of a sample lie together.
+    FrameMajor = 1,
+}
+
+/// Which samples.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleSampling {
+    /// Frames at a rate, from the first key of the set to its last.
+    Keys = 0,
+    /// Frames at a rate, from `start` to `end`.
+    Range = 1,
+    /// The times given, the same for every track, in any order.
+    Times = 2,
+    /// The times given, for each track its own: first those of the first track, then those of the
+    /// second, the same number for each.
+    TimesOfTracks = 3,
+}
+
+/// The samples of an evaluation. Zeros stand for what is not used.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct TumbleSamples {
+    /// `sizeof(TumbleSamples)`.
+    pub size: usize,
+    /// A `TumbleSampling`.
+    pub sampling: u32,
+    /// Frames per `rate_seconds`: 60, or 30000 in 1001 seconds.
+    pub rate_frames: u64,
+    /// 0 stands for 1.
+    pub rate_seconds: u64,
+    /// Seconds, for `TUMBLE_SAMPLING_RANGE`.
+    pub start: f64,
+    /// Seconds, for `TUMBLE_SAMPLING_RANGE`.
+    pub end: f64,
+    /// Seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`.
+    pub times: *const f64,
+    /// How many times there are, of all tracks together.
+    pub time_count: usize,
+}
+
+impl TumbleSamples {
+    /// The samples that the structure says.
+    ///
+    /// # Safety
+    /// The pointer is null or that of such a structure, whose `times` has `time_count` numbers.
+    pub(crate) unsafe fn read(pointer: *const Self) -> Result<Frames, Failure> {
+        // SAFETY: as the caller promises.
+        let given = unsafe {
+            let size = |own: *const Self| (&raw const (*own).size).cast();
+            sized(pointer, size, "samples")?
+        };
+        let null = || Failure::new(TumbleResult::InvalidPointer, "`samples` is null");
+        let given = given.ok_or_else(null)?;
+        let rate = || FrameRate::new(given.rate_frames, given.rate_seconds.max(1));
+        // SAFETY: as the caller promises.
+        let times = || unsafe { list(given.times, given.time_count, "samples->times") };
+        let samplings = [
+            TumbleSampling::Keys,
+            TumbleSampling::Range,
+            TumbleSampling::Times,
+            TumbleSampling::TimesOfTracks,
+        ];
+        let samplings = samplings.map(|sampling| (sampling as u32, sampling));
+        Ok(
+            match constant(given.sampling, &samplings, "samples->sampling")? {
+                TumbleSampling::Keys => Frames::rate(rate()?),
+                TumbleSampling::Range => Frames::rate(rate()?).between(given.start, given.end),
+                TumbleSampling::Times => Frames::at(times()?.to_vec()),
+                TumbleSampling::TimesOfTracks => Frames::at_each(times()?.to_vec()),
+            },
+        )
+    }
+}
+
+/// The layout of a constant.
+pub(crate) fn layout(value: u32) -> Result<Layout, Failure> {
+    let layouts = [
+        (TumbleLayout::TrackMajor as u32, Layout::TrackMajor),
+        (TumbleLayout::FrameMajor as u32, Layout::FrameMajor),
+    ];
+    constant(value, &layouts, "layout")
+}

@@ -1,0 +1,161 @@
+//! The header, and programs in C and C++ that use it.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use glam::Quat;
+use tumble::{Device, Engine, Frames, Layout, TrackSet, method};
+use tumble_formats::{Format, ReadOptions};
+
+fn own(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// `UPDATE_HEADER=1` writes it.
+#[test]
+fn the_header_is_what_the_sources_say() {
+    let mut builder = cbindgen::Builder::new()
+        .with_config(cbindgen::Config::from_file(own("cbindgen.toml")).unwrap());
+    let sources = [
+        "version",
+        "result",
+        "engine",
+        "set",
+        "file",
+        "interpolation",
+        "samples",
+        "clip",
+    ];
+    for source in sources {
+        builder = builder.with_src(own(&format!("src/{source}.rs")));
+    }
+    let mut header = Vec::new();
+    builder.generate().unwrap().write(&mut header);
+    let header = String::from_utf8(header).unwrap();
+    let functions = header.matches("tumble_").count();
+    assert!(functions > 20, "{functions} functions: {header}");
+    let place = own("include/tumble.h");
+    if std::env::var_os("UPDATE_HEADER").is_some() {
+        std::fs::write(&place, &header).unwrap();
+    }
+    let found = std::fs::read_to_string(&place).unwrap_or_default();
+    assert!(
+        found == header,
+        "capi/include/tumble.h is not current: UPDATE_HEADER=1 cargo test -p tumble-capi"
+    );
+}
+
+/// A compiler of the system's; CI must have it.
+fn compiler(name: &str) -> Option<Command> {
+    let is_there = Command::new(name).arg("--version").output().is_ok();
+    assert!(
+        is_there || std::env::var_os("CI").is_none(),
+        "CI must have `{name}`"
+    );
+    if !is_there {
+        eprintln!("NO `{name}`: nothing was compiled");
+    }
+    is_there.then(|| {
+        let mut command = Command::new(name);
+        command.args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
+        command.arg(own("include"));
+        command
+    })
+}
+
+fn succeed(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The folder of the libraries, which are built beside this test.
+fn libraries() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.parent().unwrap().to_owned();
+    let library = folder.join("libtumble_capi.a");
+    assert!(library.exists(), "{} is not built", library.display());
+    folder
+}
+
+/// What the example must print: the bits that the engine gives to Rust.
+fn expected() -> String {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let keys = [
+        [0.0, 0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.6, 0.8],
+        [0.0, 0.0, 0.8, 0.6],
+    ];
+    let mut set = TrackSet::new();
+    set.push("elbow", &[0.0, 0.5, 1.25], &keys).unwrap();
+    let elbow = engine.evaluate(&set, method::SLERP, &Frames::fps(60));
+    let elbow = elbow.unwrap();
+    let loaded = Format::open_detected(&pendulum(), &ReadOptions::default()).unwrap();
+    let frames = Frames::at(vec![0.0, 7.3, 1.0 / 3.0]);
+    let (set, layout) = (&loaded.clips[0].set, Layout::FrameMajor);
+    let file = engine.evaluate_as(set, method::BESSEL_OVERHAUSER, &frames, layout);
+    let file = file.unwrap();
+    let lines = |name: &'static str, rotations: &[Quat]| -> Vec<String> {
+        let components = rotations.iter().flat_map(|rotation| rotation.to_array());
+        components
+            .map(|component| format!("{name} {:08x}\n", component.to_bits()))
+            .collect()
+    };
+    let elbow = lines("elbow", elbow.as_quats());
+    assert_eq!(elbow.len(), 4 * 76);
+    [elbow, lines("file", file.as_quats())].concat().concat()
+}
+
+fn pendulum() -> PathBuf {
+    own("../data/pendulum.dat")
+}
+
+/// The example, linked with the shared and with the static library, on the CPU and on a Vulkan device
+/// where there is one.
+#[test]
+fn the_example_in_c_prints_the_engines_bits() {
+    let Some(_) = compiler("cc") else {
+        return;
+    };
+    let (libraries, expected) = (libraries(), expected());
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for is_static in [false, true] {
+        let program = out.join(if is_static { "static" } else { "shared" });
+        let mut command = compiler("cc").unwrap();
+        command
+            .arg("-std=c99")
+            .arg(own("examples/evaluate.c"))
+            .arg("-o")
+            .arg(&program);
+        if is_static {
+            command.arg(libraries.join("libtumble_capi.a"));
+            // What Rust's own library is linked with.
+            command.args(["-lpthread", "-ldl", "-lm"]);
+        } else {
+            command.arg("-L").arg(&libraries).arg("-ltumble_capi");
+            command.arg(format!("-Wl,-rpath,{}", libraries.display()));
+        }
+        succeed(&mut command);
+        let has_vulkan = Device::list().is_ok_and(|devices| !devices.is_empty());
+        let devices: &[&str] = match has_vulkan && !is_static {
+            true => &["cpu", "vulkan"],
+            false => &["cpu"],
+        };
+        for device in devices {
+            let said = succeed(Command::new(&program).arg(device).arg(pendulum()));
+            assert!(said == expected, "{device}, {}: {said}", program.display());
+        }
+    }
+}
+
+/// Engines are written in C++.
+#[test]
+fn the_header_is_c_plus_plus_too() {
+    let Some(mut command) = compiler("c++") else {
+        return;
+    };
+    let header = own("include/tumble.h");
+    let check = command.args(["-std=c++11", "-fsyntax-only", "-x", "c++"]);
+    succeed(check.arg(header));
+}

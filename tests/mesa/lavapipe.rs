@@ -1,0 +1,63 @@
+//! The claim on a lavapipe that is years newer than the system's: recorded hashes, the self-test,
+//! and each way of evaluating against the CPU.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::{newer, with_driver};
+use tumble::Device;
+
+/// The tests that are run once more. The golden hashes have every method, store, layout and pass;
+/// what takes longest, tens of millions of rotations and every memory budget, is left to the
+/// system's driver.
+const TESTS: [&str; 3] = [
+    "golden::",
+    "vulkan::every_device_passes_every_check",
+    "bit_identity::arbitrary_times_have_the_same_bits",
+];
+
+#[test]
+fn the_newer_lavapipe_gives_the_same_bits() {
+    let Some(manifest) = newer("lvp") else {
+        return;
+    };
+    // Its own, and empty: what one test compiled serves the next.
+    let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mesa-lavapipe");
+    let _ = std::fs::remove_dir_all(&cache);
+    std::fs::create_dir_all(&cache).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        let output = with_driver(command.args(arguments), &manifest)
+            .env("MESA_SHADER_CACHE_DISABLE", "false")
+            .env("MESA_SHADER_CACHE_DIR", &cache)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {said}{errors}");
+        said
+    };
+    let one = "mesa::lavapipe::names_its_driver";
+    let said = run(&["--exact", one, "--ignored", "--nocapture"]);
+    let version = said.split("llvmpipe Mesa ").nth(1).expect(&said);
+    let version: u32 = version.split('.').next().unwrap().parse().unwrap();
+    assert!(version >= 25, "{said}");
+    let said = run(&TESTS);
+    for test in TESTS {
+        let has_run = said.contains(&format!("test {test}"));
+        assert!(has_run, "no test is `{test}`: {said}");
+    }
+    std::fs::remove_dir_all(&cache).unwrap();
+}
+
+/// Run by the test above it, in a process of its own.
+#[test]
+#[ignore = "says which driver there is; run by the_newer_lavapipe_gives_the_same_bits"]
+fn names_its_driver() {
+    for device in Device::list().unwrap() {
+        let Device::Vulkan(device) = device else {
+            continue;
+        };
+        println!("{}", device.info().driver);
+    }
+}

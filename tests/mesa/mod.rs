@@ -1,0 +1,37 @@
+//! Mesa's drivers where there is no card: RADV, which compiles for AMD's processors without one,
+//! and a lavapipe of today beside that of the system. `scripts/mesa.sh` unpacks both.
+
+mod compile;
+mod lavapipe;
+mod listing;
+mod radv;
+mod table;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The manifest of a driver of the newer Mesa. CI must have it where there is such a package.
+fn newer(driver: &str) -> Option<PathBuf> {
+    let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa");
+    let manifest = place.join(format!("{driver}_icd.json"));
+    if place.join("complete").exists() && manifest.exists() {
+        return Some(manifest);
+    }
+    let reason = std::fs::read_to_string(place.join("unavailable"));
+    assert!(
+        reason.is_ok() || std::env::var_os("CI").is_none(),
+        "CI must have the newer Mesa: scripts/mesa.sh unpacks it into target/mesa"
+    );
+    let reason = reason.unwrap_or_else(|_| "scripts/mesa.sh unpacks it".to_owned());
+    eprintln!("NO NEWER MESA ({}): {driver} was not tested", reason.trim());
+    None
+}
+
+/// The command with one driver and no other, and nothing remembered from another compiler.
+fn with_driver<'a>(command: &'a mut Command, manifest: &Path) -> &'a mut Command {
+    command
+        .env("VK_DRIVER_FILES", manifest)
+        .env("VK_ICD_FILENAMES", manifest)
+        .env_remove("VK_ADD_DRIVER_FILES")
+        .env("MESA_SHADER_CACHE_DISABLE", "true")
+}

@@ -1,0 +1,101 @@
+//! The table of `docs/gpu.md`: what a rotation costs on AMD's processors, kernel by kernel.
+//! `UPDATE_RADV=1 cargo test --test all mesa::radv` writes what was measured into its cells.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What the table has of one kernel on one family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Cost {
+    /// Vector instructions for a sample.
+    pub(super) instructions: usize,
+    /// Vector registers of an invocation.
+    pub(super) registers: u64,
+}
+
+/// The first cell of the table's head; the families follow.
+const HEAD: &str = "| kernel | polaris10 |";
+
+fn page() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gpu.md")
+}
+
+fn cells(line: &str) -> Vec<&str> {
+    let inner = line.trim_matches('|').split('|');
+    inner.map(|cell| cell.trim().trim_matches('`')).collect()
+}
+
+/// Compares the table with what was measured, by kernel and family; returns what is wrong with it.
+pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
+    let text = std::fs::read_to_string(page()).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let head = lines.iter().position(|line| line.starts_with(HEAD));
+    let head = head.expect("docs/gpu.md has the table");
+    let families: Vec<String> = cells(&lines[head])
+        .iter()
+        .skip(1)
+        .map(ToString::to_string)
+        .collect();
+    let mut wrong = Vec::new();
+    let mut rows = 0;
+    let own = lines[head + 2..].iter_mut();
+    for line in own.take_while(|line| line.starts_with('|')) {
+        rows += 1;
+        let told = cells(line);
+        let kernel = told[0].to_owned();
+        let mut row = format!("| `{kernel}` |");
+        for (family, told) in families.iter().zip(&told[1..]) {
+            let Some(&found) = measured.get(&(kernel.clone(), family)) else {
+                wrong.push(format!("docs/gpu.md: there is no {kernel} for {family}"));
+                continue;
+            };
+            row += &format!(" {}, {} |", found.instructions, found.registers);
+            if let Some(why) = differs(told, found) {
+                wrong.push(format!("docs/gpu.md: {kernel} for {family}: {why}"));
+            }
+        }
+        *line = row;
+    }
+    assert!(rows >= 8, "the table of docs/gpu.md has {rows} rows");
+    if std::env::var_os("UPDATE_RADV").is_some() {
+        std::fs::write(page(), lines.join("\n") + "\n").unwrap();
+        return Vec::new();
+    }
+    wrong
+}
+
+/// Why a cell does not tell what was measured. Another version of the compiler may differ by a
+/// little; a bound that is far above what is measured bounds nothing.
+fn differs(told: &str, found: Cost) -> Option<String> {
+    let numbers = told.split_once(", ");
+    let numbers = numbers.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let Some((instructions, registers)): Option<(usize, u64)> = numbers else {
+        return Some(format!("`{told}` is not instructions and registers"));
+    };
+    let is_near = |told: f64, found: f64| (0.9 * told - 2.0..=1.02 * told + 1.0).contains(&found);
+    let instructions_are_near = is_near(instructions as f64, found.instructions as f64);
+    // Registers are allocated by eights.
+    let registers_are_near = found.registers.abs_diff(registers) <= 8;
+    match instructions_are_near && registers_are_near {
+        true => None,
+        false => Some(format!(
+            "{found:?}, not {told} (UPDATE_RADV=1 writes what is measured)"
+        )),
+    }
+}
+
+#[test]
+fn a_cell_that_is_not_measured_is_refused() {
+    let found = Cost {
+        instructions: 100,
+        registers: 72,
+    };
+    for told in ["100, 72", "105, 80", "98, 64"] {
+        assert_eq!(differs(told, found), None);
+    }
+    for told in [
+        "90, 72", "130, 72", "100, 48", "100, 128", "100", "", "x, y",
+    ] {
+        assert!(differs(told, found).is_some(), "{told}");
+    }
+}
