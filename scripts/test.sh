@@ -40,9 +40,6 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
-# A newer lavapipe, and AMD's compiler for cards of today (tests/mesa).
-./scripts/mesa.sh
-
 # Peers to compare with, in an environment of their own (cli/tests/peers).
 fetch_peers() {
     peers=target/peers
@@ -90,17 +87,19 @@ fetch_validator() {
     fi
 }
 
+# A newer lavapipe, and AMD's compiler for cards of today (tests/mesa), come with them.
 # One after another where something of the system's is missing, for apt takes turns; else beside each
 # other and beside what is compiled first.
 if command -v node >/dev/null && command -v npm >/dev/null &&
     python3 -c 'import venv, ensurepip' 2>/dev/null; then
-    for fetch in fetch_peers fetch_validator './scripts/python.sh --environment'; do
+    for fetch in fetch_peers fetch_validator ./scripts/mesa.sh './scripts/python.sh --environment'; do
         $fetch &
         fetching+=($!)
     done
 else
     fetch_peers
     fetch_validator
+    ./scripts/mesa.sh
 fi
 
 # The oldest Rust that Cargo.toml promises, where it is at hand and not the one in use.
