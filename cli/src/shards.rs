@@ -20,8 +20,8 @@ use crate::batch::shards::plan::Plan as OwnPlan;
 use crate::batch::shards::record::Header;
 use crate::batch::shards::run::Shard;
 use crate::batch::shards::{merge as merging, record::Refusal};
-use crate::commands::eval::Arguments;
 use crate::commands::eval::shards::{Evaluator, Request, size};
+use crate::commands::eval::{Arguments, Told};
 use crate::host::Refused;
 use crate::messages::exit::{Failure, USAGE};
 use crate::messages::words;
@@ -202,7 +202,7 @@ impl Outcome {
     /// The outcome as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("strings and numbers")
+        json(self)
     }
 }
 
@@ -276,12 +276,16 @@ impl Worker {
         Ok(Outcome {
             made: shard.made,
             skipped: shard.skipped,
-            rotations: told.iter().map(|told| told.rotations()).sum(),
+            rotations: told.iter().map(Told::rotations).sum(),
             device: self.evaluator.device.label.clone(),
             failed: shard.header.failed,
             record,
         })
     }
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("strings and numbers")
 }
 
 /// What merging came to.
@@ -297,7 +301,7 @@ impl Merged {
     /// It as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("strings and numbers")
+        json(self)
     }
 }
 

@@ -150,19 +150,19 @@ impl Worker {
         &self.options
     }
 
-    /// Evaluates inputs into a directory; gives an exit code, and JSON or a message. `record`: it
-    /// writes the shard's file, rather than give it.
-    #[pyo3(signature = (folder, shard, of, plan, inputs, *, record))]
+    /// Evaluates inputs into a directory; gives an exit code, and JSON or a message. `shard`: its
+    /// number, how many there are, and of which plan. `record`: it writes the shard's file, rather
+    /// than give it.
+    #[pyo3(signature = (folder, shard, inputs, *, record))]
     fn run(
         &self,
         py: Python<'_>,
         folder: PathBuf,
-        shard: usize,
-        of: usize,
-        plan: String,
+        shard: (usize, usize, String),
         inputs: Vec<(PathBuf, PathBuf)>,
         record: bool,
     ) -> PyResult<Outcome> {
+        let (shard, of, plan) = shard;
         let task = shards::Task {
             shard,
             of,

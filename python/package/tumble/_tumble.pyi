@@ -384,9 +384,7 @@ class Worker:
     def run(
         self,
         folder: str,
-        shard: int,
-        of: int,
-        plan: str,
+        shard: tuple[int, int, str],
         inputs: Sequence[tuple[str, str]],
         *,
         record: bool,
