@@ -57,14 +57,14 @@ pub(crate) struct Stated {
 /// `most_bytes`.
 pub(crate) fn cut(sizes: &[u64], most_bytes: u64) -> Vec<Range<usize>> {
     let mut cuts = Vec::new();
-    let (mut first, mut bytes) = (0, 0_u64);
-    for (place, &size) in sizes.iter().enumerate() {
-        let is_full = place - first == MOST_INPUTS || bytes.saturating_add(size) > most_bytes;
+    let (mut first, mut bytes) = (0, 0_u128);
+    for (place, size) in sizes.iter().map(|&size| u128::from(size)).enumerate() {
+        let is_full = place - first == MOST_INPUTS || bytes + size > u128::from(most_bytes);
         if is_full && place > first {
             cuts.push(first..place);
             (first, bytes) = (place, 0);
         }
-        bytes = bytes.saturating_add(size);
+        bytes += size;
     }
     if first < sizes.len() {
         cuts.push(first..sizes.len());
