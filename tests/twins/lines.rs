@@ -441,7 +441,8 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
 
 // ---------------------------------------------------------------- the tests
 
-/// Stores touch at most 1.1 times as many lines as they need, and loads 1.3 times.
+/// Stores touch at most 1.1 times as many lines as they need, and loads 1.3 times; 1.4 times frame by
+/// frame.
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];
@@ -474,8 +475,12 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             ratios += &format!(" {stored:.2} {loaded:.2} |");
             let what = format!("{name}, {wave} lanes, lines of {line}");
             assert!(stored <= 1.1, "{what}: stores {stored}");
-            // Lines that begin in another track from frame to frame are those of more tracks.
-            let most = if name.starts_with("odd") { 1.4 } else { 1.3 };
+            // Frame by frame neighbours have items of their own, some of which lie across lines.
+            let most = if name.ends_with("FrameMajor") {
+                1.4
+            } else {
+                1.3
+            };
             assert!(loaded <= most, "{what}: loads {loaded}");
         }
         let each = |bytes: u64| bytes as f64 / count.rotations as f64;
