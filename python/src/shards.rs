@@ -150,19 +150,20 @@ impl Worker {
         &self.options
     }
 
-    /// Evaluates inputs into a directory; gives an exit code, and JSON or a message. `shard`: its
-    /// number, how many there are, and of which plan. `record`: it writes the shard's file, rather
-    /// than give it.
-    #[pyo3(signature = (folder, shard, inputs, *, record))]
+    /// Evaluates inputs into a directory; gives an exit code, and JSON or a message. `record`: it
+    /// writes the shard's file, rather than give it.
+    #[allow(clippy::too_many_arguments, reason = "what a task is made of")]
+    #[pyo3(signature = (folder, shard, of, plan, inputs, *, record))]
     fn run(
         &self,
         py: Python<'_>,
         folder: PathBuf,
-        shard: (usize, usize, String),
+        shard: usize,
+        of: usize,
+        plan: String,
         inputs: Vec<(PathBuf, PathBuf)>,
         record: bool,
     ) -> PyResult<Outcome> {
-        let (shard, of, plan) = shard;
         let task = shards::Task {
             shard,
             of,

@@ -105,9 +105,9 @@ fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     }
 }
 
-/// What a wave reads of a buffer: at least each stretch of bytes as if it began where a line does.
-/// Bytes that are less than a line apart are one stretch. A line counts once, since a wave finds it
-/// in its cache when it comes back to it.
+/// What a workgroup reads of a buffer: at least each stretch of bytes as if it began where a line
+/// does. Bytes that are less than a line apart are one stretch. A line counts once, since the waves
+/// of a workgroup share a cache.
 fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     ranges.sort_by_key(|range| range.start);
     let (mut least, mut stretch) = (0, 0..0);
@@ -172,8 +172,8 @@ impl Launch {
             for ((wave, line), lines) in CARDS.into_iter().zip(&mut count.of_cards) {
                 for wave in lanes.chunks(wave as usize) {
                     lines[0].add(stores_of(wave, line));
-                    lines[1].add(loads_of(wave, line));
                 }
+                lines[1].add(loads_of(&lanes, line));
             }
         }
         assert!(
@@ -222,9 +222,9 @@ fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
     lines
 }
 
-fn loads_of(wave: &[Vec<Touch>], line: u64) -> Lines {
+fn loads_of(workgroup: &[Vec<Touch>], line: u64) -> Lines {
     let mut buffers = BTreeMap::<usize, Vec<_>>::new();
-    for touch in wave.iter().flatten().filter(|touch| !touch.is_store) {
+    for touch in workgroup.iter().flatten().filter(|touch| !touch.is_store) {
         buffers.entry(touch.global).or_default().push(touch.bytes());
     }
     let mut lines = Lines::default();
@@ -441,7 +441,8 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
 
 // ---------------------------------------------------------------- the tests
 
-/// Stores touch at most 1.1 times as many lines as they need, and loads 1.3 times.
+/// Stores touch at most 1.1 times as many lines as they need, and loads 1.3 times; 1.4 times frame by
+/// frame.
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];
@@ -474,7 +475,13 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             ratios += &format!(" {stored:.2} {loaded:.2} |");
             let what = format!("{name}, {wave} lanes, lines of {line}");
             assert!(stored <= 1.1, "{what}: stores {stored}");
-            assert!(loaded <= 1.3, "{what}: loads {loaded}");
+            // Frame by frame neighbours have items of their own, some of which lie across lines.
+            let most = if name.ends_with("FrameMajor") {
+                1.4
+            } else {
+                1.3
+            };
+            assert!(loaded <= most, "{what}: loads {loaded}");
         }
         let each = |bytes: u64| bytes as f64 / count.rotations as f64;
         let (lanes, lines) = (count.loaded, 64 * count.of_workgroups.touched);

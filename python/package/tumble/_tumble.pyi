@@ -384,7 +384,9 @@ class Worker:
     def run(
         self,
         folder: str,
-        shard: tuple[int, int, str],
+        shard: int,
+        of: int,
+        plan: str,
         inputs: Sequence[tuple[str, str]],
         *,
         record: bool,

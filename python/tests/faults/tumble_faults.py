@@ -19,10 +19,10 @@ def kill_on_the_clip_that_says_so() -> None:
         def __getattr__(self, name):
             return getattr(self._own, name)
 
-        def run(self, folder, shard, inputs, *, record):
+        def run(self, folder, shard, of, plan, inputs, *, record):
             if any("kills-its-worker" in path for path, _ in inputs):
                 os.kill(os.getpid(), signal.SIGKILL)
-            return self._own.run(folder, shard, inputs, record=record)
+            return self._own.run(folder, shard, of, plan, inputs, record=record)
 
     class Module:
         def __getattr__(self, name):

@@ -172,8 +172,8 @@ def _evaluate(
     *,
     record: bool,
 ) -> Entry:
-    shard = (task.shard, job.shards, job.plan)
-    code, text = worker.run(folder, shard, inputs, record=record)
+    shard, of, plan = task.shard, job.shards, job.plan
+    code, text = worker.run(folder, shard, of, plan, inputs, record=record)
     if code:
         raise DistributedError(text, code)
     outcome: Entry = json.loads(text)
