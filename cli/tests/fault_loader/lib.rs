@@ -185,6 +185,7 @@ fallible! {
     vkResetCommandPool(device, pool, flags) asks;
     vkCreateFence(device, info, allocator, out) creates;
     vkResetFences(device, count, fences) asks;
+    vkGetFenceStatus(device, fence) asks;
     vkWaitForFences(device, count, fences, all, timeout) wait;
     vkDeviceWaitIdle(device) wait;
     vkQueueSubmit(queue, count, infos, fence) asks;

@@ -5,10 +5,13 @@ use std::process::Command;
 
 use crate::faults::loader::Loader;
 use crate::faults::{DEVICE_LOST, OUT_OF_HOST_MEMORY};
-use crate::support::{dense_set, first_difference, hostile_set};
+use crate::support::{Random, dense_set, first_difference, hostile_set};
 use glam::Quat;
 use rayon::prelude::*;
-use tumble::{Device, Engine, EngineOptions, Error, Frames, Layout, Transfer, VulkanError, method};
+use tumble::{
+    CrowdError, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout, Transfer,
+    VulkanError, method,
+};
 
 /// What the program never does: validation, results that are staged, poses put together.
 /// Each call fails at its first and at its last occurrence.
@@ -87,12 +90,38 @@ fn library_work() {
                 None
             );
         }
+        let crowd = crowd_work(&engine);
+        if std::env::var_os("WANTED").is_some() {
+            crowd.unwrap();
+        }
         lent_work(devices[0].clone())
     };
     let outcome = work();
     if std::env::var_os("WANTED").is_some() {
         outcome.unwrap();
     }
+}
+
+/// A crowd, handed in and asked for until it is done.
+fn crowd_work(engine: &Engine) -> Result<(), CrowdError> {
+    let library = crate::crowd::library(&mut Random(5), 4, &[method::SLERP]);
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let of = |engine: &Engine| -> Result<Vec<[f32; 4]>, CrowdError> {
+        let mut crowd = engine.crowd(&library, 3, 1)?;
+        crowd.submit(CrowdValues::Rotations)?;
+        while !crowd.poll()? {
+            std::thread::yield_now();
+        }
+        let mut found = vec![[0.0; 4]; crowd.output_len(CrowdValues::Rotations)];
+        crowd.wait_into(&mut found)?;
+        Ok(found)
+    };
+    let (expected, found) = (of(&cpu)?, of(engine)?);
+    assert_eq!(
+        bytemuck::cast_slice::<_, u32>(&expected),
+        bytemuck::cast_slice::<_, u32>(&found)
+    );
+    Ok(())
 }
 
 /// More than a megabyte of keys and of results, which software devices work on where they
