@@ -23,8 +23,11 @@ mod stream;
 mod textbook;
 mod tidy;
 mod transforms;
+mod validation;
 mod vulkan;
 
 #[path = "support/application.rs"]
 mod application;
+#[path = "support/layer.rs"]
+mod layer;
 mod support;

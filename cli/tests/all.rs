@@ -29,8 +29,8 @@ mod view_skeletons;
 mod application;
 #[path = "support/browser.rs"]
 mod browser;
-#[path = "../../tests/crowd/mod.rs"]
-mod crowd;
+#[path = "../../tests/support/layer.rs"]
+mod layer;
 #[path = "support/program.rs"]
 mod program;
 #[path = "../../tests/support/mod.rs"]

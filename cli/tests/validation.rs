@@ -1,148 +1,15 @@
-//! The Khronos validation layer over all that the program and the library do: core and
+//! The Khronos validation layer over all that the program does (the library: `tests/validation.rs`): core and
 //! synchronization checks, and checks on the device itself (GPU-assisted), which a newer
 //! layer does better; Debian's `chromium` package brings one. Each kind of check has to
 //! find a planted fault first: a layer that sleeps has nothing to say either.
 #![allow(unsafe_code)] // the planted faults
 
-use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::application::Application;
+use crate::layer::Layer;
 use crate::program::sample_folder;
-use crate::support::{lavapipe, vulkan_devices};
 use ash::vk;
-
-const CHROMIUM: &str = "/usr/lib/chromium/libVkLayer_khronos_validation.so";
-
-/// A validation layer, told what to check, that says what it finds on standard output.
-struct Layer {
-    name: &'static str,
-    folder: tempfile::TempDir,
-    own_manifest: bool,
-    /// The one driver to run with; else all there are.
-    driver: Option<PathBuf>,
-    planted: &'static [(&'static str, &'static str)],
-}
-
-/// What a layer says of each planted fault.
-const CORE: (&str, &str) = ("core", "VUID-VkBufferCreateInfo-size-00912");
-const SYNCHRONIZATION: (&str, &str) = ("synchronization", "WRITE-AFTER-WRITE");
-const OLD_SYNCHRONIZATION: (&str, &str) = ("synchronization", "WRITE_AFTER_WRITE");
-const BOUNDS: (&str, &str) = ("bounds", "VUID-vkCmdDispatch-storageBuffers-06936");
-
-impl Layer {
-    fn settings(&self, lines: &[&str]) {
-        let common = [
-            "debug_action = VK_DBG_LAYER_ACTION_LOG_MSG",
-            "report_flags = error,warn,perf",
-            "log_filename = stdout",
-        ];
-        let lines: String = common
-            .iter()
-            .chain(lines)
-            .map(|line| format!("khronos_validation.{line}\n"))
-            .collect();
-        fs::write(self.folder.path().join("vk_layer_settings.txt"), lines).unwrap();
-    }
-
-    /// The system's, which knows core and synchronization checks.
-    fn system() -> Option<Self> {
-        let there = Path::new("/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json");
-        if !there.exists() {
-            return None;
-        }
-        let layer = Self {
-            name: "the system's layer",
-            folder: tempfile::tempdir().unwrap(),
-            own_manifest: false,
-            driver: None,
-            planted: &[CORE, OLD_SYNCHRONIZATION],
-        };
-        layer.settings(&["enables = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT"]);
-        Some(layer)
-    }
-
-    /// Chromium's, with core and synchronization checks, or with those on the device.
-    fn chromium(on_device: bool) -> Option<Self> {
-        if !Path::new(CHROMIUM).exists() || on_device && lavapipe().is_none() {
-            return None;
-        }
-        let (name, planted): (_, &[_]) = match on_device {
-            true => ("chromium's layer on the device", &[BOUNDS]),
-            false => ("chromium's layer", &[CORE, SYNCHRONIZATION]),
-        };
-        let layer = Self {
-            name,
-            folder: tempfile::tempdir().unwrap(),
-            own_manifest: true,
-            // Checks on the device need buffer addresses, which SwiftShader has not.
-            driver: on_device.then(lavapipe).flatten(),
-            planted,
-        };
-        // What it says of its own settings is no fault.
-        let filter = "message_id_filter = VALIDATION-SETTINGS,WARNING-Setting-Limit-Adjusted";
-        match on_device {
-            true => layer.settings(&["validate_core = false", "gpuav_enable = true", filter]),
-            false => layer.settings(&["validate_sync = true", filter]),
-        }
-        let manifest = format!(
-            r#"{{"file_format_version": "1.2.0", "layer": {{
-                "name": "VK_LAYER_KHRONOS_validation", "type": "GLOBAL",
-                "library_path": "{CHROMIUM}", "api_version": "1.3.0",
-                "implementation_version": "1", "description": "validation",
-                "instance_extensions": [{{"name": "VK_EXT_debug_utils", "spec_version": "1"}}]}}}}"#
-        );
-        fs::write(layer.folder.path().join("layer.json"), manifest).unwrap();
-        Some(layer)
-    }
-
-    fn all() -> Vec<Self> {
-        let all = [Self::system(), Self::chromium(false), Self::chromium(true)];
-        let in_ci = std::env::var_os("CI").is_some();
-        assert!(
-            !in_ci || all.iter().all(Option::is_some),
-            "CI has both layers (Debian: vulkan-validationlayers, chromium)"
-        );
-        let found: Vec<Self> = all.into_iter().flatten().collect();
-        if vulkan_devices().is_empty() || found.is_empty() {
-            eprintln!("NOT VALIDATED: no device, or no validation layer");
-            return Vec::new();
-        }
-        found
-    }
-
-    /// What the layer says while a command runs.
-    fn messages(&self, command: &mut Command) -> Vec<String> {
-        command
-            .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")
-            .env("VK_LAYER_SETTINGS_PATH", self.folder.path());
-        if self.own_manifest {
-            command.env("VK_LAYER_PATH", self.folder.path());
-        }
-        if let Some(driver) = &self.driver {
-            command
-                .env("VK_DRIVER_FILES", driver)
-                .env_remove("VK_ADD_DRIVER_FILES");
-        }
-        let output = command.output().unwrap();
-        let text = String::from_utf8_lossy(&output.stdout);
-        let words = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{}: {text}\n{words}", self.name);
-        let is_message = |line: &&str| {
-            [
-                "Validation Error",
-                "Validation Warning",
-                "Validation Performance",
-                "VUID-",
-                "UNASSIGNED-",
-            ]
-            .iter()
-            .any(|sign| line.contains(sign))
-        };
-        text.lines().filter(is_message).map(str::to_owned).collect()
-    }
-}
 
 /// Runs a test of this file in a process of its own, under a layer.
 fn under(layer: &Layer, test: &str, plant: &str) -> Vec<String> {
@@ -227,28 +94,6 @@ fn on_vulkan<'a>(line: &[&'a str]) -> Vec<&'a str> {
     match line.contains(&"--device") {
         true => line.to_vec(),
         false => [line, &["--device", "vulkan"]].concat(),
-    }
-}
-
-/// What the library does: the tests of this package that use Vulkan, once more; with
-/// `VALIDATE_ALL=1` also those that take longest. Not the one that has a layer of its own.
-#[test]
-fn no_layer_has_anything_to_say_of_the_library() {
-    let mut tests = vec![
-        "crowd::",
-        "poses::",
-        "encoding::",
-        "transforms::",
-        "vulkan::",
-    ];
-    if std::env::var_os("VALIDATE_ALL").is_some() {
-        tests.extend(["bit_identity::", "stream::", "outside::"]);
-    }
-    for layer in Layer::all() {
-        let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(&tests).args(["--nocapture", "--skip"]);
-        let messages = layer.messages(command.arg("the_validation_layer_has_nothing_to_say"));
-        assert_eq!(messages, Vec::<String>::new(), "{}", layer.name);
     }
 }
 

@@ -5,12 +5,12 @@ use std::process::Command;
 
 use crate::faults::loader::Loader;
 use crate::faults::{DEVICE_LOST, OUT_OF_HOST_MEMORY};
-use crate::support::{Random, dense_set, first_difference, hostile_set};
-use glam::Quat;
+use crate::support::{dense_set, first_difference, hostile_set};
+use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{
-    CrowdError, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout, Transfer,
-    VulkanError, method,
+    CrowdError, CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout,
+    Skeleton, TrackSet, Transfer, VectorMethod, VulkanError, method,
 };
 
 /// What the program never does: validation, results that are staged, poses put together.
@@ -104,7 +104,14 @@ fn library_work() {
 
 /// A crowd, handed in and asked for until it is done.
 fn crowd_work(engine: &Engine) -> Result<(), CrowdError> {
-    let library = crate::crowd::library(&mut Random(5), 4, &[method::SLERP]);
+    let skeleton = Skeleton::new(vec![None, Some(0)], vec![Vec3::Y; 2]).unwrap();
+    let mut library = CrowdLibrary::new(&skeleton)?;
+    let mut set = TrackSet::new();
+    for angle in [1.0, -0.5] {
+        let keys = [0.0, angle].map(Quat::from_rotation_x);
+        set.push("", &[0.0, 1.0], &keys).unwrap();
+    }
+    library.push(&set, method::SLERP, VectorMethod::Linear)?;
     let cpu = Engine::new(Device::Cpu).unwrap();
     let of = |engine: &Engine| -> Result<Vec<[f32; 4]>, CrowdError> {
         let mut crowd = engine.crowd(&library, 3, 1)?;
