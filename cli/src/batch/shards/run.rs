@@ -123,7 +123,7 @@ impl<'a> Shard<'a> {
             let threads = waiting.chunks_mut(each).map(|files| {
                 scope.spawn(|| {
                     let files = files.iter_mut().filter_map(Option::take);
-                    files.map(Written::commit).collect::<Result<(), _>>()
+                    files.try_for_each(Written::commit)
                 })
             });
             // All are begun before the first is waited for.
