@@ -122,7 +122,7 @@ impl<'a> Shard<'a> {
         std::thread::scope(|scope| {
             let threads = waiting.chunks_mut(each).map(|files| {
                 scope.spawn(|| {
-                    let files = files.iter_mut().filter_map(Option::take);
+                    let mut files = files.iter_mut().filter_map(Option::take);
                     files.try_for_each(Written::commit)
                 })
             });
