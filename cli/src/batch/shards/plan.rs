@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn shards_depend_on_sizes_alone() {
         assert_eq!(cut(&[], 10), []);
-        assert_eq!(cut(&[20], 10), [0..1], "one input may be larger");
+        assert_eq!(cut(&[20, 1], 10), [0..1, 1..2], "one input may be larger");
         assert_eq!(cut(&[4, 6, 1, 20, 3], 10), [0..2, 2..3, 3..4, 4..5]);
         assert_eq!(cut(&[0; 600], 10), [0..256, 256..512, 512..600]);
         assert_eq!(cut(&[u64::MAX, u64::MAX], u64::MAX), [0..1, 1..2]);
