@@ -97,11 +97,7 @@ fn expected() -> String {
     let file = engine.evaluate_as(set, method::BESSEL_OVERHAUSER, &frames, layout);
     let file = file.unwrap();
     let lines = |name: &'static str, rotations: &[Quat]| -> Vec<String> {
-<<<<<<< HEAD
-        let components = rotations.iter().flat_map(glam::Quat::to_array);
-=======
         let components = rotations.iter().flat_map(Quat::to_array);
->>>>>>> radv
         components
             .map(|component| format!("{name} {:08x}\n", component.to_bits()))
             .collect()
