@@ -348,6 +348,37 @@ impl Engine {
             .detach(|| guarded(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
 
+    /// A batch of rows, each a clip, in and out by Arrow: for functions that Spark, Daft, Ray Data or
+    /// DuckDB call with record batches (docs/distributed.md).
+    ///
+    /// `batch(rows, *, order="xyzw", **options)`: `rows` is a RecordBatch or a Table of pyarrow's, or
+    /// what offers Arrow's C data interface, with the columns `times`, a list of seconds, and `keys`, a
+    /// list of the quaternions of all tracks, track after track: 4 numbers for each time of each, or
+    /// lists of such. Other columns are kept. In the place of the two the result has `tracks`,
+    /// `frames` and `rotations`, a list of float32, track after track. `options` are those of
+    /// `evaluate`; `at` is the same for all rows. A row's result does not depend on the others.
+    ///
+    /// >>> import pyarrow, tumble
+    /// >>> rows = pyarrow.table({"clip": ["door"], "times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
+    /// >>> found = tumble.Engine("cpu").batch(rows, fps=2, method="slerp")
+    /// >>> found.schema.names, found["frames"].to_pylist()
+    /// (['clip', 'tracks', 'frames', 'rotations'], [3])
+    #[pyo3(signature = (rows, *, order="xyzw", **options))]
+    fn batch<'py>(
+        slf: &Bound<'py, Self>,
+        rows: &Bound<'py, PyAny>,
+        order: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let given = match options {
+            Some(options) => options.copy()?,
+            None => PyDict::new(slf.py()),
+        };
+        given.set_item("order", order)?;
+        let arrow = slf.py().import("tumble._arrow")?;
+        arrow.call_method("batch", (slf, rows), Some(&given))
+    }
+
     /// Compares the device with the CPU, bit by bit, and both with a reference in float64 that
     /// shares no code with them. Keywords are those of `evaluate`.
     ///

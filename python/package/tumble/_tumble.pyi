@@ -243,6 +243,9 @@ class Engine:
         layout: _Layout = "track",
         **options: Unpack[_OptionsOrTimes],
     ) -> Chunks: ...
+    def batch(
+        self, rows: Any, *, order: _Order = "xyzw", **options: Unpack[_OptionsOrTimes]
+    ) -> Any: ...
     def verify(self, clip: Clip, **options: Unpack[_OptionsOrTimes]) -> Verification: ...
 
 @final
