@@ -404,7 +404,13 @@ def test_rows_of_parquet(machines, library, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     out = tmp_path / "rows"
     evaluate(
-        library / "clips", out, fps=240, into="parquet", shard_bytes=SHARD, address=machines.address
+        library / "clips",
+        out,
+        fps=240,
+        into="parquet",
+        shard_bytes=SHARD,
+        worker_memory="64MiB",
+        address=machines.address,
     )
     rows = {}
     for path in sorted(out.glob("part-*.parquet")):
@@ -514,6 +520,14 @@ def test_a_driver_stops_where_no_machine_may_take_part(monkeypatch, library, tmp
     monkeypatch.setattr(_driver, "wheel", lambda: ("f" * 64, tumble.__version__))
     with pytest.raises(DistributedError, match="every machine has another wheel"):
         evaluate(library / "clips", tmp_path / "out", address=machines.address)
+
+
+def test_sizes_are_numbers_or_text():
+    bytes_of = _job.bytes_of
+    assert [bytes_of(size) for size in (7, "8", "2 GiB", "3mib")] == [7, 8, 2 << 30, 3 << 20]
+    for size in "lots", "0", "-1", "2 GB", "":
+        with pytest.raises(DistributedError, match="is no size"):
+            bytes_of(size)
 
 
 def test_a_device_goes_by_its_uuid():

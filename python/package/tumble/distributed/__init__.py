@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from tumble.distributed import _driver
 from tumble.distributed._driver import Progress, Refusal, Report
-from tumble.distributed._job import DistributedError, local
+from tumble.distributed._job import DistributedError, bytes_of, local
 
 __all__ = ["DistributedError", "Progress", "Refusal", "Report", "evaluate"]
 
@@ -30,6 +30,7 @@ def evaluate(
     address: str | None = "auto",
     device: str = "auto",
     shard_bytes: int | str = "32MiB",
+    worker_memory: int | str | None = None,
     into: Literal["files", "parquet"] = "files",
     resume: bool = True,
     overwrite: bool = False,
@@ -41,7 +42,8 @@ def evaluate(
     `options` are those of `tumble eval`: `fps=60`, `method="slerp"`, `from_zero=True`, `tracks=[0, 1]`.
     `address`: of a Ray cluster; "auto" is that of this machine, else one that is started for the call.
     `device`: "auto" and "cpu" take a processor for each worker, "vulkan" a graphics card where the
-    cluster has any. `shard_bytes`: of input, at most, in what one task does. `into="parquet"`: a file
+    cluster has any. `worker_memory`: what a task reserves of its machine's memory, so that Ray starts
+    no more of them than there is room for. `shard_bytes`: of input, at most, in what one task does. `into="parquet"`: a file
     of rows for each shard instead of a file for each clip. `resume`: keep what is done, and whole.
     `progress` is called with a `Progress` about twice a second.
 
@@ -57,6 +59,7 @@ def evaluate(
         address=address,
         device=device,
         shard_bytes=str(shard_bytes),
+        worker_memory=None if worker_memory is None else bytes_of(worker_memory),
         into=into,
         resume=resume,
         overwrite=overwrite,

@@ -12,7 +12,7 @@ from types import FrameType
 
 from tumble import _tumble
 from tumble.distributed import DistributedError, Progress, Report, _check, _driver
-from tumble.distributed._job import DIFFERENCE, USAGE, is_url, local
+from tumble.distributed._job import DIFFERENCE, USAGE, bytes_of, is_url, local
 
 HELP = """\
 Evaluate a library of clips over a Ray cluster; the bytes are those of `tumble eval` on one machine
@@ -29,6 +29,7 @@ Options:
       --device DEVICE        auto (the processors), cpu, or vulkan (a graphics card for each worker where
                              the cluster has any) [default: auto]
       --shard-bytes SIZE     The input of a shard, at most [default: 32MiB]
+      --worker-memory SIZE   What a task reserves of its machine's memory [default: nothing]
       --into files|parquet   A file for each clip, or a file of rows for each shard [default: files]
       --check OUT            Check results against their manifest, as `tumble check`, in object stores too
       --json                 Print the report as JSON on standard output
@@ -42,7 +43,13 @@ Exit codes are those of `tumble`: 0 done, 2 the command line is wrong, 3 some in
 6 a device failed, 7 output could not be written, 8 --check found a difference, 130 and 143 stopped by a signal: --resume goes on.
 """
 
-VALUES = {"--address": "auto", "--device": "auto", "--shard-bytes": "32MiB", "--into": "files"}
+VALUES = {
+    "--address": "auto",
+    "--device": "auto",
+    "--shard-bytes": "32MiB",
+    "--worker-memory": "",
+    "--into": "files",
+}
 FLAGS = ("--resume", "--overwrite", "--json")
 # What is said in another way here, or not at all.
 REFUSED = ("-o", "--out", "--files-from", "--shard", "--pipes")
@@ -87,6 +94,7 @@ def _run(arguments: list[str]) -> int:
         address=values["--address"],
         device=values["--device"],
         shard_bytes=values["--shard-bytes"],
+        worker_memory=bytes_of(values["--worker-memory"]) if values["--worker-memory"] else None,
         into=values["--into"],
         resume="--resume" in flags,
         overwrite="--overwrite" in flags,

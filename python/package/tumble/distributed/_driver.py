@@ -149,6 +149,7 @@ def evaluate(
     address: str | None,
     device: str,
     shard_bytes: str,
+    worker_memory: int | None,
     into: str,
     resume: bool,
     overwrite: bool,
@@ -185,7 +186,7 @@ def evaluate(
             has_gpu=has_gpu,
             wheel=wheel(),
         )
-        driver = _Driver(ray, job, plan, progress)
+        driver = _Driver(ray, job, plan, progress, worker_memory)
         if begin is not None:
             begin()
         driver.run()
@@ -280,7 +281,9 @@ class _Driver:
         job: Job,
         plan: _tumble.Plan,
         progress: Callable[[Progress], None] | None,
+        memory: int | None,
     ) -> None:
+        self._memory = memory
         self._ray = ray
         self._job = job
         self._plan = plan
@@ -362,6 +365,8 @@ class _Driver:
                 "retry_exceptions": [OSError],
                 "num_cpus": 1,
             }
+            if self._memory is not None:
+                options["memory"] = self._memory
             if self._job.has_gpu and task.device is None:
                 options |= {"num_cpus": 0, "num_gpus": 1}
             if self._refused:

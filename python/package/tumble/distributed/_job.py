@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,6 +78,15 @@ class Task:
     """In the place of the job's."""
     refused: tuple[tuple[str, str], ...] = ()
     """Inputs that are left out, and why."""
+
+
+def bytes_of(size: int | str) -> int:
+    """Bytes, of a number of them or of text such as 2GiB."""
+    units = {"": 1, "KIB": 1 << 10, "MIB": 1 << 20, "GIB": 1 << 30, "TIB": 1 << 40}
+    found = re.fullmatch(r"\s*(\d+)\s*([kmgt]ib)?\s*", str(size), re.IGNORECASE)
+    if found is None or int(found[1]) == 0:
+        raise DistributedError(f"{size!r} is no size; give bytes, or such as 2GiB", USAGE)
+    return int(found[1]) * units[(found[2] or "").upper()]
 
 
 def wheel() -> tuple[str, str]:
