@@ -1,7 +1,7 @@
 //! Results in other forms: the same bits from every device, namely those that the f32
 //! result gives.
 
-use crate::support::{hostile_set, vulkan_engines};
+use crate::support::{WAYS, hostile_set, is_turn, vulkan_engines};
 use tumble::{
     Axes, Device, Encoding, Engine, Error, Frames, Interpolation, Layout, Quantity, method,
 };
@@ -19,6 +19,7 @@ fn every_device_encodes_like_the_host() {
         .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
         .chain([cpu.clone()])
         .collect();
+    let mut round = 0;
     // Both forms, and nothing but constants.
     for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
         let of_cpu = cpu.upload(&set, method).unwrap();
@@ -33,7 +34,11 @@ fn every_device_encodes_like_the_host() {
                 for encoding in Encoding::KINDS {
                     let mut expected = vec![0; quats.len() * encoding.bytes()];
                     encoding.encode(quats, &mut expected).unwrap();
-                    for (engine, clip) in engines.iter().zip(&clips) {
+                    round += 1;
+                    for (place, (engine, clip)) in engines.iter().zip(&clips).enumerate() {
+                        if !is_turn(round, place, WAYS.len()) {
+                            continue;
+                        }
                         let device = engine.device_name();
                         let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
                         let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");

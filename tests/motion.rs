@@ -2,7 +2,7 @@
 //! reference's and with the same bits on every device.
 
 use crate::support::{
-    Random, first_difference, give_key_data, hostile_set, is_turn, vulkan_engines,
+    Random, WAYS, first_difference, give_key_data, hostile_set, is_turn, vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::Curve;
@@ -143,7 +143,7 @@ fn the_same_bits_on_every_device() {
                 let expected: &[Quat] = bytemuck::cast_slice(expected.as_slice());
                 assert!(expected.iter().all(|q| q.is_finite()));
                 for (place, vulkan) in engines.iter().enumerate() {
-                    if !is_turn(seed as usize + i + j, place, 2) {
+                    if !is_turn(seed as usize + i + j, place, WAYS.len()) {
                         continue;
                     }
                     let found = vulkan.rates(&set, interpolation, &frames, layout).unwrap();

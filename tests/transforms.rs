@@ -1,7 +1,7 @@
 //! Translations and scales beside rotations: what the textbook says, with the same bits on
 //! every device.
 
-use crate::support::{Random, is_turn, vulkan_engines};
+use crate::support::{Random, WAYS, is_turn, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::VectorCurve;
 use tumble::{
@@ -157,7 +157,7 @@ fn the_same_bits_on_every_device() {
                 };
                 let expected = of(&cpu);
                 for (place, vulkan) in engines.iter().enumerate() {
-                    if !is_turn(i + j, place, 2) {
+                    if !is_turn(i + j, place, WAYS.len()) {
                         continue;
                     }
                     assert!(of(vulkan) == expected, "{vectors}, {before:?}, {after:?}");

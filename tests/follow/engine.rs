@@ -3,7 +3,7 @@
 use super::examples::{
     FIXED, FRENET, LOOP, MINIMAL, MINIMAL_AT_END, UP_AT_END, assert_rotation, c, following, k,
 };
-use crate::support::{Random, vulkan_engines};
+use crate::support::{Random, WAYS, is_turn, vulkan_engines};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::{self, Follower, Heading, Travel, VectorCurve, angle_between};
 use tumble::{
@@ -448,6 +448,7 @@ fn the_same_bits_on_every_device() {
     let set = trouble();
     let frames = Frames::fps(50).between(-2.0, 9.0);
     let mut engines = vulkan_engines(|_| {});
+    let devices = engines.len();
     for width in VectorWidth::available() {
         let mut options = EngineOptions::default();
         options.vector_width = Some(width);
@@ -463,7 +464,10 @@ fn the_same_bits_on_every_device() {
                 assert!((norm - 1.0).abs() < 6e-7, "{follow:?}: {rotation:?} {norm}");
             }
             let expected = bits(&expected);
-            for engine in &engines {
+            for (place, engine) in engines.iter().enumerate() {
+                if place < devices && !is_turn(i, place, WAYS.len()) {
+                    continue;
+                }
                 assert!(
                     bits(&engine.follow(&own, &follow, &frames, layout).unwrap()) == expected,
                     "{follow:?}, {engine:?}"

@@ -97,11 +97,39 @@ fn compiled(
     listings
 }
 
+/// How often a kernel divides whole numbers, by what is no constant for the compiler. Processors of
+/// AMD's have no such division: it is made of a reciprocal, taken to a whole number, and of exact steps
+/// that make good what that lacks.
+fn divisions(kernel: &str) -> usize {
+    const DIVISION: u32 = 134;
+    const REMAINDER: u32 = 137;
+    let code = tumble::kernels()
+        .find(|(name, _)| *name == kernel)
+        .unwrap()
+        .1;
+    let words = code
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
+    let words: Vec<u32> = words.collect();
+    let (mut place, mut found) = (5, 0);
+    while let Some(&word) = words.get(place) {
+        found += usize::from([DIVISION, REMAINDER].contains(&(word & 0xffff)));
+        place += (word >> 16).max(1) as usize;
+    }
+    found
+}
+
 /// What is wrong with a kernel.
-fn faults(listing: &Listing, generation: Generation) -> Vec<String> {
+fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String> {
     let mut faults = Vec::new();
+    let mut left = [divisions(kernel); 2];
     for instruction in listing.inexact(generation) {
-        faults.push(format!("`{instruction}` is not exact"));
+        let of_division = ["rcp_", "cvt_u32_f32"].map(|part| instruction.contains(part));
+        let of_division = of_division.into_iter().position(|own| own);
+        match of_division.map(|part| &mut left[part]) {
+            Some(left) if *left > 0 => *left -= 1,
+            _ => faults.push(format!("`{instruction}` is not exact")),
+        }
     }
     for none in ["Scratch size", "Spilled VGPRs", "Spilled SGPRs"] {
         let found = listing.statistic(none);
@@ -135,7 +163,7 @@ fn every_kernel_is_exact_on_six_families() {
     for (own, manifest, listings) in &of_all {
         assert!(listings.len() > 100, "{}: {}", own.name, listings.len());
         for (kernel, listing) in listings {
-            for fault in faults(listing, own.generation) {
+            for fault in faults(kernel, listing, own.generation) {
                 let manifest = manifest.display();
                 wrong.push(format!("{} ({manifest}), {kernel}: {fault}", own.name));
             }
