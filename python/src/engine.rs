@@ -12,7 +12,7 @@ use crate::arrays::Order;
 use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::Result;
-use crate::options::Request;
+use crate::options::{Request, request_arrays};
 use crate::poses;
 use crate::stream::Chunks;
 use crate::verify::Verification;
@@ -348,21 +348,16 @@ impl Engine {
             .detach(|| guarded(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
 
-    /// A batch of rows, each a clip, in and out by Arrow: for functions that Spark, Daft, Ray Data or
-    /// DuckDB call with record batches (docs/distributed.md).
-    ///
-    /// `batch(rows, *, order="xyzw", **options)`: `rows` is a RecordBatch or a Table of pyarrow's, or
-    /// what offers Arrow's C data interface, with the columns `times`, a list of seconds, and `keys`, a
-    /// list of the quaternions of all tracks, track after track: 4 numbers for each time of each, or
-    /// lists of such. Other columns are kept. In the place of the two the result has `tracks`,
-    /// `frames` and `rotations`, a list of float32, track after track. `options` are those of
-    /// `evaluate`; `at` is the same for all rows. A row's result does not depend on the others.
+    /// Clips as rows of a record batch, in and out by Arrow: for Spark, Daft and Ray Data. `rows`, of
+    /// pyarrow's or with Arrow's C interface, have `times`, a list of seconds, and `keys`, a list of 4
+    /// numbers for each time of each track. In their place come `tracks`, `frames` and `rotations`,
+    /// track after track; other columns are kept. Keywords are those of `evaluate`. No row's result
+    /// depends on the others.
     ///
     /// >>> import pyarrow, tumble
-    /// >>> rows = pyarrow.table({"clip": ["door"], "times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
-    /// >>> found = tumble.Engine("cpu").batch(rows, fps=2, method="slerp")
-    /// >>> found.schema.names, found["frames"].to_pylist()
-    /// (['clip', 'tracks', 'frames', 'rotations'], [3])
+    /// >>> rows = pyarrow.table({"times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
+    /// >>> tumble.Engine("cpu").batch(rows, fps=2, method="slerp")["frames"].to_pylist()
+    /// [3]
     #[pyo3(signature = (rows, *, order="xyzw", **options))]
     fn batch<'py>(
         slf: &Bound<'py, Self>,
@@ -370,10 +365,7 @@ impl Engine {
         order: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let given = match options {
-            Some(options) => options.copy()?,
-            None => PyDict::new(slf.py()),
-        };
+        let given = options.map_or_else(|| Ok(PyDict::new(slf.py())), PyDictMethods::copy)?;
         given.set_item("order", order)?;
         let arrow = slf.py().import("tumble._arrow")?;
         arrow.call_method("batch", (slf, rows), Some(&given))
@@ -445,20 +437,6 @@ impl Engine {
             )
         })
     }
-}
-
-/// The arrays among the keywords.
-pub(crate) fn request_arrays<'py>(
-    options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let Some(options) = options else {
-        return Ok(Vec::new());
-    };
-    let named = |name: &str| options.get_item(name);
-    Ok([named("at")?, named("times")?]
-        .into_iter()
-        .flatten()
-        .collect())
 }
 
 /// Why a device cannot be opened.

@@ -5,10 +5,10 @@ use pyo3::types::PyDict;
 
 use crate::arrays::Order;
 use crate::build::clip_of;
-use crate::engine::{default_engine, layout_named, request_arrays};
+use crate::engine::{default_engine, layout_named};
 use crate::errors::guarded;
 use crate::evaluate::Result;
-use crate::options::Request;
+use crate::options::{Request, request_arrays};
 
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///

@@ -324,3 +324,17 @@ fn check_name(name: &str) -> PyResult<()> {
         NAMES.join(", ")
     )))
 }
+
+/// The arrays among the keywords.
+pub(crate) fn request_arrays<'py>(
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let Some(options) = options else {
+        return Ok(Vec::new());
+    };
+    let named = |name: &str| options.get_item(name);
+    Ok([named("at")?, named("times")?]
+        .into_iter()
+        .flatten()
+        .collect())
+}
