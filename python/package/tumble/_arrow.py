@@ -14,7 +14,7 @@ from tumble._tumble import Clip
 _MOST = 2**31 - 1
 
 
-def batch(engine: Any, rows: Any, *, order: str = "xyzw", **options: Any) -> Any:
+def batch(engine: Any, rows: Any, *, order: Any = "xyzw", **options: Any) -> Any:
     """What `Engine.batch` documents."""
     try:
         arrow: Any = importlib.import_module("pyarrow")
@@ -97,7 +97,7 @@ def _lists(arrow: Any, rows: Any, name: str) -> Any:
 
 
 def _evaluated(
-    engine: Any, times: Any, keys: Any, row: int, order: str, options: dict[str, Any]
+    engine: Any, times: Any, keys: Any, row: int, order: Any, options: dict[str, Any]
 ) -> Any:
     each = 4 * len(times)
     if each == 0 or len(keys) == 0 or len(keys) % each:
