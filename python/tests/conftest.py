@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import pathlib
+import signal
 import sys
 
 import numpy as np
 import pytest
+
+# What a shell starts in the background ignores Ctrl-C, and so do its children: the tests send it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = pathlib.Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared" / "data"
