@@ -120,8 +120,8 @@ if cargo clippy --version >/dev/null 2>&1; then
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
 for fetch in "${fetching[@]}"; do wait "$fetch"; done
-# Six seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
-export FUZZ_SECONDS=${FUZZ_SECONDS:-6}
+# Ten seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
+export FUZZ_SECONDS=${FUZZ_SECONDS:-10}
 cargo test --workspace --no-run --quiet
 # The Python package waits for processes that it starts more than it computes: it is tested meanwhile.
 said=target/python.log

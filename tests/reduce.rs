@@ -129,6 +129,11 @@ proptest! {
                 prop_assert_eq!(&found.places, &all.vectors[0].places);
             }
             prop_assert!(all.vectors[0].error <= 2.0 * tolerance, "{curve:?}");
+            // A channel that is together with none has the keys that it has alone.
+            let single = [(turns.clone(), tolerance)];
+            let single = reduce_together(&times, &single, &[], curve).unwrap();
+            let alone = reduce_rotations(&times, &turns, tolerance, curve).unwrap();
+            prop_assert_eq!(&single.rotations[0], &alone, "{:?}", curve);
         }
     }
 }

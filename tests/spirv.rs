@@ -84,7 +84,12 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
                 results += 1;
             }
         }
-        assert!(results > 0, "{name} has no float operations");
+        // All but one line of it is whole numbers.
+        let least = if name == "crowd_times" { 3 } else { 11 };
+        assert!(
+            results >= least,
+            "{name} has only {results} float operations"
+        );
         assert_eq!(
             results,
             decorations.len(),

@@ -10,7 +10,7 @@ use crate::twin::crowd_times::ELAPSED_BITS;
 pub(crate) struct Instances {
     /// `[instance][layer]`
     entries: Vec<CrowdEntry>,
-    /// A bit for each entry that changed.
+    /// A bit for each entry that changed; those beyond the last entry mean nothing.
     changed: Vec<u64>,
     /// Ticks.
     clock: u64,
@@ -27,20 +27,21 @@ impl Instances {
     ) -> Result<Self, OutOfMemory> {
         let count = instances * layers;
         let mut entries: Vec<CrowdEntry> = zeroed(count, "a crowd")?;
-        let mut changed: Vec<u64> = zeroed(count.div_ceil(64), "a crowd")?;
+        let changed = zeroed(count.div_ceil(64), "a crowd")?;
         for (place, entry) in entries.iter_mut().enumerate() {
             *entry = still;
             if place % layers > 0 {
                 entry.clip_and_weight &= 0xffff;
             }
-            changed[place / 64] |= 1 << (place % 64);
         }
-        Ok(Self {
+        let mut own = Self {
             entries,
             changed,
             clock: 0,
             since: 0,
-        })
+        };
+        own.forget();
+        Ok(own)
     }
 
     pub(crate) fn entries(&self) -> &[CrowdEntry] {
@@ -85,9 +86,7 @@ impl Instances {
 
     /// From now on the device knows nothing.
     pub(crate) fn forget(&mut self) {
-        for place in 0..self.entries.len() {
-            self.changed[place / 64] |= 1 << (place % 64);
-        }
+        self.changed.fill(u64::MAX);
     }
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::crowd::clip_tables::ClipTables;
 use crate::crowd::library::{Cells, CrowdLibrary};
-use crate::crowd::output::CrowdValues;
+use crate::crowd::output::{CrowdOutput, CrowdValues};
 use crate::shader::{
     CHANNELS, CrowdEntry, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
 };
@@ -107,10 +107,7 @@ impl InLanes for Task<'_, '_> {
 
 impl<'a> Scene<'a> {
     fn vectors(&self) -> usize {
-        match self.values {
-            CrowdValues::Rotations => 1,
-            _ => 3,
-        }
+        CrowdOutput::from(self.values).vectors()
     }
 
     fn layers<'p>(&self, places: &'p [CrowdPlace]) -> Layers<'p>
