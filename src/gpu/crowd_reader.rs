@@ -11,10 +11,10 @@ use crate::shader::CrowdEntry;
 
 /// A target whose result the host reads.
 pub(crate) struct CrowdReader {
-    crowd: Arc<DeviceCrowd>,
     // The submission goes first: it waits for what uses the rest.
     submission: Submission,
     target: CrowdTarget,
+    crowd: Arc<DeviceCrowd>,
     /// What kernels write; the host sees it where the device works in place.
     output: Buffer,
     readback: Option<Buffer>,
