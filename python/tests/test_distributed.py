@@ -532,6 +532,14 @@ def test_sizes_are_numbers_or_text():
             bytes_of(size)
 
 
+def test_objects_stay_in_their_directory():
+    _stores.check_names("s3://b/clips", ["a.dat", "walks/b..c.dat", "walks/.hidden/d.dat"])
+    for name in "../a.dat", "walks/../../a.dat", "a/./b.dat", "a//b.dat", "/etc/a.dat", "a\\..\\b.dat":
+        with pytest.raises(DistributedError, match="rename the object") as refused:
+            _stores.check_names("s3://b/clips", ["a.dat", name])
+        assert name in str(refused.value)
+
+
 def test_a_device_goes_by_its_uuid():
     listed = json.loads(tumble_program("devices", "--json").stdout)["devices"]
     assert listed, "lavapipe is there"

@@ -30,7 +30,7 @@ from tumble.distributed._job import (
     is_url,
     wheel,
 )
-from tumble.distributed._stores import Store, objects, put_text, read_text, store
+from tumble.distributed._stores import Store, check_names, objects, put_text, read_text, store
 
 # So many tasks for each processor wait for one. With four, half a minute's work was with a machine
 # that went; with 32 no pause was seen.
@@ -166,6 +166,7 @@ def evaluate(
     if is_url(library):
         base = library.split("?")[0].rstrip("/")
         listed = sorted(objects(library).list().items())
+        check_names(base, (name for name, _ in listed))
     with _refusals():
         with tempfile.TemporaryDirectory() as nowhere:
             folder = nowhere if is_url(out) else out

@@ -7,6 +7,7 @@ import importlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 from tumble.distributed._job import USAGE, DistributedError, is_url
@@ -172,6 +173,15 @@ class _Objects:
             open(target, "wb") as file,
         ):
             shutil.copyfileobj(stream, file, 1 << 20)
+
+
+def check_names(url: str, names: Iterable[str]) -> None:
+    """Objects may be called anything; workers fetch them into files, of which none may lie outside
+    their directory."""
+    for name in names:
+        if any(part in ("", ".", "..") for part in name.split("/")) or "\\" in name:
+            message = f"{url}/{name}: is no name of a file below the library; rename the object"
+            raise DistributedError(message, USAGE)
 
 
 def objects(url: str) -> _Objects:
