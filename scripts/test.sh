@@ -128,7 +128,7 @@ said=target/python.log
 ./scripts/python.sh --color=yes >"$said" 2>&1 &
 python=$!
 failed=0
-cargo test --workspace || failed=$?
+cargo test --workspace --no-fail-fast || failed=$?
 wait "$python" || failed=$?
 cat "$said"
 exit "$failed"

@@ -158,16 +158,41 @@ impl fmt::Display for Place {
     }
 }
 
-/// Makes a directory for results where there is none.
+/// Makes a directory for results where there is none. Another process may make it at the same
+/// moment: shards begin together.
 pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
-    let made = if path.is_dir() {
-        Ok(())
-    } else {
-        std::fs::create_dir(path)
-    };
-    made.map_err(|error| {
-        let path = path.display();
-        let message = format!("{path}: the directory could not be made: {error}");
-        Failure::new(OUTPUT, message)
-    })
+    match std::fs::create_dir(path) {
+        Err(error) if !path.is_dir() => {
+            let path = path.display();
+            let message = format!("{path}: the directory could not be made: {error}");
+            Err(Failure::new(OUTPUT, message))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+
+    use super::*;
+
+    /// Shards that begin together all want the directory of their results.
+    #[test]
+    fn a_directory_may_be_made_by_many_at_once() {
+        let place = tempfile::tempdir().unwrap();
+        let together = Barrier::new(4);
+        for round in 0..200 {
+            let path = place.path().join(round.to_string());
+            std::thread::scope(|scope| {
+                for _ in 0..4 {
+                    scope.spawn(|| {
+                        together.wait();
+                        assert!(folder(&path).is_ok());
+                    });
+                }
+            });
+        }
+        assert!(folder(&place.path().join("no/such")).is_err());
+    }
 }
