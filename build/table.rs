@@ -203,13 +203,17 @@ const PLAIN_CHANNELS: [&str; 6] = [
     "crowd/plain",
 ];
 
-/// Kernels over a crowd, each with the files that it needs behind some that it shares.
-const CROWD: [(&str, &[&str], &[&str]); 8] = [
-    (
-        "times",
-        &[],
-        &["crowd/entry", "lists/frame_distance", "crowd/times"],
-    ),
+/// What they read. Cells are constants of segments, keys, masks and reference poses.
+static CROWD_READS: [Read; 4] = [
+    read("entries", "CrowdEntry", "entry_at"),
+    read("channels", "CrowdChannel", "channel_at"),
+    read("cells", "vec4f", "cell_at"),
+    read("places", "CrowdPlace", "place_at"),
+];
+
+/// Kernels that evaluate the joints of a crowd, each with the files that it needs behind some that
+/// it shares.
+const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
     ("rotations", &CHANNELS, &["crowd/layers", "crowd/rotations"]),
     ("plain_rotations", &PLAIN_CHANNELS, &["crowd/rotations"]),
     (
@@ -222,17 +226,17 @@ const CROWD: [(&str, &[&str], &[&str]); 8] = [
         &PLAIN_CHANNELS,
         &["math/matrix", "crowd/locals"],
     ),
+];
+
+/// Other kernels over a crowd.
+const CROWD: [(&str, &[&str]); 4] = [
     (
-        "walk",
-        &[],
-        &["math/canonical", "crowd/affine", "crowd/walk"],
+        "times",
+        &["crowd/entry", "lists/frame_distance", "crowd/times"],
     ),
-    (
-        "skin",
-        &[],
-        &["math/canonical", "crowd/affine", "crowd/skin"],
-    ),
-    ("half", &[], &["math/half", "crowd/half"]),
+    ("walk", &["math/canonical", "crowd/affine", "crowd/walk"]),
+    ("skin", &["math/canonical", "crowd/affine", "crowd/skin"]),
+    ("half", &["math/half", "crowd/half"]),
 ];
 
 /// The files of the self-test.
@@ -293,10 +297,18 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
         });
     }
-    for (name, shared, own) in CROWD {
+    for (name, shared, own) in CROWD_JOINTS {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [shared, own, &["crowd"]].concat(),
+            files: [shared, own, &["stores/f32", "crowd"]].concat(),
+            reads: CROWD_READS.iter().collect(),
+            has_texels: true,
+        });
+    }
+    for (name, own) in CROWD {
+        kernels.push(Kernel {
+            name: format!("crowd_{name}"),
+            files: [own, &["crowd"]].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

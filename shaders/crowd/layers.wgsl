@@ -40,18 +40,18 @@ fn laid_over(
 fn layered(instance: u32, joint: u32, kind: u32) -> vec4f {
     let first = instance * dispatch.layers;
     let all = (dispatch.first_instance + instance) * dispatch.layers;
-    var value = layer_value(first, entries[all], joint, kind);
+    var value = layer_value(first, entry_at(all), joint, kind);
     for (var layer = 1u; layer < dispatch.layers; layer++) {
-        let entry = entries[all + layer];
+        let entry = entry_at(all + layer);
         let weight = entry.clip_and_weight >> 16u;
         if weight != 0u {
             let modes = entry.speed_and_modes;
             let mask = dispatch.masks + ((modes >> 24u) & 0x1fu) * dispatch.joints + joint;
-            let own = f32(i32(weight)) * WEIGHT_UNIT * cells[mask].x;
+            let own = f32(i32(weight)) * WEIGHT_UNIT * cell_at(mask).x;
             let clip = entry.clip_and_weight & 0xffffu;
             let reference = dispatch.references + (clip * dispatch.joints + joint) * CHANNELS + kind;
             let next = layer_value(first + layer, entry, joint, kind);
-            value = laid_over(kind, (modes >> 31u) != 0u, value, next, cells[reference], own);
+            value = laid_over(kind, (modes >> 31u) != 0u, value, next, cell_at(reference), own);
         }
     }
     return value;

@@ -2,8 +2,6 @@
 // affine matrix: T R S.
 // Twin: src/twin/crowd_matrices.rs.
 
-@group(0) @binding(4) var<storage, read_write> matrices: array<vec4f>;
-
 // A row of R with the columns scaled, and the translation behind it.
 fn transform_row(turned: vec3f, scale: vec4f, moved: f32) -> vec4f {
     let row = canonical(vec4f(turned, 0.0));
@@ -18,7 +16,7 @@ fn crowd_work(place: u32) {
     let moved = layered(instance, joint, TRANSLATION);
     let scale = layered(instance, joint, SCALE);
     let first = place * 3u;
-    matrices[first] = transform_row(rows.first, scale, moved.x);
-    matrices[first + 1u] = transform_row(rows.second, scale, moved.y);
-    matrices[first + 2u] = transform_row(rows.third, scale, moved.z);
+    store(first, transform_row(rows.first, scale, moved.x));
+    store(first + 1u, transform_row(rows.second, scale, moved.y));
+    store(first + 2u, transform_row(rows.third, scale, moved.z));
 }

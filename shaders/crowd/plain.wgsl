@@ -2,11 +2,6 @@
 // devices take both ways of a branch; here is none.
 // Twin: src/twin/crowd_layers.rs.
 
-@group(0) @binding(0) var<storage, read> entries: array<CrowdEntry>;
-@group(0) @binding(1) var<storage, read> channels: array<CrowdChannel>;
-@group(0) @binding(2) var<storage, read> cells: array<vec4f>;
-@group(0) @binding(3) var<storage, read> places: array<CrowdPlace>;
-
 const ROTATION: u32 = 0;
 const TRANSLATION: u32 = 1;
 const SCALE: u32 = 2;
@@ -16,8 +11,8 @@ fn arc_value(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
     let is_key = (place.span & ON_KEY) != 0u;
     let along = (place.span & TICKS) * channel.count;
     let middle = channel.first + along * 2u;
-    let own = cells[select(middle, channel.keys + along, is_key)];
-    let tangent = cells[select(middle + channel.count, 0u, channel.count == 0u)];
+    let own = cell_at(select(middle, channel.keys + along, is_key));
+    let tangent = cell_at(select(middle + channel.count, 0u, channel.count == 0u));
     return select(canonical(evaluate(Segment(own, tangent), place.parameter)), own, is_key);
 }
 
@@ -29,12 +24,12 @@ fn cubic_value(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
     let first = channel.first + along * 4u;
     let second = first + channel.count;
     let third = second + channel.count;
-    let own = cells[select(first, channel.keys + along, is_key)];
+    let own = cell_at(select(first, channel.keys + along, is_key));
     let value = cubic(
         own,
-        cells[select(second, 0u, is_constant)],
-        cells[select(third, 0u, is_constant)],
-        cells[select(third + channel.count, 0u, is_constant)],
+        cell_at(select(second, 0u, is_constant)),
+        cell_at(select(third, 0u, is_constant)),
+        cell_at(select(third + channel.count, 0u, is_constant)),
         place.parameter,
     );
     return select(canonical(value), own, is_key);
@@ -42,9 +37,9 @@ fn cubic_value(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
 
 // The `kind`th channel of a joint; `instance` counts within the window.
 fn layered(instance: u32, joint: u32, kind: u32) -> vec4f {
-    let clip = entries[dispatch.first_instance + instance].clip_and_weight & 0xffffu;
-    let channel = channels[(clip * dispatch.joints + joint) * CHANNELS + kind];
-    let place = places[instance * dispatch.bases + (channel.form_and_base & 0xffffffu)];
+    let clip = entry_at(dispatch.first_instance + instance).clip_and_weight & 0xffffu;
+    let channel = channel_at((clip * dispatch.joints + joint) * CHANNELS + kind);
+    let place = place_at(instance * dispatch.bases + (channel.form_and_base & 0xffffffu));
     if kind == ROTATION {
         return arc_value(channel, place);
     }

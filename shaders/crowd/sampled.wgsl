@@ -1,12 +1,6 @@
 // Evaluates one channel of a joint in one layer of an instance.
 // Twin: src/twin/crowd_layers.rs.
 
-@group(0) @binding(0) var<storage, read> entries: array<CrowdEntry>;
-@group(0) @binding(1) var<storage, read> channels: array<CrowdChannel>;
-// Constants of segments, keys, masks and reference poses.
-@group(0) @binding(2) var<storage, read> cells: array<vec4f>;
-@group(0) @binding(3) var<storage, read> places: array<CrowdPlace>;
-
 // The forms of channels: one constant; an arc's middle and tangent; the four coefficients of a cubic.
 // Else it is the eleven coefficients of a polynomial.
 const FORM_CONSTANT: u32 = 0;
@@ -25,25 +19,27 @@ fn sampled(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
     let count = channel.count;
     let s = place.parameter;
     if form == FORM_CONSTANT {
-        return cells[channel.first];
+        return cell_at(channel.first);
     }
     if (place.span & ON_KEY) != 0u {
-        return cells[channel.keys + span * count];
+        return cell_at(channel.keys + span * count);
     }
     if form == FORM_ARC {
         let first = channel.first + span * count * 2u;
-        return canonical(evaluate(Segment(cells[first], cells[first + count]), s));
+        return canonical(evaluate(Segment(cell_at(first), cell_at(first + count)), s));
     }
     if form == FORM_CUBIC {
         let first = channel.first + span * count * 4u;
         let second = first + count;
         let third = second + count;
-        return canonical(cubic(cells[first], cells[second], cells[third], cells[third + count], s));
+        let c0 = cell_at(first);
+        let c1 = cell_at(second);
+        return canonical(cubic(c0, c1, cell_at(third), cell_at(third + count), s));
     }
     var coefficients: array<vec4f, 11>;
     var next = channel.first + span * count * 11u;
     for (var power = 0u; power < 11u; power++) {
-        coefficients[power] = cells[next];
+        coefficients[power] = cell_at(next);
         next = next + count;
     }
     return canonical(polynomial(coefficients, s));
@@ -52,6 +48,7 @@ fn sampled(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
 // The `kind`th channel of a joint in one layer; `layer` counts within the window.
 fn layer_value(layer: u32, entry: CrowdEntry, joint: u32, kind: u32) -> vec4f {
     let clip = entry.clip_and_weight & 0xffffu;
-    let channel = channels[(clip * dispatch.joints + joint) * CHANNELS + kind];
-    return sampled(channel, places[layer * dispatch.bases + (channel.form_and_base & 0xffffffu)]);
+    let channel = channel_at((clip * dispatch.joints + joint) * CHANNELS + kind);
+    let place = place_at(layer * dispatch.bases + (channel.form_and_base & 0xffffffu));
+    return sampled(channel, place);
 }

@@ -73,9 +73,15 @@ impl CrowdTarget {
             places,
             whole,
         };
-        let sizes = [vk::DescriptorPoolSize::default()
-            .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count(count * SETS * BINDINGS)];
+        let sizes = [
+            vk::DescriptorType::STORAGE_BUFFER,
+            vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        ]
+        .map(|kind| {
+            vk::DescriptorPoolSize::default()
+                .ty(kind)
+                .descriptor_count(count * SETS * BINDINGS)
+        });
         let info = vk::DescriptorPoolCreateInfo::default()
             .max_sets(count * SETS)
             .pool_sizes(&sizes);
@@ -142,11 +148,16 @@ impl CrowdTarget {
                 .buffer(binding.buffer)
                 .offset(binding.offset)
                 .range(binding.size)];
+            let views = [binding.view];
+            let kind = pipeline.kind(place);
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(place)
-                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                .buffer_info(&info);
+                .descriptor_type(kind);
+            let write = match kind {
+                vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(&info),
+                _ => write.texel_buffer_view(&views),
+            };
             // SAFETY: nothing uses the set yet, and the buffers are alive.
             unsafe { raw.update_descriptor_sets(&[write], &[]) };
         }

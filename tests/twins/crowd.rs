@@ -508,7 +508,7 @@ pub(super) fn layers() -> Vec<Twin> {
             let place = instance * JOINTS + joint;
             trial.argument(place);
             scene.put(trial);
-            trial.output("turned");
+            trial.output("rotations");
             trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
             trial.expect(scene.twin().layered(instance, joint, ROTATION));
         }),
@@ -529,7 +529,7 @@ pub(super) fn layers() -> Vec<Twin> {
             let place = instance * JOINTS + joint;
             trial.argument(place);
             scene.put(trial);
-            trial.output("matrices");
+            trial.output("rotations");
             trial.expect(vec![[UNTOUCHED; 12]; place as usize]);
             let own = |kind| scene.twin().layered(instance, joint, kind);
             trial.expect(transform(own(ROTATION), own(TRANSLATION), own(SCALE)));
