@@ -10,7 +10,7 @@ use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
-use crate::time::runs::{Distance, Emit, Run, RunSource, runs_after, runs_before};
+use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource, runs_after, runs_before};
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::TrackCopy;
 use crate::twin::evaluate::Evaluate;
@@ -165,6 +165,19 @@ impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
     fn run(&mut self, run: Run) {
         self.row.evaluate_run::<Vec4>(&run, self.output);
     }
+
+    #[inline(always)]
+    fn constant(&mut self, sample: usize, count: usize, constant: u32) {
+        let constant = self.row.part.prepared.constants[constant as usize];
+        self.row.samples_of(sample, count, self.output).fill(constant);
+    }
+
+    #[inline(always)]
+    fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
+        let run = Run::new(sample, count, RunSource::Exact { index, parameter });
+        let output = self.row.samples_of(sample, count, self.output);
+        self.row.exact(&run, output);
+    }
 }
 
 impl<S: Evaluate> Row<'_, S> {
@@ -172,7 +185,7 @@ impl<S: Evaluate> Row<'_, S> {
     #[inline(always)]
     fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {
         let PartRef { prepared, part } = self.part;
-        let output = &mut output[run.sample - self.copy.samples.start..][..run.count];
+        let output = self.samples_of(run.sample, run.count, output);
         match run.source {
             RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
             RunSource::Segment(index, distance, affine) => {
@@ -196,6 +209,17 @@ impl<S: Evaluate> Row<'_, S> {
 }
 
 impl<S> Row<'_, S> {
+    /// Where samples of the track go; `output` starts at the first sample of the track copy.
+    #[inline(always)]
+    fn samples_of<'o>(
+        &self,
+        sample: usize,
+        count: usize,
+        output: &'o mut [[f32; 4]],
+    ) -> &'o mut [[f32; 4]] {
+        &mut output[sample - self.copy.samples.start..][..count]
+    }
+
     /// Evaluates a run in f64.
     #[inline(never)]
     fn exact(&self, run: &Run, output: &mut [[f32; 4]]) {

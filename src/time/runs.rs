@@ -87,6 +87,20 @@ pub(crate) enum Parameter {
 /// the vector width of the function that it is inlined into.
 pub(crate) trait Emit {
     fn run(&mut self, run: Run);
+
+    /// Takes samples with a constant. Most places that emit know that they have one; what evaluates
+    /// segments is not compiled for them.
+    #[inline(always)]
+    fn constant(&mut self, sample: usize, count: usize, constant: u32) {
+        self.run(Run::new(sample, count, RunSource::Constant(constant)));
+    }
+
+    /// Takes samples of a curve that is evaluated in f64, likewise.
+    #[inline(always)]
+    fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
+        let source = RunSource::Exact { index, parameter };
+        self.run(Run::new(sample, count, source));
+    }
 }
 
 impl Emit for Vec<Run> {
@@ -171,14 +185,13 @@ impl Spans {
                 };
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
                 if key != NONE && block.is_held[j] == 1 {
-                    emit.run(Run::new(first, 1, RunSource::Constant(key)));
+                    emit.constant(first, 1, key);
                     first += 1;
                     if first == last {
                         continue;
                     }
                 }
-                let run = |source| Run::new(first, last - first, source);
-                // One call for each source, so that inlined code does not match on it again.
+                let count = last - first;
                 match self.sources[span] {
                     Source::Segment(index) => {
                         let distance = if block.are_near {
@@ -193,12 +206,12 @@ impl Spans {
                         } else {
                             return Err(self.gap_too_long(part, span, clock.rate()));
                         };
-                        emit.run(run(RunSource::Segment(index, distance, block.affine(j))));
+                        let source = RunSource::Segment(index, distance, block.affine(j));
+                        emit.run(Run::new(first, count, source));
                     }
-                    Source::Constant(constant) => emit.run(run(RunSource::Constant(constant))),
+                    Source::Constant(constant) => emit.constant(first, count, constant),
                     Source::Exact(index) => {
-                        let parameter = block.parameter::<C>(j);
-                        emit.run(run(RunSource::Exact { index, parameter }));
+                        emit.exact(first, count, index, block.parameter::<C>(j));
                     }
                 }
             }
@@ -281,8 +294,7 @@ fn extrapolate(
     if first < last {
         let (start, frames) = (end, clock.rate());
         let parameter = Parameter::Frames { start, frames };
-        let source = RunSource::Exact { index, parameter };
-        emit.run(Run::new(first, last - first, source));
+        emit.exact(first, last - first, index, parameter);
     }
 }
 
@@ -297,7 +309,7 @@ fn emit_constant(
 ) {
     let (sample, to) = (from.max(samples.start), to.min(samples.end));
     if sample < to && constant != NONE {
-        emit.run(Run::new(sample, to - sample, RunSource::Constant(constant)));
+        emit.constant(sample, to - sample, constant);
     }
 }
 

@@ -123,8 +123,10 @@ fn outside(
         .iter()
         .take_while(|time| covered.contains(time))
         .count();
-    if let Some(source) = source {
-        emit.run(Run::new(sample, count, source));
+    match source {
+        Some(RunSource::Constant(constant)) => emit.constant(sample, count, constant),
+        Some(RunSource::Exact { index, parameter }) => emit.exact(sample, count, index, parameter),
+        Some(RunSource::Segment(..)) | None => {}
     }
     count
 }
