@@ -1,6 +1,6 @@
 //! Curves at constant angular speed: the way stays the same, and is measured out evenly.
 
-use crate::support::{Random, first_difference, hostile_set, vulkan_devices};
+use crate::support::{Random, first_difference, hostile_set, is_turn, vulkan_devices};
 use glam::{DQuat, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
@@ -162,14 +162,18 @@ fn the_same_bits_on_every_device() {
     let devices: Vec<Engine> = devices.collect::<Result<_, _>>().unwrap();
     let set = hostile_set(3, 12);
     let frames = Frames::fps(30).between(-1.0, 30.0);
-    for method in METHODS {
+    for (round, method) in METHODS.into_iter().enumerate() {
         let interpolation = constant(method);
         let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
         for (place, q) in expected.as_quats().iter().enumerate() {
             let norm = q.as_dquat().length();
             assert!((norm - 1.0).abs() < 1e-6, "{method}, {place}: {q}");
         }
-        for vulkan in &devices {
+        // What takes long is to prepare the curves, again for each.
+        for (place, vulkan) in devices.iter().enumerate() {
+            if !is_turn(round, place, devices.len()) {
+                continue;
+            }
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             let difference = first_difference(expected.as_quats(), found.as_quats());
             assert_eq!(difference, None, "{method}, {}", vulkan.device_name());

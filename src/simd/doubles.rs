@@ -89,7 +89,7 @@ macro_rules! doubles {
         }
     };
 }
-#[cfg(target_arch = "x86_64")]
+#[cfg(wide_vectors)]
 pub(crate) use doubles;
 
 /// Calls instructions that every processor of the target has.

@@ -12,18 +12,11 @@ pub(crate) struct DeCasteljau;
 impl Formula for DeCasteljau {
     #[inline(always)]
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
-        let mut points = [
-            quaternion(numbers, 0),
-            quaternion(numbers, 4),
-            quaternion(numbers, 8),
-            quaternion(numbers, 12),
-        ];
-        // One slerp in a loop is compiled once; six beside each other were a tenth of the engine's code.
-        for left in [3, 2, 1] {
-            for point in 0..left {
-                points[point] = slerp(points[point], points[point + 1], t);
-            }
-        }
-        points[0]
+        let (q0, a) = (quaternion(numbers, 0), quaternion(numbers, 4));
+        let (b, q1) = (quaternion(numbers, 8), quaternion(numbers, 12));
+        let middle = slerp(a, b, t);
+        let left = slerp(slerp(q0, a, t), middle, t);
+        let right = slerp(middle, slerp(b, q1, t), t);
+        slerp(left, right, t)
     }
 }

@@ -124,6 +124,9 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     }
 }
 
+/// The most pairs of nodes of a fit.
+const MOST_PAIRS: usize = 5;
+
 /// Samples curves by the formula itself, in f64.
 struct Directly<F>(PhantomData<F>);
 
@@ -141,20 +144,30 @@ impl<F: Formula> Sampling for Directly<F> {
             }
             let at = load::<L>(&block.middles, lane);
             let width = load::<L>(&block.widths, lane);
-            let middle = rotation::<F, _>(&numbers, at);
-            let mut doubt = doubt(middle);
+            // One loop over all nodes: the formula is compiled once, and what does not change along
+            // a curve is computed once.
+            let mut found = [[L::Doubles::all(0.0); 4]; 2 * MOST_PAIRS + 1];
+            let mut doubt = L::Doubles::all(0.0);
+            for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
+                let node = match i {
+                    0 => 0.0,
+                    _ if i <= PAIRS => -nodes.at[i - 1],
+                    _ => nodes.at[i - 1 - PAIRS],
+                };
+                let t = at + L::Doubles::all(f64::from(node)) * width;
+                *found = rotation::<F, _>(&numbers, t);
+                doubt = doubt + self::doubt(*found);
+            }
+            let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
             samples.middle = rounded::<L>(middle);
             for k in 0..PAIRS {
-                let reach = L::Doubles::all(f64::from(nodes.at[k])) * width;
-                let before = rotation::<F, _>(&numbers, at - reach);
-                let after = rotation::<F, _>(&numbers, at + reach);
+                let (before, after) = (found[1 + k], found[1 + PAIRS + k]);
                 for c in 0..4 {
                     let sum = (after[c] - middle[c]) + (before[c] - middle[c]);
                     samples.even[k][c] = L::rounded(sum);
                     samples.odd[k][c] = L::rounded(after[c] - before[c]);
                 }
-                doubt = doubt + self::doubt(before) + self::doubt(after);
             }
             if !doubt.are_at_most(0.0) {
                 let mut doubts = [0.0; MOST];
