@@ -61,6 +61,7 @@ impl Application {
             shader_int64: self.shader_int64,
             queue: self.queue,
             queue_family: 0,
+            copy_queue: None,
         };
         // SAFETY: the handles belong together and outlive the engine.
         unsafe { Engine::from_vulkan(handles, &options) }.unwrap()
