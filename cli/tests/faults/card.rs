@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 
+use crate::application::Application;
 use crate::faults::library::crowd_work;
 use crate::faults::loader::{Loader, Log};
 use crate::faults::{DEVICE_LOST, OUT_OF_DEVICE_MEMORY, on};
@@ -13,7 +14,7 @@ use crate::support::{dense_set, first_difference, hostile_set};
 use glam::Quat;
 use rayon::prelude::*;
 use tumble::{
-    Device, DeviceKind, Encoding, Engine, EngineOptions, Frames, Layout, Skeleton, method,
+    Device, DeviceKind, Encoding, Engine, EngineOptions, Frames, Layout, Mapping, Skeleton, method,
 };
 
 /// The kinds of memory that the loader tells of, by their numbers.
@@ -24,8 +25,13 @@ const CACHED: &str = "memory 3";
 
 fn run(loader: &Loader, card: &str) -> Log {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "faults::card::card_work", "--ignored"]);
-    let (run, log) = loader.run_command(command.arg("--nocapture"), &[("FAULT_CARD", card)]);
+    command.args([
+        "--exact",
+        "faults::card::card_work",
+        "--ignored",
+        "--nocapture",
+    ]);
+    let (run, log) = loader.run_command(command, &[("FAULT_CARD", card)]);
     assert_eq!(run.code, 0, "{card}: {}", run.words);
     assert_eq!(log.left, BTreeMap::new(), "{card}");
     log
@@ -107,13 +113,66 @@ fn card_work() {
         }
         crowd_work(&engine).unwrap();
         let skeleton = Skeleton::chain(40, 1.0).unwrap();
-        let of = |engine: &Engine| {
+        let of = |engine: &Engine| -> Vec<Quat> {
             let poses = engine.evaluate(&set, method::SLERP, &requests[0]).unwrap();
-            engine.world(&poses, &skeleton).unwrap()
+            let world = engine.world(&poses, &skeleton).unwrap();
+            let samples = 0..world.samples();
+            let all = samples.filter_map(|sample| world.rotation(39, sample));
+            all.collect()
         };
         let (expected, found) = (of(&cpu), of(&engine));
-        assert_same(expected.as_quats(), found.as_quats(), "world");
+        assert!(!expected.is_empty());
+        assert_same(&expected, &found, "world");
     }
+}
+
+/// An application's device copies on the queue that the application names, and on no other.
+#[test]
+fn an_application_names_the_queue_that_copies() {
+    let Some(loader) = Loader::new() else { return };
+    for (name, named) in [("own_queue", false), ("two_queues", true)] {
+        let test = format!("faults::card::{name}");
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", &test, "--ignored", "--nocapture"]);
+        let (run, log) = loader.run_command(command, &[("FAULT_CARD", "rebar")]);
+        assert_eq!(run.code, 0, "{name}: {}", run.words);
+        assert_eq!(log.left, BTreeMap::new(), "{name}");
+        assert_eq!(log.card.contains_key("copies"), named, "{name}: {log:?}");
+        assert!(!log.card.contains_key("disorder"), "{name}: {log:?}");
+    }
+}
+
+fn on_own_device(change: impl Fn(&mut Application)) {
+    let mut application = Application::new();
+    assert!(
+        application.copy_queue.is_some(),
+        "the card has such a queue"
+    );
+    change(&mut application);
+    let engine = application.engine(Mapping::Automatic);
+    let set = hostile_set(4, 32);
+    let frames = Frames::fps(30).between(0.0, 20.0);
+    for method in [method::SLERP, method::C2] {
+        let found = engine.evaluate(&set, method, &frames).unwrap();
+        let cpu = Engine::new(Device::Cpu).unwrap();
+        let expected = cpu.evaluate(&set, method, &frames).unwrap();
+        let difference = first_difference(expected.as_quats(), found.as_quats());
+        assert_eq!(difference, None, "{method}");
+    }
+}
+
+/// Run by the test above, in a process of its own.
+#[test]
+#[ignore = "part of an_application_names_the_queue_that_copies"]
+fn own_queue() {
+    on_own_device(|application| application.copy_queue = None);
+}
+
+/// Run by the test above, in a process of its own.
+#[test]
+#[ignore = "part of an_application_names_the_queue_that_copies"]
+fn two_queues() {
+    on_own_device(|_| {});
 }
 
 /// As `a_fault_anywhere_changes_no_bit_and_leaks_nothing`, on the card: the calls for a second queue,
