@@ -38,7 +38,8 @@ impl ReadBack {
         staged: bool,
     ) -> Result<&Buffer, VulkanError> {
         if !staged {
-            return Ok(grow(device, &mut self.output, size, Residence::InPlace)?);
+            let output = grow(device, &mut self.output, size, Residence::InPlace)?;
+            return Ok(output);
         }
         if self.apart.is_none() && device.copies_apart() {
             self.apart = Some(CopyApart {
@@ -47,7 +48,8 @@ impl ReadBack {
             });
         }
         grow(device, &mut self.host, size, Residence::Readback)?;
-        Ok(grow(device, &mut self.output, size, Residence::Results)?)
+        let output = grow(device, &mut self.output, size, Residence::Results)?;
+        Ok(output)
     }
 
     /// Submits recorded kernels that wrote the first `size` bytes of the results, and what brings
