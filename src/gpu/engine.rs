@@ -8,7 +8,7 @@ use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeysInFlight;
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{External, InFlight, Target};
+use crate::gpu::in_flight::{External, InFlight, Target, copy};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
@@ -273,7 +273,7 @@ impl VulkanEngine {
             Some(place) => (spare.swap_remove(place), false),
             None => writable(&self.device, name, size, KernelReads::Often)?,
         };
-        upload.bytes_mut(0..bytes.len()).copy_from_slice(bytes);
+        copy(upload.bytes_mut(0..bytes.len()), bytes);
         if !is_staged {
             return Ok(upload);
         }

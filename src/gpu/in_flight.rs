@@ -337,10 +337,10 @@ pub(crate) fn write(
         });
 }
 
-/// Bytes of a result that one thread copies at once.
+/// Bytes that one thread copies at once.
 const COPIED: usize = 1 << 20;
 
-/// Copies a result, on all threads where it is long.
+/// Copies a result or an upload, on all threads where it is long.
 pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
     if to.len() <= COPIED {
         return to.copy_from_slice(from);
