@@ -1,8 +1,7 @@
 //! Vulkan's side of the bargain: devices, self-tests, validation, handles.
 
 use crate::support::{
-    STAGED, WAYS, dense_set, first_difference, hostile_set, is_turn, stage, vulkan_devices,
-    vulkan_engines,
+    WAYS, dense_set, first_difference, hostile_set, is_turn, stage, vulkan_devices, vulkan_engines,
 };
 use bytemuck::Pod;
 use glam::Quat;
@@ -102,11 +101,11 @@ fn every_way_of_copying_gives_the_same_bits() {
     let (dense, dense_frames) = dense_set(40, 300, 0.1);
     let frames = Frames::fps(60).between(0.0, 9.0);
     for device in vulkan_devices() {
-        for turn in 0..STAGED.len() {
+        for (turn, (reads, mapping)) in WAYS.into_iter().enumerate() {
             for memory in [None, Some(100_000)] {
                 let mut options = EngineOptions::default();
                 stage(&mut options, turn);
-                (options.reads, options.mapping) = WAYS[turn];
+                (options.reads, options.mapping) = (reads, mapping);
                 options.memory = memory;
                 let engine = Engine::with_options(device.clone(), &options).unwrap();
                 for (set, frames) in [(&set, &frames), (&dense, &dense_frames)] {
