@@ -182,6 +182,7 @@ impl Renderer {
             shader_int64: self.has_int64,
             queue: self.queue,
             queue_family: self.family,
+            copy_queue: None,
         };
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }

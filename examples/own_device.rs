@@ -95,6 +95,7 @@ impl Renderer {
             shader_int64: self.has_int64,
             queue: self.compute.0,
             queue_family: self.compute.1,
+            copy_queue: None,
         };
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }

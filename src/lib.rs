@@ -114,8 +114,10 @@ pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;
 pub use crate::gpu::error::VulkanError;
-pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
-pub use crate::gpu::options::{EngineOptions, Mapping, Reads, Timings, Transfer};
+pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
+pub use crate::gpu::options::{
+    EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,
+};
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
 pub use crate::gpu::self_test::SelfTestReport;
 pub use crate::memory::OutOfMemory;

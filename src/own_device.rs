@@ -24,7 +24,7 @@ impl Engine {
     ///
     /// # Safety
     /// The handles must be valid and belong together, must outlive the engine and
-    /// all of its clips and results, and nobody else may use the queue while the
+    /// all of its clips and results, and nobody else may use the queues while the
     /// engine does.
     pub unsafe fn from_vulkan(
         handles: VulkanHandles,

@@ -2,7 +2,7 @@
 //! frames, however the work is cut.
 
 use crate::support::{
-    Random, WAYS, first_difference, give_key_data, hostile_set, is_turn, vulkan_devices,
+    Random, WAYS, first_difference, give_key_data, hostile_set, is_turn, stage, vulkan_devices,
     vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
@@ -111,6 +111,9 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
             for device in vulkan_devices() {
                 let engine = engine(&device, |options| {
                     options.transfer = transfer;
+                    if transfer == Transfer::Staged {
+                        stage(options, way + budget);
+                    }
                     (options.reads, options.mapping) = (reads, mapping);
                     options.memory = memory;
                 });
@@ -209,6 +212,9 @@ fn arbitrary_times_have_the_same_bits() {
         let engines = vulkan_engines(|options| {
             options.memory = memory;
             options.transfer = transfer;
+            if transfer == Transfer::Staged {
+                stage(options, 1);
+            }
         });
         for (place, vulkan) in engines.iter().enumerate() {
             for (round, (method, expected)) in METHODS.into_iter().zip(&expected).enumerate() {
@@ -908,7 +914,7 @@ fn few_times_of_each_track_have_the_bits_of_many() {
     give_key_data(&mut set, 84);
     // In one window and group, and in many: of these some hold all of each of their tracks.
     let small = |options: &mut EngineOptions| options.memory = Some(300_000);
-    let staged = |options: &mut EngineOptions| options.transfer = Transfer::Staged;
+    let staged = |options: &mut EngineOptions| stage(options, 2);
     let mut engines = vulkan_engines(|_| {});
     engines.push(cpu());
     let mut others = vulkan_engines(small);
@@ -971,7 +977,7 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
     for change in [
         |_: &mut EngineOptions| {},
         |options: &mut EngineOptions| options.memory = Some(300_000),
-        |options: &mut EngineOptions| options.transfer = Transfer::Staged,
+        |options: &mut EngineOptions| stage(options, 0),
     ] {
         engines.extend(vulkan_engines(change));
     }

@@ -10,7 +10,7 @@ use crate::layer::Layer;
 /// test with a layer of its own (`vulkan::the_validation_layer_has_nothing_to_say`).
 #[test]
 fn no_layer_has_anything_to_say_of_the_library() {
-    let mut tests = vec!["crowd::own_device::", "poses::"];
+    let mut tests = vec!["crowd::own_device::", "poses::", "every_way_of_copying"];
     if std::env::var_os("VALIDATE_ALL").is_some() {
         tests.extend(["crowd::", "vulkan::", "encoding::", "transforms::"]);
         tests.extend(["bit_identity::", "outside::", "stream::"]);

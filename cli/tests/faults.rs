@@ -2,6 +2,7 @@
 //! place of the system's (`tests/fault_loader`), which the program knows nothing of.
 #![cfg(target_os = "linux")]
 
+mod card;
 mod library;
 mod loader;
 

@@ -149,12 +149,15 @@ impl KeyDispatch<'_, '_> {
         );
         if written.imported.is_none() {
             let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
-            own.copy_from_slice(keys);
             let signs = window.keys.signs;
             if signs.any() {
-                for (i, key) in own.iter_mut().enumerate() {
-                    key[0] |= if signs.is_turned(i) { SIGN_TURNED } else { 0 };
+                // Whole keys, in order: what is written to may be slow to read.
+                for (i, (to, &[x, y, z, w])) in own.iter_mut().zip(keys).enumerate() {
+                    let turned = if signs.is_turned(i) { SIGN_TURNED } else { 0 };
+                    *to = [x | turned, y, z, w];
                 }
+            } else {
+                own.copy_from_slice(keys);
             }
             written.keys = others;
         }

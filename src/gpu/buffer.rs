@@ -17,22 +17,46 @@ use crate::shader::PolynomialSegment;
 pub(crate) enum Residence {
     /// The host writes, the device reads.
     Upload,
-    /// The device writes, the host reads.
+    /// The same in the device's own memory. The host must write in order, and not read.
+    Direct,
+    /// Copies fill it, the host reads.
     Readback,
-    /// Only the device touches it; copies fill and empty it.
+    /// Kernels write, the host reads.
+    InPlace,
+    /// Only the device touches it; copies fill it.
     Device,
+    /// Kernels write, and copies read, maybe on another queue.
+    Results,
 }
 
 impl Residence {
-    fn properties(self) -> (vk::MemoryPropertyFlags, vk::MemoryPropertyFlags) {
+    /// What its memory must have, and what it should have besides, the best first.
+    fn properties(self) -> (vk::MemoryPropertyFlags, &'static [vk::MemoryPropertyFlags]) {
         use vk::MemoryPropertyFlags as Flags;
+        /// Reading memory that the host does not cache is dozens of times slower.
+        const CACHED: &[Flags] = &[Flags::HOST_CACHED];
+        /// Where memory is one, it is the device's as well.
+        const UNIFIED: &[Flags] = &[
+            Flags::from_raw(Flags::HOST_CACHED.as_raw() | Flags::DEVICE_LOCAL.as_raw()),
+            Flags::HOST_CACHED,
+        ];
         let mapped = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
         match self {
-            Self::Upload => (mapped, Flags::empty()),
-            // Reading memory that the host does not cache is dozens of times slower.
-            Self::Readback => (mapped, Flags::HOST_CACHED),
-            Self::Device => (Flags::DEVICE_LOCAL, Flags::empty()),
+            Self::Upload => (mapped, &[]),
+            Self::Direct => (mapped | Flags::DEVICE_LOCAL, &[]),
+            Self::Readback => (mapped, CACHED),
+            Self::InPlace => (mapped, UNIFIED),
+            Self::Device | Self::Results => (Flags::DEVICE_LOCAL, &[]),
         }
+    }
+
+    fn is_mapped(self) -> bool {
+        !matches!(self, Self::Device | Self::Results)
+    }
+
+    /// Whether kernels read it, as texels where they read those.
+    fn is_read_by_kernels(self) -> bool {
+        matches!(self, Self::Upload | Self::Direct | Self::Device)
     }
 }
 
@@ -97,20 +121,27 @@ impl Buffer {
         residence: Residence,
     ) -> Result<Self, VulkanError> {
         let size = size.max(LEAST).next_multiple_of(16);
-        let is_texels = device.reads_texels && residence != Residence::Readback;
-        let mut buffer = Self::without_memory(device, size, is_texels, None)?;
+        let is_texels = device.reads_texels && residence.is_read_by_kernels();
+        // Both families may use what is copied on another queue, without a change of owners.
+        let is_copied = matches!(residence, Residence::Results | Residence::Readback);
+        let families = device.two_families().filter(|_| is_copied);
+        let mut buffer = Self::without_memory(device, size, is_texels, families, None)?;
         // SAFETY: the buffer was just created.
         let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
         let (required, preferred) = residence.properties();
+        let allowed = match (residence, device.placing.direct) {
+            (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
+            _ => needs.memory_type_bits,
+        };
         let memory_type = device
             .physical
-            .memory_type(needs.memory_type_bits, required, preferred)
+            .memory_type(allowed, required, preferred)
             .ok_or(VulkanError::NoMemoryType {
                 wanted: required.as_raw(),
             })?;
         let kind = Kind {
             memory_type,
-            mapped: residence != Residence::Device,
+            mapped: residence.is_mapped(),
         };
         if let Some(share) = device.shared.take(&device.raw, kind, &needs)? {
             buffer.share = Some(share);
@@ -122,7 +153,7 @@ impl Buffer {
             .allocation_size(needs.size)
             .memory_type_index(memory_type);
         buffer.give_memory(&allocate, is_texels, name)?;
-        if residence != Residence::Device {
+        if residence.is_mapped() {
             let flags = vk::MemoryMapFlags::empty();
             // SAFETY: the memory is host-visible and not mapped yet.
             let pointer = unsafe {
@@ -159,7 +190,7 @@ impl Buffer {
             .named("vkGetMemoryHostPointerPropertiesEXT")
             .ok()?;
         let is_texels = device.reads_texels;
-        let mut buffer = Self::without_memory(device, size, is_texels, Some(LENT)).ok()?;
+        let mut buffer = Self::without_memory(device, size, is_texels, None, Some(LENT)).ok()?;
         // SAFETY: the buffer was just created.
         let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
         let (required, preferred) = Residence::Readback.properties();
@@ -180,6 +211,7 @@ impl Buffer {
         device: &Arc<LogicalDevice>,
         size: u64,
         is_texels: bool,
+        families: Option<[u32; 2]>,
         external: Option<vk::ExternalMemoryHandleTypeFlags>,
     ) -> Result<Self, VulkanError> {
         let mut kinds = vk::ExternalMemoryBufferCreateInfo::default()
@@ -187,6 +219,11 @@ impl Buffer {
         let mut info = vk::BufferCreateInfo::default()
             .size(size)
             .usage(usage(is_texels));
+        if let Some(families) = &families {
+            info = info
+                .sharing_mode(vk::SharingMode::CONCURRENT)
+                .queue_family_indices(families);
+        }
         if external.is_some() {
             info = info.push_next(&mut kinds);
         }
@@ -247,6 +284,11 @@ impl Buffer {
     /// Size in bytes.
     pub(crate) fn size(&self) -> u64 {
         self.size
+    }
+
+    /// Whether the host sees its bytes.
+    pub(crate) fn is_mapped(&self) -> bool {
+        self.mapped.is_some()
     }
 
     /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.

@@ -1,4 +1,4 @@
-//! The logical device and its one compute queue.
+//! The logical device, the queue that computes, and the one that copies results where there is one.
 
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,9 +10,36 @@ use ash::{ext, khr, vk};
 use crate::gpu::buffer::may_be_imported;
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::options::Reads;
+use crate::gpu::handles::VulkanQueue;
+use crate::gpu::memory_types::Placing;
+use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::queues::{Copies, QueuePlace};
 use crate::gpu::shared_memory::SharedMemory;
+
+/// What a submission is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// Kernels, and whatever goes with them.
+    Kernels,
+    /// Copies of results to the host.
+    Copies,
+}
+
+/// A queue, which Vulkan wants to have one user at a time.
+struct Queue {
+    raw: Mutex<vk::Queue>,
+    family: u32,
+}
+
+impl Queue {
+    fn new(raw: vk::Queue, family: u32) -> Self {
+        Self {
+            raw: Mutex::new(raw),
+            family,
+        }
+    }
+}
 
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(crate) struct LogicalDevice {
@@ -20,7 +47,12 @@ pub(crate) struct LogicalDevice {
     pub(crate) physical: PhysicalDevice,
     /// Whether its kernels read texel buffers.
     pub(crate) reads_texels: bool,
-    queue: Mutex<vk::Queue>,
+    /// Where what the host writes for kernels goes.
+    pub(crate) placing: Placing,
+    queue: Queue,
+    copies: Copies,
+    /// The queue of [`Lane::Copies`], where that is another one.
+    copy_queue: Option<Queue>,
     names: Option<ext::debug_utils::Device>,
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
@@ -32,11 +64,23 @@ pub(crate) struct LogicalDevice {
 }
 
 impl LogicalDevice {
-    pub(crate) fn new(physical: PhysicalDevice, reads: Reads) -> Result<Arc<Self>, VulkanError> {
-        let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(physical.queue_family)
-            .queue_priorities(&priorities)];
+    pub(crate) fn new(
+        physical: PhysicalDevice,
+        options: &EngineOptions,
+    ) -> Result<Arc<Self>, VulkanError> {
+        let copies = physical.copies(options);
+        let own = physical.queue_family;
+        let priorities = [1.0; 2];
+        let of_family = |family, count| {
+            vk::DeviceQueueCreateInfo::default()
+                .queue_family_index(family)
+                .queue_priorities(&priorities[..count])
+        };
+        let queues = match copies {
+            Copies::Together | Copies::Apart => vec![of_family(own, 1)],
+            Copies::Beside(place) if place.family == own => vec![of_family(own, 2)],
+            Copies::Beside(place) => vec![of_family(own, 1), of_family(place.family, 1)],
+        };
         let controls = physical.float_controls_extension;
         let mut extensions: Vec<_> = controls
             .then_some(khr::shader_float_controls::NAME.as_ptr())
@@ -44,43 +88,74 @@ impl LogicalDevice {
             .collect();
         // Memory is imported on software devices only. They work in threads of this process: a
         // wait for them ends, and afterwards none of them touches memory that its owner may free.
-        let reads_texels = physical.reads_texels(reads);
+        let reads_texels = physical.reads_texels(options.reads);
         let borrows = physical.info.kind == DeviceKind::Cpu
             && physical.lent_alignment.is_some()
             && may_be_imported(&physical, reads_texels);
         if borrows {
             extensions.push(ext::external_memory_host::NAME.as_ptr());
         }
+        let has_timelines = copies != Copies::Together;
+        if has_timelines && physical.timelines_extension {
+            extensions.push(khr::timeline_semaphore::NAME.as_ptr());
+        }
         let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads_texels);
-        let info = vk::DeviceCreateInfo::default()
+        let mut timelines =
+            vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
+        let mut info = vk::DeviceCreateInfo::default()
             .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
+        if has_timelines {
+            info = info.push_next(&mut timelines);
+        }
         let instance = &physical.instance.raw;
-        // SAFETY: the physical device belongs to the instance and has this family.
+        // SAFETY: the physical device belongs to the instance and has these families.
         let raw =
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
-        // SAFETY: one queue of this family was just created.
-        let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
+        let queue = |QueuePlace { family, index }| {
+            // SAFETY: this queue was just created.
+            Queue::new(unsafe { raw.get_device_queue(family, index) }, family)
+        };
+        let first = queue(QueuePlace {
+            family: own,
+            index: 0,
+        });
+        let beside = match copies {
+            Copies::Together | Copies::Apart => None,
+            Copies::Beside(place) => Some(queue(place)),
+        };
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
-        Ok(Self::wrap(physical, raw, queue, reads, borrows, true))
+        let queues = (first, copies, beside);
+        Ok(Self::wrap(physical, raw, queues, options, borrows, true))
     }
 
-    /// An application's device; it stays the application's to destroy.
+    /// An application's device; it stays the application's to destroy. Results are copied by
+    /// `copy_queue` where it names one.
     pub(crate) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
-        reads: Reads,
+        copy_queue: Option<VulkanQueue>,
+        options: &EngineOptions,
     ) -> Arc<Self> {
-        Self::wrap(physical, raw, queue, reads, None, false)
+        let stay = physical.in_place(options.transfer) || options.read_back == ReadBack::SameQueue;
+        let named = copy_queue.filter(|_| !stay);
+        let copies = named.map_or(Copies::Together, |named| {
+            let (family, index) = (named.family, 0);
+            Copies::Beside(QueuePlace { family, index })
+        });
+        let beside = named.map(|named| Queue::new(named.queue, named.family));
+        let queue = Queue::new(queue, physical.queue_family);
+        let queues = (queue, copies, beside);
+        Self::wrap(physical, raw, queues, options, None, false)
     }
 
     fn wrap(
         physical: PhysicalDevice,
         raw: ash::Device,
-        queue: vk::Queue,
-        reads: Reads,
+        (queue, copies, copy_queue): (Queue, Copies, Option<Queue>),
+        options: &EngineOptions,
         borrows: Option<ext::external_memory_host::Device>,
         owned: bool,
     ) -> Arc<Self> {
@@ -88,23 +163,54 @@ impl LogicalDevice {
         let names = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
-        let (queue, hung) = (Mutex::new(queue), AtomicBool::new(false));
         Arc::new(Self {
             raw,
-            reads_texels: physical.reads_texels(reads),
+            reads_texels: physical.reads_texels(options.reads),
+            placing: physical.placing(options),
             physical,
             queue,
+            copies,
+            copy_queue,
             names,
             borrows,
             owned,
             shared: SharedMemory::default(),
-            hung,
+            hung: AtomicBool::new(false),
         })
     }
 
-    /// The queue; Vulkan wants one user at a time.
-    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
-        lock(&self.queue)
+    /// The queue of a lane, for one user at a time.
+    pub(crate) fn queue(&self, lane: Lane) -> MutexGuard<'_, vk::Queue> {
+        lock(&self.queue_of(lane).raw)
+    }
+
+    /// The family of a lane's queue.
+    pub(crate) fn family(&self, lane: Lane) -> u32 {
+        self.queue_of(lane).family
+    }
+
+    fn queue_of(&self, lane: Lane) -> &Queue {
+        match (lane, &self.copy_queue) {
+            (Lane::Copies, Some(own)) => own,
+            _ => &self.queue,
+        }
+    }
+
+    /// Whether staged results are copied in submissions of their own.
+    pub(crate) fn copies_apart(&self) -> bool {
+        self.copies != Copies::Together
+    }
+
+    /// The families that use staged results, where they are two.
+    pub(crate) fn two_families(&self) -> Option<[u32; 2]> {
+        let families = [Lane::Kernels, Lane::Copies].map(|lane| self.family(lane));
+        (families[0] != families[1]).then_some(families)
+    }
+
+    /// Nobody else uses any queue meanwhile.
+    fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
+        let own = lock(&self.queue.raw);
+        (own, self.copy_queue.as_ref().map(|other| lock(&other.raw)))
     }
 
     /// Gives an object the name that validation and debuggers show.
@@ -130,8 +236,8 @@ impl LogicalDevice {
 
     /// Waits until the device is idle. If the wait fails, the device counts as hung.
     pub(crate) fn wait_until_idle(&self) {
-        let _queue = self.queue();
-        // SAFETY: the device is alive, and its queue is locked.
+        let _queues = self.all_queues();
+        // SAFETY: the device is alive, and its queues are locked.
         match unsafe { self.raw.device_wait_idle() } {
             Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST) => {}
             Err(_) => self.mark_hung(),
@@ -140,7 +246,7 @@ impl LogicalDevice {
 
     /// Waits until the device is idle, and again if the wait fails for lack of memory.
     pub(crate) fn wait_in_any_case(&self) {
-        let _queue = self.queue();
+        let _queues = self.all_queues();
         // SAFETY: as in `wait_until_idle`.
         while let Err(error) = unsafe { self.raw.device_wait_idle() }
             && error != vk::Result::ERROR_DEVICE_LOST

@@ -4,16 +4,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::device::LogicalDevice;
+use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeysInFlight;
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{External, InFlight, Target};
+use crate::gpu::in_flight::{External, InFlight, Target, copy};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
+use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
-use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
+use crate::gpu::upload::writable;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -30,7 +32,10 @@ const WINDOW: u64 = 1 << 21;
 const SMALLEST_WINDOW: usize = 1 << 16;
 
 /// Windows in flight: the host fills one while the device works on another.
-pub(crate) const IN_FLIGHT: usize = 2;
+const IN_FLIGHT: usize = 2;
+
+/// The same where a second queue copies: one is filled, one evaluated, and one on its way back.
+const IN_FLIGHT_WITH_COPIES: usize = 3;
 
 /// A Vulkan device with its kernels.
 pub(crate) struct VulkanEngine {
@@ -39,6 +44,8 @@ pub(crate) struct VulkanEngine {
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
     pub(crate) in_flight: Mutex<Vec<InFlight>>,
     pub(crate) keys_in_flight: Mutex<Vec<KeysInFlight>>,
+    /// Windows in flight at once.
+    pub(crate) in_flight_count: usize,
     /// Whether kernels write into memory that the host reads; else results are copied out of the
     /// device's own memory.
     pub(crate) in_place: bool,
@@ -108,7 +115,7 @@ impl VulkanEngine {
         physical: PhysicalDevice,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
-        let device = LogicalDevice::new(physical, options.reads)?;
+        let device = LogicalDevice::new(physical, options)?;
         Self::with_device(device, options)
     }
 
@@ -117,12 +124,9 @@ impl VulkanEngine {
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
         let info = &device.physical.info;
-        let in_place = match options.transfer {
-            Transfer::Automatic => {
-                matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu)
-            }
-            Transfer::InPlace => true,
-            Transfer::Staged => false,
+        let in_flight_count = match device.copies_apart() {
+            true => IN_FLIGHT_WITH_COPIES,
+            false => IN_FLIGHT,
         };
         let largest = info
             .max_storage_buffer_range
@@ -132,7 +136,7 @@ impl VulkanEngine {
         let mut group_bytes = largest;
         if let Some(budget) = options.memory {
             let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
-            window = window.min(budget / 2 / IN_FLIGHT as u64 / each);
+            window = window.min(budget / 2 / in_flight_count as u64 / each);
             group_bytes = group_bytes.min(budget / 2);
         }
         // Windows start at aligned offsets where their length allows.
@@ -141,7 +145,8 @@ impl VulkanEngine {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
             in_flight: Mutex::default(),
             keys_in_flight: Mutex::default(),
-            in_place,
+            in_flight_count,
+            in_place: device.placing.in_place,
             maps_samples: device.physical.maps_samples(options.mapping),
             lends: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
@@ -262,17 +267,18 @@ impl VulkanEngine {
         spare: &mut Vec<Buffer>,
     ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
-        let fits = |buffer: &Buffer| self.in_place && buffer.size() >= size;
-        let mut upload = match spare.iter().position(fits) {
-            Some(place) => spare.swap_remove(place),
-            None => Buffer::new(&self.device, name, size, Residence::Upload)?,
+        // Of spare ones the host writes those that kernels have read in place.
+        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size() >= size;
+        let (mut upload, is_staged) = match spare.iter().position(fits) {
+            Some(place) => (spare.swap_remove(place), false),
+            None => writable(&self.device, name, size, KernelReads::Often)?,
         };
-        upload.bytes_mut(0..bytes.len()).copy_from_slice(bytes);
-        if self.in_place {
+        copy(upload.bytes_mut(0..bytes.len()), bytes);
+        if !is_staged {
             return Ok(upload);
         }
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
-        let mut submission = Submission::new(&self.device)?;
+        let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(0)?;
         submission.copy(&upload, &resident, 0, upload.size());
         submission.barrier(Access::Copy, Access::Kernel);
@@ -347,6 +353,6 @@ impl VulkanEngine {
             return Ok(free.swap_remove(i));
         }
         drop(free);
-        Buffer::new(&self.device, "tumble rotations", bytes, Residence::Readback)
+        Buffer::new(&self.device, "tumble rotations", bytes, Residence::InPlace)
     }
 }

@@ -11,24 +11,26 @@ use glam::Quat;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::{KeyDispatch, KeyJob};
 use crate::from_keys::upload::Keys;
-use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{IN_FLIGHT, VulkanEngine, lock};
+use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::engine::{VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{Flight, Stopwatch, Target, copy, grow};
+use crate::gpu::in_flight::{Flight, Stopwatch, Target, copy};
+use crate::gpu::memory_types::KernelReads;
 use crate::gpu::pipeline::Pipeline;
+use crate::gpu::read_back::ReadBack;
 use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::upload::Upload;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
 
-/// What one dispatch in flight needs. The submission is the first field: dropped first, it waits for
-/// its work to end before the buffers are freed.
+/// What one dispatch in flight needs. The submissions are the first fields: dropped first, they wait
+/// for their work to end before the buffers are freed.
 pub(crate) struct KeysInFlight {
     submission: Submission,
-    keys: Option<Buffer>,
-    samples: Option<Buffer>,
-    rotations: Option<Buffer>,
-    weights: Option<Buffer>,
+    results: ReadBack,
+    keys: Upload,
+    samples: Upload,
+    weights: Upload,
     /// The bytes of the result that the dispatch in flight makes.
     output: Range<usize>,
     /// Whether the pipeline had run before: the first run of one may compile it.
@@ -50,7 +52,7 @@ impl VulkanEngine {
         output: &mut [[f32; 4]],
     ) -> Result<(), EvaluateError> {
         let mut in_flight = lock(&self.keys_in_flight);
-        while in_flight.len() < IN_FLIGHT {
+        while in_flight.len() < self.in_flight_count {
             in_flight.push(KeysInFlight::new(&self.device)?);
         }
         let each = size_of::<Quat>();
@@ -113,7 +115,7 @@ impl VulkanEngine {
             let Some(dispatch) = dispatches.next(self.window())? else {
                 return Ok(());
             };
-            *next = (*next + 1) % IN_FLIGHT;
+            *next = (*next + 1) % in_flight.len();
             let evaluation = &mut in_flight[*next];
             evaluation.finish(&mut imported.target, stopwatch)?;
             let writing = Instant::now();
@@ -128,11 +130,11 @@ impl VulkanEngine {
 impl KeysInFlight {
     fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         Ok(Self {
-            submission: Submission::new(device)?,
-            keys: None,
-            samples: None,
-            rotations: None,
-            weights: None,
+            submission: Submission::new(device, Lane::Kernels)?,
+            results: ReadBack::default(),
+            keys: Upload::new("tumble keys", KernelReads::Once),
+            samples: Upload::new("tumble samples", KernelReads::Once),
+            weights: Upload::new("tumble weights", KernelReads::Once),
             output: 0..0,
             compiled: false,
         })
@@ -148,45 +150,51 @@ impl KeysInFlight {
         output: Range<usize>,
     ) -> Result<(), EvaluateError> {
         let (device, maps_samples) = (&engine.device, engine.maps_samples);
-        let [key_bytes, sample_bytes, mut rotation_bytes, weight_bytes] = dispatch.bytes();
+        let [key_bytes, sample_bytes, rotation_bytes, weight_bytes] = dispatch.bytes();
         let place = match &imported.target {
             Target::ImportedMemory(memory) if !output.is_empty() => {
-                rotation_bytes = 0;
                 let start = memory.start() + output.start;
                 let size = output.len() as u64;
                 Some(Binding::range(memory.raw(), start as u64, size))
             }
             _ => None,
         };
-        let upload = Residence::Upload;
-        let samples = grow(device, &mut self.samples, sample_bytes as u64, upload)?;
-        let weights = grow(device, &mut self.weights, weight_bytes as u64, upload)?;
-        let own = &mut self.rotations;
-        let rotations = grow(device, own, rotation_bytes as u64, Residence::Readback)?;
+        // One queue alone gains nothing by a copy: kernels then write where the host reads.
+        let staged = !engine.in_place && device.copies_apart();
+        let output_binding = match place {
+            Some(place) => place,
+            None => {
+                let size = rotation_bytes as u64;
+                Binding::whole(self.results.room(device, size, staged)?)
+            }
+        };
+        let samples = self.samples.room(device, sample_bytes)?;
+        let weights = self.weights.room(device, weight_bytes)?;
         let mut write = |keys: Keys<'_>| {
             dispatch.write(
                 keys,
-                bytemuck::cast_slice_mut(samples.bytes_mut(0..sample_bytes)),
-                bytemuck::cast_slice_mut(weights.bytes_mut(0..weight_bytes)),
+                bytemuck::cast_slice_mut(samples),
+                bytemuck::cast_slice_mut(weights),
             )
         };
-        let keys = match &imported.keys {
-            Some(keys) if dispatch.keys_are_as_given() => {
-                write(Keys::ImportedMemory(keys.start() / size_of::<Quat>()))?;
-                keys.binding()
+        let as_given = imported.keys.as_ref();
+        let as_given = as_given.filter(|_| dispatch.keys_are_as_given());
+        match as_given {
+            Some(keys) => write(Keys::ImportedMemory(keys.start() / size_of::<Quat>()))?,
+            None => {
+                let copied = self.keys.room(device, key_bytes)?;
+                write(Keys::Copied(bytemuck::cast_slice_mut(copied)))?;
             }
-            _ => {
-                let keys = grow(device, &mut self.keys, key_bytes as u64, upload)?;
-                let copied = bytemuck::cast_slice_mut(keys.bytes_mut(0..key_bytes));
-                write(Keys::Copied(copied))?;
-                Binding::whole(keys)
-            }
-        };
-        let mut bindings = vec![keys, Binding::whole(samples)];
-        if weight_bytes > 0 {
-            bindings.push(Binding::whole(weights));
         }
-        bindings.push(place.unwrap_or_else(|| Binding::whole(rotations)));
+        let mut uploads = vec![&self.samples];
+        uploads.extend((weight_bytes > 0).then_some(&self.weights));
+        let mut bindings = Vec::new();
+        match as_given {
+            Some(keys) => bindings.push(keys.binding()),
+            None => uploads.insert(0, &self.keys),
+        }
+        bindings.extend(uploads.iter().filter_map(|upload| upload.binding()));
+        bindings.push(output_binding);
         let rows = dispatch.rows(maps_samples);
         let groups = [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
@@ -195,10 +203,19 @@ impl KeysInFlight {
         ];
         self.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         self.submission.begin(1)?;
+        Upload::record(uploads.into_iter(), &mut self.submission);
         self.submission
             .dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
-        self.submission.barrier(Access::Kernel, Access::Host);
-        self.submission.submit()?;
+        match place {
+            Some(_) => {
+                self.submission.barrier(Access::Kernel, Access::Host);
+                self.submission.submit()?;
+            }
+            None => {
+                let size = rotation_bytes as u64;
+                self.results.submit(&mut self.submission, size)?;
+            }
+        }
         self.output = output;
         Ok(())
     }
@@ -210,13 +227,13 @@ impl Flight for KeysInFlight {
         target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
-        if let Some(spent) = self.submission.wait()? {
+        if let Some(spent) = self.results.wait(&mut self.submission)? {
             stopwatch.ran(spent, self.compiled);
         }
         let copying = Instant::now();
         let own = std::mem::take(&mut self.output);
-        if let (Target::Slice(output), Some(rotations)) = (target, &self.rotations) {
-            copy(&mut output[own.clone()], rotations.bytes(0..own.len()));
+        if let Target::Slice(output) = target {
+            copy(&mut output[own.clone()], self.results.bytes(0..own.len()));
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())

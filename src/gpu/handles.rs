@@ -35,6 +35,19 @@ pub struct VulkanHandles {
     pub queue: vk::Queue,
     /// That queue's family.
     pub queue_family: u32,
+    /// Another queue, on which results that are staged are copied to the host while the first one
+    /// computes ([`ReadBack`](crate::gpu::options::ReadBack)). Without one, only `queue` is used. The
+    /// device must have the feature `timelineSemaphore` enabled then.
+    pub copy_queue: Option<VulkanQueue>,
+}
+
+/// A queue of an application's own device.
+#[derive(Debug, Clone, Copy)]
+pub struct VulkanQueue {
+    /// The queue.
+    pub queue: vk::Queue,
+    /// Its family, which can copy.
+    pub family: u32,
 }
 
 /// A range of a buffer on an application's own device.
@@ -51,7 +64,7 @@ pub struct VulkanBuffer {
 impl VulkanEngine {
     /// # Safety
     /// The handles must be valid and belong together, must outlive the engine and
-    /// all of its clips and results, and nobody else may use the queue while the
+    /// all of its clips and results, and nobody else may use the queues while the
     /// engine does.
     pub(crate) unsafe fn from_handles(
         handles: VulkanHandles,
@@ -66,8 +79,13 @@ impl VulkanEngine {
             physical.float_controls = FloatControls::default();
         }
         physical.has_int64 &= handles.shader_int64;
-        let device =
-            LogicalDevice::borrowed(physical, handles.device, handles.queue, options.reads);
+        let device = LogicalDevice::borrowed(
+            physical,
+            handles.device,
+            handles.queue,
+            handles.copy_queue,
+            options,
+        );
         Self::with_device(device, options)
     }
 }

@@ -3,6 +3,8 @@
 #![allow(unsafe_code)]
 
 pub(crate) mod buffer;
+#[cfg(test)]
+pub(crate) mod cards;
 pub(crate) mod crowd;
 pub(crate) mod crowd_reader;
 pub(crate) mod crowd_target;
@@ -16,14 +18,19 @@ pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
 pub(crate) mod mapped;
+pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
 pub(crate) mod pose_pass;
+pub(crate) mod queues;
+pub(crate) mod read_back;
 pub(crate) mod recovery;
 pub(crate) mod run;
 pub(crate) mod sample_list;
 pub(crate) mod self_test;
+pub(crate) mod semaphore;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
+pub(crate) mod upload;
 pub(crate) mod work_list;

@@ -18,6 +18,37 @@ pub enum Transfer {
     Staged,
 }
 
+/// On which queue of a Vulkan device results are copied to the host, where they are copied
+/// ([`Transfer::Staged`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReadBack {
+    /// Cards that have a second queue: [`ReadBack::Overlapped`]; all others, and software devices:
+    /// [`ReadBack::SameQueue`].
+    #[default]
+    Automatic,
+    /// In the submission of the kernels, after them.
+    SameQueue,
+    /// In a submission of its own, which waits for the kernels' on a timeline semaphore: on a second
+    /// queue, so that the next kernels run beside the copy; where there is none, on the same queue.
+    /// Devices without timeline semaphores copy as by [`ReadBack::SameQueue`].
+    Overlapped,
+}
+
+/// How keys, segments and work lists come to a Vulkan device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Uploads {
+    /// Each upload by itself: as [`Uploads::Direct`] where the memory that is both the device's and
+    /// the host's is as large as the device's (resizable BAR, integrated devices), or the upload is at
+    /// most a 64th of it; else read in place or staged, as results are ([`Transfer`]).
+    #[default]
+    Automatic,
+    /// Written by the host into the device's own memory, where any of it is visible to the host and
+    /// there is room; else as by `Automatic`.
+    Direct,
+    /// Written into the host's memory, from where the device copies them.
+    Staged,
+}
+
 /// How kernels of a Vulkan device read keys, segments and work lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reads {
@@ -59,6 +90,10 @@ pub struct EngineOptions {
     pub vector_width: Option<VectorWidth>,
     /// How results come back from a Vulkan device.
     pub transfer: Transfer,
+    /// On which queue results are copied back.
+    pub read_back: ReadBack,
+    /// How a Vulkan device gets what its kernels read.
+    pub uploads: Uploads,
     /// How a Vulkan device's kernels read.
     pub reads: Reads,
     /// How a Vulkan device's invocations share the samples.
@@ -74,10 +109,11 @@ pub struct Timings {
     /// Time in which the host made work lists and recorded commands; the device may have worked on
     /// another window meanwhile.
     pub work_lists: Duration,
-    /// Time from submitting work to seeing its fence signalled; time that several windows in
+    /// Time from submitting work to seeing that it has ended, copies included; time that several windows in
     /// flight share is counted once.
     pub submit_to_fence: Duration,
-    /// Time in which the device worked, by its own clock; zero where it has none.
+    /// Time in which the queue of the kernels worked, by the device's clock; zero where it has none.
+    /// Copies on another queue run beside it and are not counted here.
     pub on_device: Duration,
     /// Time in which the host copied results into the caller's memory.
     pub read_back: Duration,

@@ -7,7 +7,9 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
-use crate::gpu::options::{Mapping, Reads};
+use crate::gpu::memory_types::{Placing, direct, is_unified};
+use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
+use crate::gpu::queues::{Copies, compute_family, copies};
 use crate::shader::spirv::FloatControls;
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
@@ -73,14 +75,17 @@ pub(crate) struct PhysicalDevice {
     pub(crate) instance: Arc<Instance>,
     pub(crate) raw: vk::PhysicalDevice,
     pub(crate) queue_family: u32,
-    /// Valid bits of a time stamp, for each queue family; 0 where there are none.
-    timestamp_bits: Vec<u32>,
+    families: Vec<vk::QueueFamilyProperties>,
     /// Nanoseconds of one tick of a time stamp.
     timestamp_period: f64,
     pub(crate) float_controls: FloatControls,
     /// The extension must be enabled: the device is older than Vulkan 1.2.
     pub(crate) float_controls_extension: bool,
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
+    /// It has timeline semaphores.
+    pub(crate) has_timelines: bool,
+    /// Their extension must be enabled: the device is older than Vulkan 1.2.
+    pub(crate) timelines_extension: bool,
     max_texel_buffer_elements: u32,
     /// Shaders may have integers of 64 bits.
     pub(crate) has_int64: bool,
@@ -118,12 +123,9 @@ impl PhysicalDevice {
         let vk_instance = &instance.raw;
         // SAFETY: `raw` was enumerated from this instance, here and below.
         let families = unsafe { vk_instance.get_physical_device_queue_family_properties(raw) };
-        let compute = families
-            .iter()
-            .position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
         // SAFETY: as above.
         let properties = unsafe { vk_instance.get_physical_device_properties(raw) };
-        let Some(queue_family) = compute else {
+        let Some(queue_family) = compute_family(&families) else {
             return Ok(None);
         };
         if properties.api_version < vk::API_VERSION_1_1 {
@@ -164,6 +166,13 @@ impl PhysicalDevice {
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
         // SAFETY: as above.
         let features = unsafe { vk_instance.get_physical_device_features(raw) };
+        let mut timelines = vk::PhysicalDeviceTimelineSemaphoreFeatures::default();
+        let reports_timelines = core_1_2 || has(khr::timeline_semaphore::NAME);
+        if reports_timelines {
+            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut timelines);
+            // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
+            unsafe { vk_instance.get_physical_device_features2(raw, &mut all) };
+        }
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
                 == vk::TRUE,
@@ -199,12 +208,14 @@ impl PhysicalDevice {
         Ok(Some(Self {
             instance: Arc::clone(instance),
             raw,
-            queue_family: queue_family as u32,
-            timestamp_bits: families.iter().map(|f| f.timestamp_valid_bits).collect(),
+            queue_family,
+            families,
             timestamp_period: f64::from(limits.timestamp_period),
             float_controls,
             float_controls_extension: reports_controls && !core_1_2,
             memory,
+            has_timelines: timelines.timeline_semaphore == vk::TRUE,
+            timelines_extension: reports_timelines && !core_1_2,
             has_int64: features.shader_int64 == vk::TRUE,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             lent_alignment: borrows.then_some(imported.min_imported_host_pointer_alignment),
@@ -235,25 +246,67 @@ impl PhysicalDevice {
         }
     }
 
+    /// Whether results stay where kernels write them, in memory that the host reads; else they are
+    /// copied out of the device's own memory.
+    pub(crate) fn in_place(&self, transfer: Transfer) -> bool {
+        match (transfer, self.info.kind) {
+            (Transfer::InPlace, _)
+            | (Transfer::Automatic, DeviceKind::Integrated | DeviceKind::Cpu) => true,
+            (Transfer::Staged, _) | (Transfer::Automatic, DeviceKind::Discrete) => false,
+            (Transfer::Automatic, DeviceKind::Virtual | DeviceKind::Other) => {
+                is_unified(&self.memory)
+            }
+        }
+    }
+
+    /// How staged results are copied.
+    pub(crate) fn copies(&self, options: &EngineOptions) -> Copies {
+        if self.in_place(options.transfer) || !self.has_timelines {
+            return Copies::Together;
+        }
+        let is_software = matches!(self.info.kind, DeviceKind::Cpu | DeviceKind::Other);
+        copies(
+            &self.families,
+            self.queue_family,
+            options.read_back,
+            is_software,
+        )
+    }
+
+    /// The rule by which uploads are placed.
+    pub(crate) fn placing(&self, options: &EngineOptions) -> Placing {
+        Placing {
+            uploads: options.uploads,
+            in_place: self.in_place(options.transfer),
+            direct: direct(&self.memory),
+        }
+    }
+
+    /// Valid bits of a time stamp of its queue; 0 where there are none.
+    fn timestamp_bits(&self) -> u32 {
+        let family = self.families.get(self.queue_family as usize);
+        family.map_or(0, |own| own.timestamp_valid_bits)
+    }
+
     /// Whether its queue can take time stamps.
     pub(crate) fn has_timestamps(&self) -> bool {
-        self.timestamp_bits[self.queue_family as usize] > 0
+        self.timestamp_bits() > 0
     }
 
     /// The time between two stamps.
     pub(crate) fn between(&self, start: u64, end: u64) -> Duration {
-        let bits = self.timestamp_bits[self.queue_family as usize];
+        let bits = self.timestamp_bits();
         let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.clamp(1, 64)));
         Duration::from_nanos((ticks as f64 * self.timestamp_period) as u64)
     }
 
-    /// The first memory type allowed by `allowed` with all of `required`; one that
-    /// also has `preferred`, where there is one.
+    /// The first memory type allowed by `allowed` with all of `required`; one that also has the first
+    /// of `preferred`, where there is one, else the next.
     pub(crate) fn memory_type(
         &self,
         allowed: u32,
         required: vk::MemoryPropertyFlags,
-        preferred: vk::MemoryPropertyFlags,
+        preferred: &[vk::MemoryPropertyFlags],
     ) -> Option<u32> {
         let types = self.memory.memory_types_as_slice();
         let find = |wanted| {
@@ -261,7 +314,8 @@ impl PhysicalDevice {
                 allowed & (1 << i) != 0 && types[i as usize].property_flags.contains(wanted)
             })
         };
-        find(required | preferred).or_else(|| find(required))
+        let mut preferred = preferred.iter().map(|flags| find(required | *flags));
+        preferred.find_map(|found| found).or_else(|| find(required))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
 
 use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::upload::Upload;
 use crate::shader::{CrowdDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -8,8 +9,9 @@ use std::sync::atomic::AtomicBool;
 use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::device::LogicalDevice;
+use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::memory_types::KernelReads;
 
 /// Bytes that come with a dispatch, at most; Vulkan allows at least 128.
 const PUSHED: u32 = {
@@ -108,24 +110,27 @@ impl Pipeline {
         groups: [u32; 3],
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
-        let new = |bytes: usize, residence| {
-            Buffer::new(&self.device, "tumble once", bytes as u64, residence)
-        };
-        let mut buffers = Vec::with_capacity(inputs.len() + 1);
+        let mut uploads = Vec::with_capacity(inputs.len());
         for input in inputs {
-            let mut buffer = new(input.len(), Residence::Upload)?;
-            buffer.bytes_mut(0..input.len()).copy_from_slice(input);
-            buffers.push(buffer);
+            let mut upload = Upload::new("tumble once", KernelReads::Once);
+            upload
+                .room(&self.device, input.len())?
+                .copy_from_slice(input);
+            uploads.push(upload);
         }
-        buffers.push(new(output.len(), Residence::Readback)?);
-        let bindings: Vec<Binding> = buffers.iter().map(Binding::whole).collect();
-        let mut submission = Submission::new(&self.device)?;
+        let bytes = output.len() as u64;
+        let found = Buffer::new(&self.device, "tumble once", bytes, Residence::InPlace)?;
+        let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
+        bindings.push(Binding::whole(&found));
+        // Made last: dropped first, it waits for its work before the buffers are freed.
+        let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(1)?;
+        Upload::record(uploads.iter(), &mut submission);
         submission.dispatch(self, &bindings, constants, groups)?;
         submission.barrier(Access::Kernel, Access::Host);
         submission.submit()?;
         submission.wait()?;
-        output.copy_from_slice(buffers[inputs.len()].bytes(0..output.len()));
+        output.copy_from_slice(found.bytes(0..output.len()));
         Ok(())
     }
 

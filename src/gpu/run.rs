@@ -1,15 +1,15 @@
 //! The walk over a result's windows. Two are in flight: the host lists the work of one while the
-//! device evaluates the other.
+//! device evaluates the other; three where a second queue brings back the one before.
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::engine::{IN_FLIGHT, Job, VulkanEngine, lock};
+use crate::gpu::engine::{Job, VulkanEngine, lock};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::{Finish, Flight as _, InFlight, Stopwatch, Target, grow};
+use crate::gpu::in_flight::{Finish, Flight as _, InFlight, Stopwatch, Target};
 use crate::gpu::submission::{Access, Binding};
+use crate::gpu::upload::Upload;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::shader::{Dispatch, Kernel, LINE, List, WORKGROUP};
@@ -40,7 +40,7 @@ impl VulkanEngine {
         let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
         let most = || (self.window() / each).max(1);
         let mut windows: VecDeque<Window> = window.cut(most()).collect();
-        while in_flight.len() < IN_FLIGHT.min(windows.len()) {
+        while in_flight.len() < self.in_flight_count.min(windows.len()) {
             in_flight.push(InFlight::new(&self.device)?);
         }
         let mut next = 0;
@@ -100,56 +100,25 @@ impl VulkanEngine {
         let samples = self.maps_samples;
         let work = evaluation.list(&self.device, clip, timeline, &window, shift, samples)?;
 
-        let room = |kept: &mut Option<Buffer>, size: u64, residence| {
-            grow(&self.device, kept, size, residence).map(|_| ())
-        };
         let is_grid = matches!(work.list, List::FramesCoalesced | List::TimesCoalesced);
         let is_timed = matches!(work.list, List::Times | List::TimesCoalesced);
-        if !self.in_place {
-            let device = Residence::Device;
-            room(
-                &mut evaluation.device_items,
-                evaluation.items.size(),
-                device,
-            )?;
-            let distances = evaluation.distances.size();
-            room(&mut evaluation.device_distances, distances, device)?;
-            if let Some(blocks) = evaluation.blocks.as_ref().filter(|_| is_grid) {
-                room(&mut evaluation.device_blocks, blocks.size(), device)?;
+        let (buffer, first) = match target {
+            Target::Buffer(buffer) => (buffer.raw, aligned),
+            Target::ImportedMemory(memory) => (memory.raw(), aligned),
+            Target::External(buffer) => (buffer.raw, aligned),
+            Target::Slice(_) => {
+                let results = &mut evaluation.results;
+                let own = results.room(&self.device, size, !self.in_place)?;
+                (own.raw, 0)
             }
-        }
-        if matches!(target, Target::Slice(_)) {
-            let residence = if self.in_place {
-                Residence::Readback
-            } else {
-                Residence::Device
-            };
-            room(&mut evaluation.rotations, size, residence)?;
-            if !self.in_place {
-                room(&mut evaluation.readback, size, Residence::Readback)?;
-            }
-        }
+        };
+        let rotations = Binding::range(buffer, first, size);
         evaluation.submission.begin(work.groups.len() as u32)?;
         let mut listed = vec![&evaluation.items];
-        listed.extend(evaluation.blocks.as_ref().filter(|_| is_grid));
+        listed.extend(is_grid.then_some(&evaluation.blocks));
         listed.extend(is_timed.then_some(&evaluation.distances));
-        if !self.in_place {
-            let mut resident: Vec<&Buffer> = evaluation.device_items.iter().collect();
-            resident.extend(evaluation.device_blocks.as_ref().filter(|_| is_grid));
-            resident.extend(evaluation.device_distances.as_ref().filter(|_| is_timed));
-            for (from, to) in listed.iter().zip(&resident) {
-                evaluation.submission.copy(from, to, 0, from.size());
-            }
-            evaluation.submission.barrier(Access::Copy, Access::Kernel);
-            listed = resident;
-        }
-        let rotations = match (target, &evaluation.rotations) {
-            (Target::Buffer(buffer), _) => Binding::range(buffer.raw, aligned, size),
-            (Target::ImportedMemory(memory), _) => Binding::range(memory.raw(), aligned, size),
-            (Target::External(buffer), _) => Binding::range(buffer.raw, aligned, size),
-            (Target::Slice(_), Some(buffer)) => Binding::range(buffer.raw, 0, size),
-            (Target::Slice(_), None) => unreachable!("grown above"),
-        };
+        Upload::record(listed.iter().copied(), &mut evaluation.submission);
+        let listed: Vec<Binding> = listed.into_iter().filter_map(Upload::binding).collect();
         let form = clip.interpolation.form();
         let pipeline =
             self.pipeline(Kernel::over_segments(form, work.list, encoding.row().store))?;
@@ -165,7 +134,7 @@ impl VulkanEngine {
                 Binding::whole(&group.segments),
                 Binding::whole(&group.constants),
             ];
-            bindings.extend(listed.iter().map(|buffer| Binding::whole(buffer)));
+            bindings.extend(&listed);
             bindings.push(rotations);
             let detail = encoding.row().detail;
             let (grid, dispatch);
@@ -199,13 +168,12 @@ impl VulkanEngine {
             first_item += item_count;
         }
         let mut patches = work.patches;
-        match (target, &evaluation.rotations, &evaluation.readback) {
-            (Target::Slice(_), Some(rotations), Some(readback)) => {
-                evaluation.submission.barrier(Access::Kernel, Access::Copy);
-                evaluation.submission.copy(rotations, readback, 0, size);
-                evaluation.submission.barrier(Access::Copy, Access::Host);
+        match target {
+            Target::Slice(_) => {
+                let results = &mut evaluation.results;
+                results.submit(&mut evaluation.submission, size)?;
             }
-            (Target::External(buffer), ..) => {
+            Target::External(buffer) => {
                 evaluation.submission.barrier(Access::Kernel, Access::Copy);
                 let mut bytes = vec![0; encoding.bytes()];
                 for (place, value) in patches.drain(..) {
@@ -215,10 +183,13 @@ impl VulkanEngine {
                 }
                 evaluation.submission.barrier(Access::Kernel, Access::Any);
                 evaluation.submission.barrier(Access::Copy, Access::Any);
+                evaluation.submission.submit()?;
             }
-            _ => evaluation.submission.barrier(Access::Kernel, Access::Host),
+            Target::Buffer(_) | Target::ImportedMemory(_) => {
+                evaluation.submission.barrier(Access::Kernel, Access::Host);
+                evaluation.submission.submit()?;
+            }
         }
-        evaluation.submission.submit()?;
         evaluation.done = Some(Finish {
             window,
             encoding,

@@ -194,7 +194,7 @@ fn probes() -> Vec<Probe> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::options::Reads;
+    use crate::gpu::options::EngineOptions;
     use crate::gpu::physical::{DeviceKind, list};
 
     /// A comparison that cannot fail proves nothing: without the decorations lavapipe folds `(a +
@@ -210,7 +210,7 @@ mod tests {
             eprintln!("NO LAVAPIPE: the negative control did not run");
             return;
         };
-        let device = LogicalDevice::new(lavapipe, Reads::Automatic).unwrap();
+        let device = LogicalDevice::new(lavapipe, &EngineOptions::default()).unwrap();
         let differing = |exactness| {
             let reports = expressions(&device, exactness).unwrap();
             reports

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::buffer::Buffer;
-use crate::gpu::device::LogicalDevice;
+use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
+use crate::gpu::semaphore::Point;
 
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
@@ -19,6 +20,7 @@ const MOST_BINDINGS: u32 = 6;
 /// Command buffer, fence and descriptor pool, used again and again.
 pub(crate) struct Submission {
     device: Arc<LogicalDevice>,
+    lane: Lane,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
@@ -26,7 +28,7 @@ pub(crate) struct Submission {
     /// Sets that the descriptor pool can hold.
     capacity: u32,
     /// Two time stamps, around all that a submission does; null where the queue
-    /// takes none.
+    /// takes none, and for copies beside kernels: time that both share must not count twice.
     stamps: vk::QueryPool,
     /// When the pending work was handed over.
     submitted: Option<Instant>,
@@ -76,9 +78,10 @@ impl Binding {
 }
 
 impl Submission {
-    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+    pub(crate) fn new(device: &Arc<LogicalDevice>, lane: Lane) -> Result<Self, VulkanError> {
         let mut submission = Self {
             device: Arc::clone(device),
+            lane,
             pool: vk::CommandPool::null(),
             commands: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
@@ -88,8 +91,7 @@ impl Submission {
             submitted: None,
         };
         let raw = &device.raw;
-        let info =
-            vk::CommandPoolCreateInfo::default().queue_family_index(device.physical.queue_family);
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.family(lane));
         // SAFETY: the device is alive, here and below; what is created is destroyed
         // in `drop`, also when a later step fails.
         submission.pool =
@@ -103,7 +105,7 @@ impl Submission {
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
-        if device.physical.has_timestamps() {
+        if lane == Lane::Kernels && device.physical.has_timestamps() {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
@@ -111,7 +113,11 @@ impl Submission {
             submission.stamps =
                 unsafe { raw.create_query_pool(&info, None) }.named("vkCreateQueryPool")?;
         }
-        device.name(submission.commands, "tumble window");
+        let name = match lane {
+            Lane::Kernels => "tumble window",
+            Lane::Copies => "tumble read back",
+        };
+        device.name(submission.commands, name);
         Ok(submission)
     }
 
@@ -280,6 +286,16 @@ impl Submission {
 
     /// Ends recording and hands the work to the queue.
     pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
+        self.submit_between(None, None)
+    }
+
+    /// As [`Submission::submit`]; copies in it wait for the point `after`, and the point `reached` is
+    /// reached when all of it has ended.
+    pub(crate) fn submit_between(
+        &mut self,
+        after: Option<Point>,
+        reached: Option<Point>,
+    ) -> Result<(), VulkanError> {
         let raw = &self.device.raw;
         if self.stamps != vk::QueryPool::null() {
             let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
@@ -289,8 +305,24 @@ impl Submission {
         // SAFETY: recording is on.
         unsafe { raw.end_command_buffer(self.commands) }.named("vkEndCommandBuffer")?;
         let commands = [self.commands];
-        let info = [vk::SubmitInfo::default().command_buffers(&commands)];
-        let queue = self.device.queue();
+        let values = |point: Option<Point>| point.map(|point| point.value);
+        let semaphores = |point: Option<Point>| point.map(|point| point.semaphore);
+        let (waits, signals) = (semaphores(after), semaphores(reached));
+        let (wait_values, signal_values) = (values(after), values(reached));
+        let mut timelines = vk::TimelineSemaphoreSubmitInfo::default()
+            .wait_semaphore_values(wait_values.as_slice())
+            .signal_semaphore_values(signal_values.as_slice());
+        let stages = [vk::PipelineStageFlags::TRANSFER];
+        let mut info = vk::SubmitInfo::default()
+            .command_buffers(&commands)
+            .wait_semaphores(waits.as_slice())
+            .wait_dst_stage_mask(&stages[..waits.as_slice().len()])
+            .signal_semaphores(signals.as_slice());
+        if after.or(reached).is_some() {
+            info = info.push_next(&mut timelines);
+        }
+        let info = [info];
+        let queue = self.device.queue(self.lane);
         // SAFETY: the fence is unsignalled and the queue is locked.
         unsafe { raw.queue_submit(*queue, &info, self.fence) }.named("vkQueueSubmit")?;
         self.submitted = Some(Instant::now());

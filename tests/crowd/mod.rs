@@ -211,6 +211,7 @@ fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(Strin
             let mut options = EngineOptions::default();
             options.transfer = transfer;
             if transfer == tumble::Transfer::Staged {
+                crate::support::stage(&mut options, instances);
                 options.memory = Some(4096); // so that windows are as short as they may be
             }
             let engine = Engine::with_options(device.clone(), &options).unwrap();

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // each test program uses some of it
 
 use ash::vk;
-use tumble::{Engine, EngineOptions, Mapping, VulkanHandles};
+use tumble::{Engine, EngineOptions, Mapping, VulkanHandles, VulkanQueue};
 
 pub(crate) struct Application {
     pub(crate) instance: ash::Instance,
@@ -11,6 +11,8 @@ pub(crate) struct Application {
     pub(crate) device: ash::Device,
     entry: ash::Entry,
     pub(crate) queue: vk::Queue,
+    /// A queue that only copies, where the device has one.
+    pub(crate) copy_queue: Option<VulkanQueue>,
     shader_int64: bool,
 }
 
@@ -23,25 +25,46 @@ impl Application {
             let info = vk::InstanceCreateInfo::default().application_info(&application);
             let instance = entry.create_instance(&info, None).unwrap();
             let physical_device = instance.enumerate_physical_devices().unwrap()[0];
-            let queues = [vk::DeviceQueueCreateInfo::default()
-                .queue_family_index(0)
-                .queue_priorities(&[1.0])];
+            let families = instance.get_physical_device_queue_family_properties(physical_device);
+            let copies = |family: &vk::QueueFamilyProperties| {
+                family.queue_flags == vk::QueueFlags::TRANSFER && family.queue_count > 0
+            };
+            let copy_family = families.iter().position(copies).map(|place| place as u32);
+            let of_family = |family| {
+                vk::DeviceQueueCreateInfo::default()
+                    .queue_family_index(family)
+                    .queue_priorities(&[1.0])
+            };
+            let mut queues = vec![of_family(0)];
+            queues.extend(copy_family.map(of_family));
             let has = instance.get_physical_device_features(physical_device);
             let features =
                 vk::PhysicalDeviceFeatures::default().shader_int64(has.shader_int64 == vk::TRUE);
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_features(&features);
+            let timeline = [ash::khr::timeline_semaphore::NAME.as_ptr()];
+            let mut timelines =
+                vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
+            let mut info = vk::DeviceCreateInfo::default();
+            if copy_family.is_some() {
+                info = info
+                    .enabled_extension_names(&timeline)
+                    .push_next(&mut timelines);
+            }
+            let info = info.queue_create_infos(&queues).enabled_features(&features);
             let device = instance
                 .create_device(physical_device, &info, None)
                 .unwrap();
             let queue = device.get_device_queue(0, 0);
+            let copy_queue = copy_family.map(|family| VulkanQueue {
+                queue: device.get_device_queue(family, 0),
+                family,
+            });
             Self {
                 instance,
                 physical_device,
                 device,
                 entry,
                 queue,
+                copy_queue,
                 shader_int64: has.shader_int64 == vk::TRUE,
             }
         }
@@ -61,6 +84,7 @@ impl Application {
             shader_int64: self.shader_int64,
             queue: self.queue,
             queue_family: 0,
+            copy_queue: self.copy_queue,
         };
         // SAFETY: the handles belong together and outlive the engine.
         unsafe { Engine::from_vulkan(handles, &options) }.unwrap()

@@ -2,7 +2,10 @@
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Device, Engine, EngineOptions, Frames, Mapping, Reads, Tcb, TrackSet};
+use tumble::{
+    Device, Engine, EngineOptions, Frames, Mapping, ReadBack, Reads, Tcb, TrackSet, Transfer,
+    Uploads,
+};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.
@@ -27,6 +30,19 @@ pub const WAYS: [(Reads, Mapping); 3] = [
     (Reads::TexelBuffers, Mapping::Runs),
     (Reads::StorageBuffers, Mapping::Samples),
 ];
+
+/// How uploads come to a device whose results are staged, and how these are copied back.
+pub const STAGED: [(Uploads, ReadBack); 3] = [
+    (Uploads::Staged, ReadBack::SameQueue),
+    (Uploads::Direct, ReadBack::Overlapped),
+    (Uploads::Staged, ReadBack::Overlapped),
+];
+
+/// Results are staged, in each turn by the next of [`STAGED`].
+pub fn stage(options: &mut EngineOptions, turn: usize) {
+    options.transfer = Transfer::Staged;
+    (options.uploads, options.read_back) = STAGED[turn % STAGED.len()];
+}
 
 /// Every Vulkan device in all of [`WAYS`].
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {

@@ -8,11 +8,14 @@
 //! * `FAULT_LOG`: a file that gets a line for every call that can fail, and for every
 //!   object that is created or destroyed, behind the number of the process.
 //! * `FAULT_DEVICES`: `none` hides every device, `no-compute` their compute queues.
+//! * `FAULT_CARD`: a card in the place of the device (`card.rs`).
 //! * `REAL_LOADER`: the path of the loader behind it.
 //!
 //! Built as an example, so that `cargo test` builds it; `tests/faults.rs` puts it where a
 //! program finds it as `libvulkan.so.1`.
 #![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, missing_docs)]
+
+mod card;
 
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
@@ -183,6 +186,7 @@ fallible! {
     vkBeginCommandBuffer(commands, info) asks;
     vkEndCommandBuffer(commands) asks;
     vkResetCommandPool(device, pool, flags) asks;
+    vkCreateSemaphore(device, info, allocator, out) creates;
     vkCreateFence(device, info, allocator, out) creates;
     vkResetFences(device, count, fences) asks;
     vkGetFenceStatus(device, fence) asks;
@@ -230,6 +234,7 @@ destroys! {
     vkDestroyBuffer of vkCreateBuffer;
     vkDestroyBufferView of vkCreateBufferView;
     vkDestroyCommandPool of vkCreateCommandPool;
+    vkDestroySemaphore of vkCreateSemaphore;
     vkDestroyFence of vkCreateFence;
     vkDestroyQueryPool of vkCreateQueryPool;
     vkDestroyDescriptorPool of vkCreateDescriptorPool;
@@ -410,6 +415,9 @@ unsafe extern "system" fn vkGetDeviceProcAddr(device: Word, name: *const c_char)
 }
 
 fn own(name: &CStr) -> Option<Pointer> {
+    if let Some(of_card) = card::own(name) {
+        return Some(of_card);
+    }
     let special = match name.to_str().unwrap_or_default() {
         "vkCreateInstance" => vkCreateInstance as *const (),
         "vkAllocateMemory" => vkAllocateMemory as *const (),

@@ -10,7 +10,7 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{
     CrowdError, CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout,
-    Skeleton, TrackSet, Transfer, VectorMethod, VulkanError, method,
+    ReadBack, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError, method,
 };
 
 /// What the program never does: validation, results that are staged, poses put together.
@@ -75,6 +75,8 @@ fn library_work() {
         };
         let mut options = EngineOptions::default();
         options.transfer = Transfer::Staged;
+        options.uploads = Uploads::Staged;
+        options.read_back = ReadBack::Overlapped;
         let engine = Engine::with_options(devices[0].clone(), &options)?;
         let set = hostile_set(2, 8);
         let clip = engine.upload(&set, method::C2)?;
@@ -103,7 +105,7 @@ fn library_work() {
 }
 
 /// A crowd, handed in and asked for until it is done.
-fn crowd_work(engine: &Engine) -> Result<(), CrowdError> {
+pub(super) fn crowd_work(engine: &Engine) -> Result<(), CrowdError> {
     let skeleton = Skeleton::new(vec![None, Some(0)], vec![Vec3::Y; 2]).unwrap();
     let mut library = CrowdLibrary::new(&skeleton)?;
     let mut set = TrackSet::new();

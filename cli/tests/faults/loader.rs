@@ -98,12 +98,15 @@ pub(super) struct Log {
     pub(super) left: BTreeMap<String, i64>,
     /// Allocations that were refused for want of memory.
     pub(super) short: usize,
+    /// What a card saw (`FAULT_CARD`).
+    pub(super) card: BTreeMap<String, usize>,
 }
 
 impl Log {
     fn new(text: &str) -> Self {
         let mut calls: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let (mut left, mut short) = (BTreeMap::new(), 0);
+        let mut card: BTreeMap<String, usize> = BTreeMap::new();
         for line in text.lines() {
             let words: Vec<&str> = line.split(' ').collect();
             let name = words[2].to_owned();
@@ -114,6 +117,7 @@ impl Log {
                 }
                 "made" => *left.entry(name).or_default() += 1,
                 "gone" => *left.entry(name).or_default() -= 1,
+                "card" => *card.entry(words[2..].join(" ")).or_default() += 1,
                 _ => short += 1,
             }
         }
@@ -123,6 +127,7 @@ impl Log {
             calls: calls.into_values().max_by_key(most).unwrap_or_default(),
             left,
             short,
+            card,
         }
     }
 }

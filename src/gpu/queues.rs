@@ -1,0 +1,160 @@
+//! Which queue of a device copies results to the host while another computes.
+
+use ash::vk;
+
+use crate::gpu::options::ReadBack;
+
+/// A queue of a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct QueuePlace {
+    pub(crate) family: u32,
+    pub(crate) index: u32,
+}
+
+/// How results are copied out of the device's own memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Copies {
+    /// In the submission of the kernels.
+    Together,
+    /// In submissions of their own, on the kernels' queue.
+    Apart,
+    /// In submissions of their own, on another queue.
+    Beside(QueuePlace),
+}
+
+/// What the families of engines for other work can do besides.
+const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
+    vk::QueueFlags::VIDEO_DECODE_KHR.as_raw()
+        | VIDEO_ENCODE.as_raw()
+        | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
+);
+
+/// `VK_QUEUE_VIDEO_ENCODE_BIT_KHR`.
+const VIDEO_ENCODE: vk::QueueFlags = vk::QueueFlags::from_raw(0x40);
+
+/// The family of the queue that computes: the first that can.
+pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let computes = |own: &vk::QueueFamilyProperties| {
+        own.queue_count > 0 && own.queue_flags.contains(vk::QueueFlags::COMPUTE)
+    };
+    families.iter().position(computes).map(|place| place as u32)
+}
+
+/// The queue that runs beside one of the family `compute` with the least in its way: a copy engine;
+/// else a family that computes and does not draw; else a second queue of the family itself; else
+/// any other family that computes or draws. Families for video and optical flow are left alone.
+pub(crate) fn copy_queue(
+    families: &[vk::QueueFamilyProperties],
+    compute: u32,
+) -> Option<QueuePlace> {
+    use vk::QueueFlags as Flags;
+    let rank = |family: u32, own: &vk::QueueFamilyProperties| {
+        let has = |flags| own.queue_flags.intersects(flags);
+        if family == compute {
+            return (own.queue_count > 1).then_some(2);
+        }
+        // Whoever computes or draws can copy, also where the flag for it is not set.
+        match (has(Flags::GRAPHICS), has(Flags::COMPUTE)) {
+            _ if own.queue_count == 0 || has(OTHER_WORK) => None,
+            (false, false) => has(Flags::TRANSFER).then_some(0),
+            (false, true) => Some(1),
+            (true, _) => Some(3),
+        }
+    };
+    let ranked = (0..).zip(families);
+    let ranked = ranked.filter_map(|(family, own)| Some((rank(family, own)?, family)));
+    let (_, family) = ranked.min()?;
+    Some(QueuePlace {
+        family,
+        index: u32::from(family == compute),
+    })
+}
+
+/// How a device copies whose results are staged.
+pub(crate) fn copies(
+    families: &[vk::QueueFamilyProperties],
+    compute: u32,
+    read_back: ReadBack,
+    is_software: bool,
+) -> Copies {
+    let beside = || copy_queue(families, compute).map(Copies::Beside);
+    match read_back {
+        ReadBack::SameQueue => Copies::Together,
+        ReadBack::Automatic if is_software => Copies::Together,
+        ReadBack::Automatic => beside().unwrap_or(Copies::Together),
+        ReadBack::Overlapped => beside().unwrap_or(Copies::Apart),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::cards::{Card, card};
+
+    fn of(name: &str) -> Option<QueuePlace> {
+        let Card { families, .. } = card(name);
+        copy_queue(&families, compute_family(&families).unwrap())
+    }
+
+    fn place(family: u32, index: u32) -> Option<QueuePlace> {
+        Some(QueuePlace { family, index })
+    }
+
+    /// Copy engines first, then what computes without drawing, then a second queue of the same
+    /// family; nothing where there is one queue.
+    #[test]
+    fn each_card_copies_on_the_queue_that_is_least_in_the_way() {
+        assert_eq!(of("H200"), place(1, 0));
+        assert_eq!(of("RTX 4060"), place(1, 0));
+        assert_eq!(of("RX 7900 XTX, RADV"), place(1, 0));
+        assert_eq!(of("RX 7900 XTX, AMD's driver"), place(2, 0));
+        assert_eq!(of("Steam Deck"), place(1, 0));
+        assert_eq!(of("Arc A770, Mesa 23"), None);
+        assert_eq!(of("Arc A770, Mesa 24"), place(2, 0));
+        assert_eq!(of("Apple M2, MoltenVK"), place(1, 0));
+        assert_eq!(of("lavapipe"), None);
+        assert_eq!(of("SwiftShader"), None);
+    }
+
+    #[test]
+    fn a_second_queue_of_the_family_serves_where_no_other_family_does() {
+        let mut families = card("lavapipe").families;
+        families[0].queue_count = 2;
+        assert_eq!(copy_queue(&families, 0), place(0, 1));
+        // A family for video can copy, and stays what it is for.
+        let mut video = card("H200").families;
+        video.retain(|own| own.queue_flags.intersects(OTHER_WORK));
+        assert!(!video.is_empty());
+        assert!(
+            video
+                .iter()
+                .all(|own| own.queue_flags.contains(vk::QueueFlags::TRANSFER))
+        );
+        families[0].queue_count = 1;
+        families.extend(video);
+        assert_eq!(copy_queue(&families, 0), None);
+        // The family that computes need not be the first.
+        let families = card("RTX 4060").families;
+        assert_eq!(copy_queue(&families, 2), place(1, 0));
+    }
+
+    #[test]
+    fn nothing_is_chosen_for_software_unless_it_is_forced() {
+        let Card { families, .. } = card("lavapipe");
+        let of = |read_back| copies(&families, 0, read_back, true);
+        assert_eq!(of(ReadBack::Automatic), Copies::Together);
+        assert_eq!(of(ReadBack::SameQueue), Copies::Together);
+        assert_eq!(of(ReadBack::Overlapped), Copies::Apart);
+        let Card { families, .. } = card("H200");
+        let beside = Copies::Beside(QueuePlace {
+            family: 1,
+            index: 0,
+        });
+        let of = |read_back| copies(&families, 0, read_back, false);
+        assert_eq!(of(ReadBack::Automatic), beside);
+        assert_eq!(of(ReadBack::SameQueue), Copies::Together);
+        assert_eq!(of(ReadBack::Overlapped), beside);
+        let many = copies(&families, 0, ReadBack::Automatic, true);
+        assert_eq!(many, Copies::Together);
+    }
+}

@@ -1,0 +1,99 @@
+//! What the host writes for kernels to read, where the device's memory and the options want it.
+
+use std::sync::Arc;
+
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::error::VulkanError;
+use crate::gpu::memory_types::{KernelReads, Place};
+use crate::gpu::submission::{Access, Binding, Submission};
+
+/// Bytes for kernels, in memory that is kept for the next ones.
+pub(crate) struct Upload {
+    name: &'static str,
+    reads: KernelReads,
+    /// Where the host writes.
+    written: Option<Buffer>,
+    /// The device's own copy, where there is one.
+    copied: Option<Buffer>,
+    /// Bytes of the last upload.
+    used: usize,
+}
+
+impl Upload {
+    pub(crate) const fn new(name: &'static str, reads: KernelReads) -> Self {
+        Self {
+            name,
+            reads,
+            written: None,
+            copied: None,
+            used: 0,
+        }
+    }
+
+    /// Room for as many bytes, on which no kernel may work. It may be memory that is fast only to
+    /// write, and in order (write-combined): the host must write all of it, from the first byte on,
+    /// and must not read it.
+    pub(crate) fn room(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        bytes: usize,
+    ) -> Result<&mut [u8], VulkanError> {
+        let size = bytes as u64;
+        if self.written.as_ref().is_none_or(|own| own.size() < size) {
+            // Shorter ones are freed before new ones are made, so that both need not fit.
+            (self.written, self.copied) = (None, None);
+            let (written, is_staged) = writable(device, self.name, size, self.reads)?;
+            if is_staged {
+                let copied = Buffer::new(device, self.name, size, Residence::Device)?;
+                self.copied = Some(copied);
+            }
+            self.written = Some(written);
+        }
+        self.used = bytes;
+        let written = self.written.as_mut();
+        Ok(written.map_or(&mut [], |own| own.bytes_mut(0..bytes)))
+    }
+
+    /// Records the copies of some uploads, where any of them are copied, and that kernels wait.
+    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
+        let mut any = false;
+        for upload in uploads {
+            if let (Some(from), Some(to)) = (&upload.written, &upload.copied)
+                && upload.used > 0
+            {
+                let size = (upload.used as u64).next_multiple_of(4);
+                submission.copy(from, to, 0, size);
+                any = true;
+            }
+        }
+        if any {
+            submission.barrier(Access::Copy, Access::Kernel);
+        }
+    }
+
+    /// What kernels bind; nothing before there was room for anything.
+    pub(crate) fn binding(&self) -> Option<Binding> {
+        let own = self.copied.as_ref().or(self.written.as_ref());
+        own.map(Binding::whole)
+    }
+}
+
+/// A buffer for the host to write, and whether its bytes must be copied for kernels. Where the
+/// device's own memory has no room that the host sees, the host's serves.
+pub(crate) fn writable(
+    device: &Arc<LogicalDevice>,
+    name: &str,
+    size: u64,
+    reads: KernelReads,
+) -> Result<(Buffer, bool), VulkanError> {
+    let mut place = device.placing.place(size, reads);
+    if place == Place::Direct {
+        match Buffer::new(device, name, size, Residence::Direct) {
+            Err(error) if !error.is_lost() => place = device.placing.without_direct(reads),
+            made => return Ok((made?, false)),
+        }
+    }
+    let buffer = Buffer::new(device, name, size, Residence::Upload)?;
+    Ok((buffer, place == Place::Staged))
+}
