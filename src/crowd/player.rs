@@ -245,6 +245,9 @@ impl Crowd {
             return self.wait_into(output);
         }
         self.check(values.into())?;
+        if self.submitted.is_some() {
+            return Err(CrowdError::StillSubmitted);
+        }
         self.on_cpu(values, output);
         Ok(())
     }
