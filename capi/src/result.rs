@@ -61,6 +61,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
+            Error::Vulkan(VulkanError::OwnBuffer { .. }) => TumbleResult::WrongSize,
             Error::Vulkan(_) | Error::Threads { .. } => TumbleResult::Device,
             Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,

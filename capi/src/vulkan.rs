@@ -2,8 +2,9 @@
 
 use std::ffi::{CStr, c_void};
 
+use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
-use tumble::{Engine, VulkanHandles};
+use tumble::{Engine, VulkanBuffer, VulkanHandles};
 
 use crate::arguments::{Out, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};
@@ -142,6 +143,29 @@ impl TumbleVulkan {
             Some(_) => Ok(()),
         }
     }
+}
+
+/// A range of an application's buffer, for what an engine on its own device left there.
+pub(crate) fn buffer_range(
+    is_on_own_device: bool,
+    buffer: u64,
+    offset: u64,
+    size: u64,
+) -> Result<VulkanBuffer, Failure> {
+    if !is_on_own_device {
+        let message = "the engine is not on the application's device; make it with \
+                       tumble_engine_from_vulkan";
+        return Err(Failure::argument(message));
+    }
+    if buffer == 0 {
+        let message = "`buffer` is VK_NULL_HANDLE";
+        return Err(Failure::new(TumbleResult::InvalidPointer, message));
+    }
+    Ok(VulkanBuffer {
+        buffer: vk::Buffer::from_raw(buffer),
+        offset,
+        size,
+    })
 }
 
 /// An engine on an application's own Vulkan device, for crowds that are recorded into its command buffers

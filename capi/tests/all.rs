@@ -73,7 +73,7 @@ fn compiler(name: &str) -> Option<Command> {
     }
     is_there.then(|| {
         let mut command = Command::new(name);
-        command.args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
+        command.args(["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
         command.arg(own("include"));
         command
     })
@@ -131,8 +131,9 @@ fn pendulum() -> PathBuf {
 const LANGUAGES: [(&str, &[&str]); 2] =
     [("cc", &["-std=c99"]), ("c++", &["-std=c++11", "-x", "c++"])];
 
-/// An example, compiled as C and as C++, linked with the shared and with the static library.
-fn programs(example: &str) -> Vec<PathBuf> {
+/// An example, compiled as C and as C++, linked with the shared and with the static library; each with
+/// the devices that it runs on.
+fn programs(example: &str) -> Vec<(PathBuf, &'static [&'static str])> {
     let (libraries, out) = (libraries(), Path::new(env!("CARGO_TARGET_TMPDIR")));
     let mut programs = Vec::new();
     for (name, language) in LANGUAGES {
@@ -157,15 +158,15 @@ fn programs(example: &str) -> Vec<PathBuf> {
                 command.arg(format!("-Wl,-rpath,{}", libraries.display()));
             }
             succeed(&mut command);
-            programs.push(program);
+            programs.push((program, devices(is_static)));
         }
     }
     programs
 }
 
-/// The CPU, and a Vulkan device where there is one.
-fn devices() -> &'static [&'static str] {
-    match support::vulkan_devices().is_empty() {
+/// The CPU, and for shared libraries a Vulkan device where there is one.
+fn devices(is_static: bool) -> &'static [&'static str] {
+    match is_static || support::vulkan_devices().is_empty() {
         true => &["cpu"],
         false => &["cpu", "vulkan"],
     }
@@ -175,8 +176,8 @@ fn devices() -> &'static [&'static str] {
 #[test]
 fn the_example_in_c_prints_the_engines_bits() {
     let expected = expected();
-    for program in programs("evaluate") {
-        for device in devices() {
+    for (program, devices) in programs("evaluate") {
+        for device in devices {
             let said = succeed(Command::new(&program).arg(device).arg(pendulum()));
             assert!(said == expected, "{device}, {}: {said}", program.display());
         }
@@ -197,8 +198,8 @@ fn crowds_in_c_have_the_same_bytes_on_the_cpu_and_a_device() {
     let chain = folder.path().join("chain.bvh");
     std::fs::write(&chain, CHAIN).unwrap();
     let mut first = None;
-    for program in programs("crowd") {
-        for device in devices() {
+    for (program, devices) in programs("crowd") {
+        for device in devices {
             let said = succeed(Command::new(&program).arg(device).arg(&chain));
             let lines = |what: &str| said.lines().filter(|line| line.starts_with(what)).count();
             assert!(

@@ -6,6 +6,7 @@ use std::process::Command;
 use std::ptr::{null, null_mut};
 
 use ash::vk::{self, Handle};
+use tumble_capi::clip::*;
 use tumble_capi::crowd::layer::TumbleCrowdLayer;
 use tumble_capi::crowd::library::*;
 use tumble_capi::crowd::output::*;
@@ -13,6 +14,7 @@ use tumble_capi::crowd::player::*;
 use tumble_capi::crowd::target::*;
 use tumble_capi::engine::*;
 use tumble_capi::result::*;
+use tumble_capi::samples::*;
 use tumble_capi::set::*;
 use tumble_capi::vulkan::*;
 
@@ -296,6 +298,94 @@ fn frames_are_recorded_into_an_applications_commands() {
     done(tumble_crowd_library_free(library));
     done(tumble_engine_free(cpu));
     done(tumble_engine_free(engine));
+}
+
+/// A clip's rotations stay on the device.
+#[test]
+fn clips_are_evaluated_into_an_applications_buffer() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let (mut set, times) = (null_mut(), [0.0, 1.0]);
+    let keys = [[0.0_f32, 0.0, 0.0, 1.0], [0.0, 0.6, 0.0, 0.8]];
+    let samples = TumbleSamples {
+        size: size_of::<TumbleSamples>(),
+        sampling: TumbleSampling::Keys as u32,
+        rate_frames: 60,
+        rate_seconds: 1,
+        start: 0.0,
+        end: 0.0,
+        times: null(),
+        time_count: 0,
+    };
+    const SIZE: u64 = 61 * 16;
+    let mut engines = [null_mut(); 2];
+    let mut clips = [null_mut(); 2];
+    done(open(&handles(&application), &mut engines[0]));
+    let mut expected = [f32::NAN; 61 * 4];
+    // SAFETY: as many numbers as are told, text, null, a structure, and places for handles.
+    unsafe {
+        done(tumble_engine_open(
+            c"cpu".as_ptr(),
+            null(),
+            &raw mut engines[1],
+        ));
+        let (times, keys) = (times.as_ptr(), keys.as_ptr().cast());
+        done(tumble_set_with_shared_times(
+            times,
+            2,
+            keys,
+            1,
+            &raw mut set,
+        ));
+        for (engine, clip) in engines.iter().zip(&mut clips) {
+            done(tumble_upload(*engine, set, null(), clip));
+        }
+        let (into, count) = (expected.as_mut_ptr(), expected.len());
+        done(tumble_clip_evaluate(
+            clips[1],
+            &raw const samples,
+            0,
+            into,
+            count,
+        ));
+    }
+    let (buffer, memory) = application.buffer(16 + SIZE);
+    let evaluate = |clip, buffer: u64, offset, size| {
+        let samples = &raw const samples;
+        // SAFETY: the buffer is the application's, or is refused.
+        unsafe { tumble_clip_evaluate_to_buffer(clip, samples, 0, buffer, offset, size) }
+    };
+    let raw = buffer.as_raw();
+    let argument = TumbleResult::InvalidArgument;
+    fails(
+        evaluate(clips[1], raw, 16, SIZE),
+        argument,
+        "tumble_engine_from_vulkan",
+    );
+    fails(
+        evaluate(clips[0], 0, 16, SIZE),
+        TumbleResult::InvalidPointer,
+        "VK_NULL_HANDLE",
+    );
+    for (offset, size) in [(8, SIZE), (16, SIZE - 1)] {
+        let refused = evaluate(clips[0], raw, offset, size);
+        fails(refused, TumbleResult::WrongSize, "the result has 976 bytes");
+    }
+    done(evaluate(clips[0], raw, 16, SIZE));
+    let found = application.bytes(memory, 16 + SIZE);
+    assert!(found[16..] == *bytemuck::cast_slice::<_, u8>(&expected));
+    for (engine, clip) in engines.into_iter().zip(clips) {
+        done(tumble_clip_free(clip));
+        done(tumble_engine_free(engine));
+    }
+    done(tumble_set_free(set));
+    // SAFETY: nothing is in flight.
+    unsafe {
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
 }
 
 /// What the loader and the instance can tell of handles is asked of them.

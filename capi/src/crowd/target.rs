@@ -2,14 +2,14 @@
 
 use std::ffi::c_void;
 
-use tumble::ash::vk::{Buffer, Handle};
-use tumble::{CrowdTarget, VulkanBuffer};
+use tumble::CrowdTarget;
 
 use crate::arguments::{Out, flag, vulkan};
 use crate::crowd::output;
 use crate::crowd::player::TumbleCrowd;
 use crate::handle::{self, Object};
-use crate::result::{Failure, TumbleResult, code};
+use crate::result::{TumbleResult, code};
+use crate::vulkan::buffer_range;
 
 /// A range of an application's buffer that a crowd is evaluated into, with all that recording needs.
 pub struct TumbleCrowdTarget {
@@ -45,20 +45,7 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
         let out = Out::new(target, "target")?;
         let crowd = handle::get(crowd)?;
         let output = output::output(values, flag(half, "half")?)?;
-        if !crowd.is_on_own_device {
-            let message = "the crowd's engine is not on the application's device; make it with \
-                           tumble_engine_from_vulkan";
-            return Err(Failure::argument(message));
-        }
-        if buffer == 0 {
-            let message = "`buffer` is VK_NULL_HANDLE";
-            return Err(Failure::new(TumbleResult::InvalidPointer, message));
-        }
-        let buffer = VulkanBuffer {
-            buffer: Buffer::from_raw(buffer),
-            offset,
-            size,
-        };
+        let buffer = buffer_range(crowd.is_on_own_device, buffer, offset, size)?;
         // SAFETY: as the caller promises.
         let own = unsafe { crowd.lock()?.own.target(output, buffer)? };
         // SAFETY: as the caller promises.
@@ -76,7 +63,7 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
 /// a frame that is thrown away is told by `tumble_crowd_forget_recorded`. The library submits to that
 /// queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
-/// `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
+/// `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
 /// application keeps these calls and its own submissions from one another.
 ///
 /// # Safety
