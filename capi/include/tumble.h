@@ -872,6 +872,26 @@ TumbleResult tumble_clip_evaluate(const struct TumbleClip *clip,
                                   size_t output_count);
 
 /*
+ Evaluates a clip of an engine of `tumble_engine_from_vulkan` into a range of a buffer on its device:
+ four floats for each sample of each track, which stay there. Returns when they are written; what is
+ submitted to the queue afterwards sees them. `buffer` is the `VkBuffer`, as a number:
+ `(uint64_t)buffer`. The range starts at a multiple of 16 and has at least 16 × tracks × samples bytes.
+
+ The buffer belongs to that device, has memory, and was made for use as
+ `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`. Nobody else uses it, or
+ the queue, during the call.
+
+ # Safety
+ `samples` is such a structure, and the buffer is as said.
+ */
+TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
+                                            const struct TumbleSamples *samples,
+                                            uint32_t layout,
+                                            uint64_t buffer,
+                                            uint64_t offset,
+                                            uint64_t size);
+
+/*
  Gives a clip back. Null is allowed.
  */
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
@@ -1236,7 +1256,7 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
  a frame that is thrown away is told by `tumble_crowd_forget_recorded`. The library submits to that
  queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
- `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
+ `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
  application keeps these calls and its own submissions from one another.
 
  # Safety
