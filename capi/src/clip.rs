@@ -201,10 +201,11 @@ pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
         let buffer = buffer_range(clip.is_on_own_device, buffer, offset, size)?;
         let encoding = Encoding::F32;
         // SAFETY: as the caller promises.
-        Ok(unsafe {
-            clip.own
-                .evaluate_to_buffer(&frames, layout, encoding, buffer)?
-        })
+        unsafe {
+            let own = &clip.own;
+            own.evaluate_to_buffer(&frames, layout, encoding, buffer)?;
+        }
+        Ok(())
     })
 }
 
