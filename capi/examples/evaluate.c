@@ -30,7 +30,7 @@ static void print_bits(const char *what, const float *rotations, size_t count) {
 }
 
 static float *floats(size_t count) {
-    float *memory = malloc((count > 0 ? count : 1) * sizeof *memory);
+    float *memory = (float *)malloc((count > 0 ? count : 1) * sizeof *memory);
     if (memory == NULL) {
         fprintf(stderr, "no memory for %lu floats\n", (unsigned long)count);
         exit(1);
@@ -43,14 +43,16 @@ static void elbow(TumbleEngine *engine) {
     const double times[3] = {0.0, 0.5, 1.25};
     const float keys[3][4] = {
         {0.0f, 0.0f, 0.0f, 1.0f}, {0.0f, 0.0f, 0.6f, 0.8f}, {0.0f, 0.0f, 0.8f, 0.6f}};
-    TumbleInterpolation how = {0};
-    TumbleSamples samples = {0};
+    TumbleInterpolation how;
+    TumbleSamples samples;
     TumbleSet *set;
     size_t count;
     float *rotations;
 
+    memset(&how, 0, sizeof how);
     how.size = sizeof how;
     how.method = "slerp";
+    memset(&samples, 0, sizeof samples);
     samples.size = sizeof samples;
     samples.sampling = TUMBLE_SAMPLING_KEYS;
     samples.rate_frames = 60;
@@ -77,13 +79,14 @@ static void elbow(TumbleEngine *engine) {
 /* The first clip of a file, as a clip that stays on the device, at three times. */
 static void file(TumbleEngine *engine, const char *path) {
     const double times[3] = {0.0, 7.3, 1.0 / 3.0};
-    TumbleSamples samples = {0};
+    TumbleSamples samples;
     TumbleFile *loaded;
     TumbleSet *set;
     TumbleClip *clip;
     size_t tracks, count;
     float *rotations;
 
+    memset(&samples, 0, sizeof samples);
     samples.size = sizeof samples;
     samples.sampling = TUMBLE_SAMPLING_TIMES;
     samples.times = times;

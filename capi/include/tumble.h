@@ -55,7 +55,7 @@ enum TumbleResult
    */
   TUMBLE_RESULT_INVALID_ARGUMENT = 3,
   /*
-   Memory for a result is not exactly as large as the result.
+   Memory for a result is not exactly as large as the result, or a buffer's range does not fit it.
    */
   TUMBLE_RESULT_WRONG_SIZE = 4,
   /*
@@ -78,6 +78,11 @@ enum TumbleResult
    A mistake of the library's; please report it.
    */
   TUMBLE_RESULT_INTERNAL = 9,
+  /*
+   Not now: nothing was submitted, the result of a submission was not taken, or what is asked for
+   needs something that the object has not been given.
+   */
+  TUMBLE_RESULT_WRONG_STATE = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -312,9 +317,60 @@ typedef uint32_t TumbleSampling;
 #endif // __cplusplus
 
 /*
+ What is left of every joint of every instance, in the order `[instance][joint]`.
+ */
+enum TumbleCrowdValues
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   The rotation in the parent's frame, four numbers: `x y z w`.
+   */
+  TUMBLE_CROWD_VALUES_ROTATIONS = 0,
+  /*
+   The transform in the parent's frame, twelve numbers: three rows of four, for column vectors, the
+   last column the translation.
+   */
+  TUMBLE_CROWD_VALUES_LOCAL = 1,
+  /*
+   The transform in the model, likewise.
+   */
+  TUMBLE_CROWD_VALUES_MODEL = 2,
+  /*
+   The transform in the model times the inverse bind matrix, likewise: what vertices are skinned
+   with.
+   */
+  TUMBLE_CROWD_VALUES_SKINNING = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumbleCrowdValues TumbleCrowdValues;
+#else
+typedef uint32_t TumbleCrowdValues;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  A set prepared for one method, on an engine's device. Any number of threads may use it at once.
  */
 typedef struct TumbleClip TumbleClip;
+
+/*
+ Many instances of a library's skeleton, each of which plays clips at its own time and speed. Threads
+ that use one crowd at once are served one after another.
+ */
+typedef struct TumbleCrowd TumbleCrowd;
+
+/*
+ Clips of one skeleton, prepared for crowds. Any number of threads may use it at once.
+ */
+typedef struct TumbleCrowdLibrary TumbleCrowdLibrary;
+
+/*
+ A range of an application's buffer that a crowd is evaluated into, with all that recording needs.
+ */
+typedef struct TumbleCrowdTarget TumbleCrowdTarget;
 
 /*
  One device, open. Any number of threads may use it at once.
@@ -448,6 +504,105 @@ typedef struct TumbleInterpolation {
    */
   double bias;
 } TumbleInterpolation;
+
+/*
+ An application's Vulkan instance, device and queue. They stay the application's.
+
+ The device needs no features; a software device is faster with `shaderInt64`. Below Vulkan 1.2,
+ enable `VK_KHR_shader_float_controls` where it is offered.
+ */
+typedef struct TumbleVulkan {
+  /*
+   `sizeof(TumbleVulkan)`.
+   */
+  size_t size;
+  /*
+   `vkGetInstanceProcAddr` of the loader that the instance was made by, cast to `void (*)(void)`.
+   The loader stays loaded as long as the engine and all that was made with it.
+   */
+  void (*get_instance_proc_addr)(void);
+  /*
+   The `VkInstance`, of Vulkan 1.1 or newer.
+   */
+  void *instance;
+  /*
+   The `VkPhysicalDevice` of the device.
+   */
+  void *physical_device;
+  /*
+   The `VkDevice`.
+   */
+  void *device;
+  /*
+   A `VkQueue` of the device that can compute.
+   */
+  void *queue;
+  /*
+   The family of that queue.
+   */
+  uint32_t queue_family;
+  /*
+   The version that the instance was made for, `VkApplicationInfo.apiVersion`.
+   */
+  uint32_t api_version;
+  /*
+   1: `VK_KHR_shader_float_controls` is enabled; it does not count from Vulkan 1.2 on.
+   */
+  uint32_t shader_float_controls;
+  /*
+   1: the feature `shaderInt64` is enabled.
+   */
+  uint32_t shader_int64;
+} TumbleVulkan;
+
+/*
+ What a layer of an instance plays. All zeros but `size` stand still at the start of the first clip.
+ */
+typedef struct TumbleCrowdLayer {
+  /*
+   `sizeof(TumbleCrowdLayer)`.
+   */
+  size_t size;
+  /*
+   The instance, from 0.
+   */
+  size_t instance;
+  /*
+   Its layer, from 0; higher ones are laid over lower ones.
+   */
+  size_t layer;
+  /*
+   The clip, by its number in the library.
+   */
+  size_t clip;
+  /*
+   Where in the clip it stands now, ticks; `wrap` says what lies outside of the clip.
+   */
+  int64_t time;
+  /*
+   Ticks of the clip for a tick of the clock: 1 as keyed, 0 to stand still, negative to run
+   backwards; magnitudes below 128, kept in units of 2^-16.
+   */
+  float speed;
+  /*
+   How much of it is laid over the layers below, 0 to 1, kept in units of 2^-15. The first layer
+   has no weight.
+   */
+  float weight;
+  /*
+   A `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
+   */
+  uint32_t wrap;
+  /*
+   1: the clip's difference from its reference pose is added to the layers below; 0: they go over
+   into it.
+   */
+  uint32_t additive;
+  /*
+   0: all joints take part; or a mask, by the number that `tumble_crowd_library_push_mask` gave.
+   */
+  size_t mask;
+} TumbleCrowdLayer;
 
 #ifdef __cplusplus
 extern "C" {
@@ -600,7 +755,8 @@ size_t tumble_file_clip_count(const struct TumbleFile *file);
 const char *tumble_file_clip_name(const struct TumbleFile *file, size_t clip);
 
 /*
- A clip's tracks of rotations, as a set of the caller's own, to be freed.
+ A clip's tracks of rotations, with the translations and scales that crowds use, as a set of the
+ caller's own, to be freed.
 
  # Safety
  `set` has room for a handle.
@@ -716,9 +872,413 @@ TumbleResult tumble_clip_evaluate(const struct TumbleClip *clip,
                                   size_t output_count);
 
 /*
+ Evaluates a clip of an engine of `tumble_engine_from_vulkan` into a range of a buffer on its device:
+ four floats for each sample of each track, which stay there. Returns when they are written; what is
+ submitted to the queue afterwards sees them. `buffer` is the `VkBuffer`, as a number:
+ `(uint64_t)buffer`. The range starts at a multiple of 16 and has at least 16 × tracks × samples bytes.
+
+ The buffer belongs to that device, has memory, and was made for use as
+ `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`. Nobody else uses it, or
+ the queue, during the call.
+
+ # Safety
+ `samples` is such a structure, and the buffer is as said.
+ */
+TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
+                                            const struct TumbleSamples *samples,
+                                            uint32_t layout,
+                                            uint64_t buffer,
+                                            uint64_t offset,
+                                            uint64_t size);
+
+/*
  Gives a clip back. Null is allowed.
  */
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
+
+/*
+ Gives a track translations, in place of those that it had. `times` are seconds, strictly increasing,
+ and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
+ `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
+ curve arrives, then the one with which it leaves, units per second. If anything is refused, the set
+ is as it was.
+
+ # Safety
+ `times` has `key_count` numbers, `keys` three times as many, and `tangents` is null or has six times
+ as many.
+ */
+TumbleResult tumble_set_translations(struct TumbleSet *set,
+                                     size_t track,
+                                     const double *times,
+                                     const float *keys,
+                                     const float *tangents,
+                                     size_t key_count);
+
+/*
+ Gives a track scales along its axes; otherwise as `tumble_set_translations`.
+
+ # Safety
+ As there.
+ */
+TumbleResult tumble_set_scales(struct TumbleSet *set,
+                               size_t track,
+                               const double *times,
+                               const float *keys,
+                               const float *tangents,
+                               size_t key_count);
+
+/*
+ An engine on an application's own Vulkan device, for crowds that are recorded into its command buffers
+ (`tumble_crowd_record`), and for all else that engines do.
+
+ The handles stay the application's, which destroys them after it has freed the engine, its clips,
+ crowds and targets, and no call with one of them is under way. Calls that submit work (uploading,
+ evaluating, submitting; not recording) use the queue, so nobody else may at the same time: a queue
+ of the library's own is the simplest where the device has several.
+
+ # Safety
+ `vulkan` is such a structure, whose handles are valid and belong together and live as said; `options` is
+ null or such a structure, and `engine` has room for a handle.
+ */
+TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
+                                       const struct TumbleEngineOptions *options,
+                                       struct TumbleEngine **engine);
+
+/*
+ An empty library for a skeleton of arrays. `parents` has the place of each joint's parent, -1 for a
+ root; parents may come after their children. `offsets` has three numbers for each joint: where it
+ hangs in its parent's frame while a clip has no translations for it; null: nowhere but at the parent.
+ `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
+
+ # Safety
+ `parents` has `joint_count` numbers, `offsets` is null or has three times as many, and `library` has
+ room for a handle.
+ */
+TumbleResult tumble_crowd_library_new(const int32_t *parents,
+                                      const float *offsets,
+                                      size_t joint_count,
+                                      uint32_t ticks_per_second,
+                                      struct TumbleCrowdLibrary **library);
+
+/*
+ Adds a clip: a track for each joint, in their order, the rotations by `interpolation` and the
+ translations and scales by `vectors`: "step", "linear", "catmull-rom", "bessel-overhauser",
+ "gltf-cubic", "c2" or "b-spline"; null is "linear". Joints without translations hang at their
+ offsets. Instances say what happens outside the keys, so `before` and `after` do not count. The
+ clip's reference pose, for additive layers, is its pose at its start. If anything is refused, the
+ library is as it was.
+
+ # Safety
+ `interpolation` is null (the defaults) or such a structure, `vectors` null or text that ends with a
+ zero, and `clip`, where the clip's number goes, null or room for one.
+ */
+TumbleResult tumble_crowd_library_push(struct TumbleCrowdLibrary *library,
+                                       const struct TumbleSet *set,
+                                       const struct TumbleInterpolation *interpolation,
+                                       const char *vectors,
+                                       size_t *clip);
+
+/*
+ Adds a mask, a weight from 0 to 1 for each joint, which layers' weights are multiplied with. There
+ can be 31. `mask` gets its number, from 1, as `TumbleCrowdLayer.mask` takes it.
+
+ # Safety
+ `weights` has `joint_count` numbers, and `mask` is null or has room for a number.
+ */
+TumbleResult tumble_crowd_library_push_mask(struct TumbleCrowdLibrary *library,
+                                            const float *weights,
+                                            size_t joint_count,
+                                            size_t *mask);
+
+/*
+ Gives every joint the inverse of its matrix in the model in the pose in which vertices were bound:
+ three rows of four numbers each, for column vectors, the last column the translation, as results are.
+ (A matrix of 16 numbers in columns, as glTF has them, has `m[0] m[4] m[8] m[12]` in its first row.)
+
+ # Safety
+ `matrices` has 12 × `joint_count` numbers.
+ */
+TumbleResult tumble_crowd_library_set_inverse_bind(struct TumbleCrowdLibrary *library,
+                                                   const float *matrices,
+                                                   size_t joint_count);
+
+/*
+ Makes the pose of the clip `from` at a tick, held at its ends, the reference pose of `clip`: what
+ additive layers of it differ from.
+ */
+TumbleResult tumble_crowd_library_set_reference(struct TumbleCrowdLibrary *library,
+                                                size_t clip,
+                                                size_t from,
+                                                uint32_t tick);
+
+/*
+ The number of joints; 0 for what is no library.
+ */
+size_t tumble_crowd_library_joint_count(const struct TumbleCrowdLibrary *library);
+
+/*
+ The number of clips; 0 for what is no library.
+ */
+size_t tumble_crowd_library_clip_count(const struct TumbleCrowdLibrary *library);
+
+/*
+ Ticks of a second; 0 for what is no library.
+ */
+uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *library);
+
+/*
+ How long a clip is, ticks: from the first key of anything to the last, and at least 1. 0 where there
+ is no such clip.
+ */
+uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library,
+                                         size_t clip);
+
+/*
+ The name of a joint, empty in libraries that were made of arrays: UTF-8, valid until the library is
+ freed; null where there is no such joint.
+ */
+const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library, size_t joint);
+
+/*
+ The place of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
+ joints.
+
+ # Safety
+ `parents` has room for `joint_count` numbers, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_library_parents(const struct TumbleCrowdLibrary *library,
+                                          int32_t *parents,
+                                          size_t joint_count);
+
+/*
+ Gives a library back; crowds that were made of it stay. Null is allowed.
+ */
+TumbleResult tumble_crowd_library_free(struct TumbleCrowdLibrary *library);
+
+/*
+ An empty library for the skeleton of a file: the joints of all of its clips, by name, with their
+ parents and where they rest; roots all of them where the file has no hierarchy. Its clips are then
+ pushed by `tumble_crowd_library_push_clip`. `ticks_per_second` is as in `tumble_crowd_library_new`.
+
+ # Safety
+ `library` has room for a handle.
+ */
+TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
+                                          uint32_t ticks_per_second,
+                                          struct TumbleCrowdLibrary **library);
+
+/*
+ Adds a clip of a file, whose joints are known by their names. Joints that the clip does not have stay
+ where they rest, and it must have none that the library has not. `interpolation` and `vectors` are as
+ in `tumble_crowd_library_push`; null is what the file says, which must then be one method for all
+ rotations and one for all translations and scales.
+
+ # Safety
+ `interpolation` is null or such a structure, `vectors` null or text that ends with a zero, and
+ `clip`, where the clip's number in the library goes, null or room for one.
+ */
+TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
+                                            const struct TumbleFile *file,
+                                            size_t clip_of_file,
+                                            const struct TumbleInterpolation *interpolation,
+                                            const char *vectors,
+                                            size_t *clip);
+
+/*
+ A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the start of
+ the library's first clip until they are set. The library is copied, to the device too: what is
+ pushed to it later is not in this crowd.
+
+ # Safety
+ `crowd` has room for a handle.
+ */
+TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
+                              const struct TumbleCrowdLibrary *library,
+                              size_t instances,
+                              size_t layers,
+                              struct TumbleCrowd **crowd);
+
+/*
+ Sets what layers of instances play from now on: 16 bytes each that reach the device with the next
+ evaluation. Of two for the same layer the later one counts. If one is refused, none is set.
+
+ # Safety
+ `layers` has `count` such structures.
+ */
+TumbleResult tumble_crowd_set(struct TumbleCrowd *crowd,
+                              const struct TumbleCrowdLayer *layers,
+                              size_t count);
+
+/*
+ What a layer of an instance plays, and where it stands now; speed and weight are as they were rounded.
+ `layer->size`, `layer->instance` and `layer->layer` say which, the rest is written.
+
+ # Safety
+ `layer` is such a structure, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_get(const struct TumbleCrowd *crowd,
+                              struct TumbleCrowdLayer *layer);
+
+/*
+ The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
+
+ # Safety
+ `tick` has room for a number.
+ */
+TumbleResult tumble_crowd_tick(const struct TumbleCrowd *crowd,
+                               size_t instance,
+                               size_t layer,
+                               uint32_t *tick);
+
+/*
+ Moves the clock of all instances on by the ticks nearest to some seconds. Where the sum must not
+ drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
+ */
+TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd, double seconds);
+
+/*
+ Sets the clock, ticks below 2^52; all instances move with it, forwards or backwards.
+ */
+TumbleResult tumble_crowd_set_clock(struct TumbleCrowd *crowd, uint64_t ticks);
+
+/*
+ The clock, ticks.
+
+ # Safety
+ `ticks` has room for a number.
+ */
+TumbleResult tumble_crowd_clock(const struct TumbleCrowd *crowd, uint64_t *ticks);
+
+/*
+ Gives a crowd back, which waits for what was submitted; its targets stay. Null is allowed.
+ */
+TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
+
+/*
+ How many numbers a result has: 4 or 12 × joints × instances.
+
+ # Safety
+ `count` has room for a number.
+ */
+TumbleResult tumble_crowd_output_count(const struct TumbleCrowd *crowd,
+                                       uint32_t values,
+                                       size_t *count);
+
+/*
+ Evaluates all instances at the clock's time into the caller's memory, and waits until it is done.
+ `values` is a `TumbleCrowdValues`; `output_count` is exactly as `tumble_crowd_output_count` says.
+
+ # Safety
+ `output` has room for `output_count` floats, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_evaluate(struct TumbleCrowd *crowd,
+                                   uint32_t values,
+                                   float *output,
+                                   size_t output_count);
+
+/*
+ As `tumble_crowd_evaluate`, in 16 bits: the bits of halves (IEEE 754), rounded to nearest.
+
+ # Safety
+ `output` has room for `output_count` halves, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_evaluate_half(struct TumbleCrowd *crowd,
+                                        uint32_t values,
+                                        uint16_t *output,
+                                        size_t output_count);
+
+/*
+ Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it while
+ instances and the clock are changed for the next one. The CPU evaluates before this returns. The
+ result must be taken by `tumble_crowd_wait`, or by `tumble_crowd_wait_half` where `half` is 1, before
+ anything else is evaluated or submitted.
+ */
+TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
+                                 uint32_t values,
+                                 uint32_t half);
+
+/*
+ Whether what was submitted is done, so that `tumble_crowd_wait` does not wait.
+
+ # Safety
+ `done` has room for a truth value.
+ */
+TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
+
+/*
+ Waits for what was submitted with `half` 0, and takes its result. If an argument is refused, the
+ result can still be taken.
+
+ # Safety
+ `output` has room for `output_count` floats, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd, float *output, size_t output_count);
+
+/*
+ Waits for what was submitted with `half` 1, and takes its result. If an argument is refused, the
+ result can still be taken.
+
+ # Safety
+ `output` has room for `output_count` halves, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
+                                    uint16_t *output,
+                                    size_t output_count);
+
+/*
+ Makes ready what it takes to evaluate into a range of a buffer of the application's, on the device of
+ `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
+ is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
+ `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
+ at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`.
+
+ The buffer belongs to that device, has memory, and was made for use as
+ `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; it stays the application's, and lives longer than the target.
+
+ # Safety
+ The buffer is as said, and `target` has room for a handle.
+ */
+TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
+                                     uint32_t values,
+                                     uint32_t half,
+                                     uint64_t buffer,
+                                     uint64_t offset,
+                                     uint64_t size,
+                                     struct TumbleCrowdTarget **target);
+
+/*
+ Records an evaluation at the clock's time into the application's `VkCommandBuffer`: 16 bytes for each
+ layer that changed since the last evaluation, and the dispatches. Nothing is waited for, submitted or
+ allocated. What is recorded behind it, or submitted to the same queue later, sees the result; it
+ waits for all that was recorded before it.
+
+ The command buffer is of the engine's device and of the family of its queue, in recording, outside of
+ a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
+ a frame that is thrown away is told by `tumble_crowd_forget_recorded`. The library submits to that
+ queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
+ `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
+ application keeps these calls and its own submissions from one another.
+
+ # Safety
+ The command buffer is as said, and its work is submitted as said.
+ */
+TumbleResult tumble_crowd_record(struct TumbleCrowd *crowd,
+                                 const struct TumbleCrowdTarget *target,
+                                 void *commands);
+
+/*
+ Takes back that anything was recorded: the next evaluation tells the device all that instances play.
+ For an application that threw a recorded frame away.
+ */
+TumbleResult tumble_crowd_forget_recorded(struct TumbleCrowd *crowd);
+
+/*
+ Gives a target back, after all work that was recorded with it has ended. Null is allowed.
+
+ # Safety
+ No such work is in flight.
+ */
+TumbleResult tumble_crowd_target_free(struct TumbleCrowdTarget *target);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,6 +1,8 @@
 //! Pointers and sizes of the caller's, checked before they are used.
 
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, c_char, c_void};
+
+use tumble::ash::vk::Handle;
 
 use crate::result::{Failure, TumbleResult};
 
@@ -49,22 +51,38 @@ pub(crate) unsafe fn list<'a, T: Copy>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
+/// Numbers of which every pattern of bits is one.
+pub(crate) trait Number: Copy {}
+
+impl Number for f32 {}
+impl Number for u16 {}
+impl Number for i32 {}
+
 /// Memory of the caller's for numbers.
 ///
 /// # Safety
 /// As [`list`]; nothing else uses the memory during the call.
-pub(crate) unsafe fn list_mut<'a>(
-    pointer: *mut f32,
+pub(crate) unsafe fn list_mut<'a, T: Number>(
+    pointer: *mut T,
     count: usize,
     what: &str,
-) -> Result<&'a mut [f32], Failure> {
-    product::<f32>(count, 1, what)?;
+) -> Result<&'a mut [T], Failure> {
+    product::<T>(count, 1, what)?;
     if count == 0 {
         return Ok(&mut []);
     }
     check(pointer, what)?;
     // SAFETY: as in `list`; every pattern of bits is a number.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A handle of Vulkan's that is not null.
+pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, what: &str) -> Result<T, Failure> {
+    if pointer.is_null() {
+        let message = format!("`{what}` is null");
+        return Err(Failure::new(TumbleResult::InvalidPointer, message));
+    }
+    Ok(T::from_raw(pointer.expose_provenance() as u64))
 }
 
 /// A structure of the caller's that begins with its own size; `None` where the pointer is null.
@@ -94,6 +112,23 @@ pub(crate) unsafe fn sized<T: Copy>(
     Ok(Some(unsafe { pointer.read() }))
 }
 
+/// As [`sized`], and an error where the pointer is null.
+///
+/// # Safety
+/// As [`sized`].
+pub(crate) unsafe fn needed<T: Copy>(
+    pointer: *const T,
+    size: impl FnOnce(*const T) -> *const usize,
+    what: &str,
+) -> Result<T, Failure> {
+    // SAFETY: the caller's promise.
+    let found = unsafe { sized(pointer, size, what)? };
+    found.ok_or_else(|| {
+        let message = format!("`{what}` is null");
+        Failure::new(TumbleResult::InvalidPointer, message)
+    })
+}
+
 /// Text of the caller's; `None` where the pointer is null.
 ///
 /// # Safety
@@ -114,6 +149,7 @@ pub(crate) unsafe fn text<'a>(
 
 /// Where a value goes.
 pub(crate) struct Out<T> {
+    /// Null where the value is not wanted.
     pointer: *mut T,
 }
 
@@ -124,9 +160,20 @@ impl<T> Out<T> {
         Ok(Self { pointer })
     }
 
+    /// As [`Out::new`]; null where the value is not wanted.
+    pub(crate) fn optional(pointer: *mut T, what: &str) -> Result<Self, Failure> {
+        match pointer.is_null() {
+            true => Ok(Self { pointer }),
+            false => Self::new(pointer, what),
+        }
+    }
+
     /// # Safety
     /// The pointer is that of memory for such a value, which nothing else uses during the call.
     pub(crate) unsafe fn set(self, value: T) {
+        if self.pointer.is_null() {
+            return;
+        }
         // SAFETY: not null and aligned; the rest is the caller's promise. Nothing is dropped that
         // was there before: it may never have been written.
         unsafe { self.pointer.write(value) };
@@ -142,4 +189,9 @@ pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], what: &str) -> R
             "`{what}` is {value}; its constants are 0 to {last}"
         ))
     })
+}
+
+/// What 0 and 1 stand for.
+pub(crate) fn flag(value: u32, what: &str) -> Result<bool, Failure> {
+    constant(value, &[(0, false), (1, true)], what)
 }

@@ -1,6 +1,6 @@
 //! Evaluating: a set in one go, or a clip that stays on a device.
 
-use tumble::{Clip, Frames, Timeline, TrackSet};
+use tumble::{Clip, Encoding, Frames, Timeline, TrackSet};
 
 use crate::arguments::{Out, list_mut};
 use crate::engine::TumbleEngine;
@@ -9,10 +9,13 @@ use crate::interpolation::TumbleInterpolation;
 use crate::result::{Failure, TumbleResult, code};
 use crate::samples::{TumbleSamples, layout};
 use crate::set::TumbleSet;
+use crate::vulkan::buffer_range;
 
 /// A set prepared for one method, on an engine's device. Any number of threads may use it at once.
 pub struct TumbleClip {
     own: Clip,
+    /// Whether its engine is on the application's own Vulkan device.
+    is_on_own_device: bool,
 }
 
 impl Object for TumbleClip {
@@ -112,7 +115,12 @@ pub unsafe extern "C" fn tumble_upload(
         let interpolation = unsafe { TumbleInterpolation::read(interpolation)? };
         let own = engine.own.upload(&set.read(), interpolation)?;
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleClip { own })) };
+        unsafe {
+            out.set(handle::give(TumbleClip {
+                own,
+                is_on_own_device: engine.is_on_own_device,
+            }));
+        }
         Ok(())
     })
 }
@@ -162,6 +170,42 @@ pub unsafe extern "C" fn tumble_clip_evaluate(
         let output = unsafe { list_mut(output, output_count, "output")? };
         let (rows, _) = output.as_chunks_mut::<4>();
         Ok(clip.own.evaluate_into(&frames, layout, rows)?)
+    })
+}
+
+/// Evaluates a clip of an engine of `tumble_engine_from_vulkan` into a range of a buffer on its device:
+/// four floats for each sample of each track, which stay there. Returns when they are written; what is
+/// submitted to the queue afterwards sees them. `buffer` is the `VkBuffer`, as a number:
+/// `(uint64_t)buffer`. The range starts at a multiple of 16 and has at least 16 × tracks × samples bytes.
+///
+/// The buffer belongs to that device, has memory, and was made for use as
+/// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`. Nobody else uses it, or
+/// the queue, during the call.
+///
+/// # Safety
+/// `samples` is such a structure, and the buffer is as said.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
+    clip: *const TumbleClip,
+    samples: *const TumbleSamples,
+    layout: u32,
+    buffer: u64,
+    offset: u64,
+    size: u64,
+) -> TumbleResult {
+    code(|| {
+        let clip = handle::get(clip)?;
+        // SAFETY: as the caller promises.
+        let frames = unsafe { TumbleSamples::read(samples)? };
+        let layout = self::layout(layout)?;
+        let buffer = buffer_range(clip.is_on_own_device, buffer, offset, size)?;
+        let encoding = Encoding::F32;
+        // SAFETY: as the caller promises.
+        unsafe {
+            let own = &clip.own;
+            own.evaluate_to_buffer(&frames, layout, encoding, buffer)?;
+        }
+        Ok(())
     })
 }
 

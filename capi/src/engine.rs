@@ -4,14 +4,28 @@ use std::ffi::{CString, c_char};
 
 use tumble::{Device, Engine, EngineOptions, Error, VulkanError};
 
-use crate::arguments::{Out, sized, text};
+use crate::arguments::{Out, flag, sized, text};
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 
 /// One device, open. Any number of threads may use it at once.
 pub struct TumbleEngine {
     pub(crate) own: Engine,
+    /// Whether the Vulkan device is the application's.
+    pub(crate) is_on_own_device: bool,
     name: CString,
+}
+
+impl TumbleEngine {
+    pub(crate) fn new(own: Engine, is_on_own_device: bool) -> Self {
+        let name = own.device_name().replace('\0', "");
+        let name = CString::new(name).unwrap_or_default();
+        Self {
+            own,
+            is_on_own_device,
+            name,
+        }
+    }
 }
 
 impl Object for TumbleEngine {
@@ -51,31 +65,36 @@ pub unsafe extern "C" fn tumble_engine_open(
         let out = Out::new(engine, "engine")?;
         // SAFETY: as the caller promises.
         let (device, options) = unsafe {
-            let size = |own: *const TumbleEngineOptions| (&raw const (*own).size).cast();
-            (text(device, "device")?, sized(options, size, "options")?)
+            let options = TumbleEngineOptions::read(options)?;
+            (text(device, "device")?, options)
         };
-        let options = options.map_or_else(|| Ok(EngineOptions::default()), engine_options)?;
         let own = open(device.unwrap_or("auto"), &options)?;
-        let name = own.device_name().replace('\0', "");
-        let name = CString::new(name).unwrap_or_default();
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleEngine { own, name })) };
+        unsafe { out.set(handle::give(TumbleEngine::new(own, false))) };
         Ok(())
     })
+}
+
+impl TumbleEngineOptions {
+    /// What the structure says; null is all defaults.
+    ///
+    /// # Safety
+    /// The pointer is null or that of such a structure.
+    pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
+        // SAFETY: as the caller promises.
+        let given = unsafe {
+            let size = |own: *const Self| (&raw const (*own).size).cast();
+            sized(pointer, size, "options")?
+        };
+        given.map_or_else(|| Ok(EngineOptions::default()), engine_options)
+    }
 }
 
 fn engine_options(given: TumbleEngineOptions) -> Result<EngineOptions, Failure> {
     let mut options = EngineOptions::default();
     options.memory = (given.memory > 0).then_some(given.memory);
     options.threads = (given.threads > 0).then_some(given.threads as usize);
-    options.allow_inexact = match given.allow_inexact {
-        0 => false,
-        1 => true,
-        other => {
-            let message = format!("`options->allow_inexact` is {other}; it is 0 or 1");
-            return Err(Failure::argument(message));
-        }
-    };
+    options.allow_inexact = flag(given.allow_inexact, "options->allow_inexact")?;
     Ok(options)
 }
 

@@ -14,13 +14,13 @@ use crate::set::TumbleSet;
 
 /// What was read from a motion file: clips, and what is remarkable about it.
 pub struct TumbleFile {
-    clips: Vec<Clip>,
+    pub(crate) clips: Vec<Clip>,
     messages: Vec<CString>,
 }
 
 /// A clip, and what is told about it as text.
-struct Clip {
-    motion: Motion,
+pub(crate) struct Clip {
+    pub(crate) motion: Motion,
     name: CString,
     /// Of each track, the name of the method by which the file interpolates its rotation.
     methods: Vec<CString>,
@@ -31,7 +31,7 @@ impl Object for TumbleFile {
 }
 
 /// Text for C, which has no zeros inside.
-fn c_text(text: &str) -> CString {
+pub(crate) fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
@@ -95,7 +95,7 @@ pub extern "C" fn tumble_file_clip_count(file: *const TumbleFile) -> usize {
 }
 
 impl TumbleFile {
-    fn clip(&self, index: usize) -> Result<&Clip, Failure> {
+    pub(crate) fn clip(&self, index: usize) -> Result<&Clip, Failure> {
         let count = self.clips.len();
         self.clips.get(index).ok_or_else(|| {
             let message = format!("there is no clip {index}; the file has {count}");
@@ -112,7 +112,8 @@ pub extern "C" fn tumble_file_clip_name(file: *const TumbleFile, clip: usize) ->
     name.unwrap_or(std::ptr::null())
 }
 
-/// A clip's tracks of rotations, as a set of the caller's own, to be freed.
+/// A clip's tracks of rotations, with the translations and scales that crowds use, as a set of the
+/// caller's own, to be freed.
 ///
 /// # Safety
 /// `set` has room for a handle.

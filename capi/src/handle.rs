@@ -5,7 +5,9 @@
 
 use std::any::Any;
 use std::collections::HashMap;
-use std::sync::{Arc, LazyLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{
+    Arc, LazyLock, LockResult, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard,
+};
 
 use crate::result::{Failure, TumbleResult};
 
@@ -76,4 +78,13 @@ pub(crate) fn free<T: Object>(handle: *mut T) -> Result<(), Failure> {
     let object = write().objects.remove(&handle.addr());
     drop(object);
     Ok(())
+}
+
+/// What a lock guards, unless a call that held it ended in a panic: what it left may be half changed.
+pub(crate) fn locked<T: Object, G>(lock: LockResult<G>) -> Result<G, Failure> {
+    lock.map_err(|_| {
+        let name = T::NAME;
+        let message = format!("an earlier call with this {name} had an internal error; free it");
+        Failure::new(TumbleResult::Internal, message)
+    })
 }

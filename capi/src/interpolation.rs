@@ -81,6 +81,14 @@ pub enum TumbleWrap {
     Extrapolate = 3,
 }
 
+/// What the constants of [`TumbleWrap`] stand for.
+pub(crate) const WRAPS: [(u32, WrapMode); 4] = [
+    (TumbleWrap::Hold as u32, WrapMode::Hold),
+    (TumbleWrap::Loop as u32, WrapMode::Loop),
+    (TumbleWrap::Mirror as u32, WrapMode::Mirror),
+    (TumbleWrap::Extrapolate as u32, WrapMode::Extrapolate),
+];
+
 /// A method with its options. All zeros but `size` are the defaults.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -117,16 +125,28 @@ impl TumbleInterpolation {
     /// What the structure says; null is all defaults.
     ///
     /// # Safety
+    /// As [`TumbleInterpolation::read_or`].
+    pub(crate) unsafe fn read(pointer: *const Self) -> Result<Interpolation, Failure> {
+        // SAFETY: as the caller promises.
+        unsafe { Self::read_or(pointer, || Ok(method::BESSEL_OVERHAUSER)) }
+    }
+
+    /// What the structure says; null is another method with all defaults.
+    ///
+    /// # Safety
     /// The pointer is null or that of such a structure, whose `method` is null or text that ends with
     /// a zero.
-    pub(crate) unsafe fn read(pointer: *const Self) -> Result<Interpolation, Failure> {
+    pub(crate) unsafe fn read_or(
+        pointer: *const Self,
+        other: impl FnOnce() -> Result<Method, Failure>,
+    ) -> Result<Interpolation, Failure> {
         // SAFETY: as the caller promises.
         let given = unsafe {
             let size = |own: *const Self| (&raw const (*own).size).cast();
             sized(pointer, size, "interpolation")?
         };
         let Some(given) = given else {
-            return Ok(method::BESSEL_OVERHAUSER.into());
+            return Ok(other()?.into());
         };
         // SAFETY: as the caller promises.
         let name = unsafe { text(given.method, "interpolation->method")? };
@@ -183,12 +203,6 @@ impl TumbleInterpolation {
             (TumbleSpeed::AsKeyed as u32, Speed::AsKeyed),
             (TumbleSpeed::Constant as u32, Speed::Constant),
         ];
-        let wraps = [
-            (TumbleWrap::Hold as u32, WrapMode::Hold),
-            (TumbleWrap::Loop as u32, WrapMode::Loop),
-            (TumbleWrap::Mirror as u32, WrapMode::Mirror),
-            (TumbleWrap::Extrapolate as u32, WrapMode::Extrapolate),
-        ];
         Ok(Interpolation {
             method,
             path: method.path.unwrap_or(path),
@@ -200,8 +214,8 @@ impl TumbleInterpolation {
             },
             quantity: constant(self.quantity, &quantities, "interpolation->quantity")?,
             speed: constant(self.speed, &speeds, "interpolation->speed")?,
-            before: constant(self.before, &wraps, "interpolation->before")?,
-            after: constant(self.after, &wraps, "interpolation->after")?,
+            before: constant(self.before, &WRAPS, "interpolation->before")?,
+            after: constant(self.after, &WRAPS, "interpolation->after")?,
         })
     }
 }

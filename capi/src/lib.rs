@@ -8,6 +8,7 @@
 
 mod arguments;
 pub mod clip;
+pub mod crowd;
 pub mod engine;
 pub mod file;
 mod handle;
@@ -15,6 +16,8 @@ pub mod interpolation;
 pub mod result;
 pub mod samples;
 pub mod set;
+pub mod set_vectors;
 #[cfg(test)]
 mod tests;
 pub mod version;
+pub mod vulkan;

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use tumble::{Error, TrackError, VulkanError};
+use tumble::{CrowdError, Error, SkeletonError, TrackError, VulkanError};
 use tumble_formats::Diagnostic;
 
 /// What became of a call.
@@ -21,7 +21,7 @@ pub enum TumbleResult {
     /// An argument has a value that it cannot have: an unknown constant or name, a size that
     /// overflows, a structure of another version, text that is not UTF-8.
     InvalidArgument = 3,
-    /// Memory for a result is not exactly as large as the result.
+    /// Memory for a result is not exactly as large as the result, or a buffer's range does not fit it.
     WrongSize = 4,
     /// There is nothing at that index.
     OutOfRange = 5,
@@ -33,6 +33,9 @@ pub enum TumbleResult {
     Device = 8,
     /// A mistake of the library's; please report it.
     Internal = 9,
+    /// Not now: nothing was submitted, the result of a submission was not taken, or what is asked for
+    /// needs something that the object has not been given.
+    WrongState = 10,
 }
 
 /// Why a call failed.
@@ -58,6 +61,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
+            Error::Vulkan(VulkanError::OwnBuffer { .. }) => TumbleResult::WrongSize,
             Error::Vulkan(_) | Error::Threads { .. } => TumbleResult::Device,
             Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
@@ -78,6 +82,46 @@ impl From<TrackError> for Failure {
     fn from(error: TrackError) -> Self {
         let code = match error {
             TrackError::NoSuchTrack { .. } => TumbleResult::OutOfRange,
+            _ => TumbleResult::InvalidInput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<SkeletonError> for Failure {
+    fn from(error: SkeletonError) -> Self {
+        let code = match error {
+            SkeletonError::OutOfMemory(_) => TumbleResult::OutOfMemory,
+            _ => TumbleResult::InvalidInput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<CrowdError> for Failure {
+    fn from(error: CrowdError) -> Self {
+        let reason = match &error {
+            CrowdError::Change { reason, .. } => reason,
+            error => error,
+        };
+        let code = match reason {
+            CrowdError::Vulkan(_) => TumbleResult::Device,
+            CrowdError::OutOfMemory(_) => TumbleResult::OutOfMemory,
+            CrowdError::Missing { .. } => TumbleResult::OutOfRange,
+            CrowdError::OutputLength { .. } | CrowdError::Buffer { .. } => TumbleResult::WrongSize,
+            CrowdError::NothingSubmitted
+            | CrowdError::StillSubmitted
+            | CrowdError::Precision { .. }
+            | CrowdError::NoClips
+            | CrowdError::NoInverseBind => TumbleResult::WrongState,
+            CrowdError::TicksPerSecond { .. }
+            | CrowdError::Instances { .. }
+            | CrowdError::Layers { .. }
+            | CrowdError::Weight { .. }
+            | CrowdError::Speed { .. }
+            | CrowdError::Wrap { .. }
+            | CrowdError::Seconds { .. }
+            | CrowdError::OtherDevice => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };
         Self::new(code, error.to_string())

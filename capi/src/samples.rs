@@ -2,8 +2,8 @@
 
 use tumble::{FrameRate, Frames, Layout};
 
-use crate::arguments::{constant, list, sized};
-use crate::result::{Failure, TumbleResult};
+use crate::arguments::{constant, list, needed};
+use crate::result::Failure;
 
 /// The order of a result in memory, four numbers for each sample of each track.
 #[repr(u32)]
@@ -61,10 +61,8 @@ impl TumbleSamples {
         // SAFETY: as the caller promises.
         let given = unsafe {
             let size = |own: *const Self| (&raw const (*own).size).cast();
-            sized(pointer, size, "samples")?
+            needed(pointer, size, "samples")?
         };
-        let null = || Failure::new(TumbleResult::InvalidPointer, "`samples` is null");
-        let given = given.ok_or_else(null)?;
         let rate = || FrameRate::new(given.rate_frames, given.rate_seconds.max(1));
         // SAFETY: as the caller promises.
         let times = || unsafe { list(given.times, given.time_count, "samples->times") };

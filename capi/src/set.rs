@@ -13,7 +13,7 @@ use crate::result::{Failure, TumbleResult, code, guarded};
 /// Tracks of keys. Any number of threads may read a set at once.
 #[derive(Default)]
 pub struct TumbleSet {
-    own: RwLock<TrackSet>,
+    pub(crate) own: RwLock<TrackSet>,
 }
 
 impl Object for TumbleSet {

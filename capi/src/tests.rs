@@ -1,5 +1,10 @@
 //! What C may do wrong, and what it is told then.
 
+mod crowd;
+mod crowd_files;
+mod crowd_refusals;
+mod crowd_states;
+
 use std::ffi::{CStr, c_char};
 use std::ptr::{dangling, dangling_mut, null, null_mut};
 

@@ -1,4 +1,12 @@
-//! The header, and programs in C and C++ that use it.
+//! The header, and programs in C and C++ that use it; and an application's own device.
+
+#[path = "../../tests/support/application.rs"]
+mod application;
+#[path = "../../tests/support/layer.rs"]
+mod layer;
+mod own_device;
+#[path = "../../tests/support/mod.rs"]
+mod support;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,6 +33,14 @@ fn the_header_is_what_the_sources_say() {
         "interpolation",
         "samples",
         "clip",
+        "set_vectors",
+        "vulkan",
+        "crowd/library",
+        "crowd/file",
+        "crowd/layer",
+        "crowd/player",
+        "crowd/output",
+        "crowd/target",
     ];
     for source in sources {
         builder = builder.with_src(own(&format!("src/{source}.rs")));
@@ -57,7 +73,7 @@ fn compiler(name: &str) -> Option<Command> {
     }
     is_there.then(|| {
         let mut command = Command::new(name);
-        command.args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
+        command.args(["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
         command.arg(own("include"));
         command
     })
@@ -111,37 +127,56 @@ fn pendulum() -> PathBuf {
     own("../data/pendulum.dat")
 }
 
-/// The example, linked with the shared and with the static library, on the CPU and on a Vulkan device
-/// where there is one.
+/// Engines are written in C++.
+const LANGUAGES: [(&str, &[&str]); 2] =
+    [("cc", &["-std=c99"]), ("c++", &["-std=c++11", "-x", "c++"])];
+
+/// An example, compiled as C and as C++, linked with the shared and with the static library; each with
+/// the devices that it runs on.
+fn programs(example: &str) -> Vec<(PathBuf, &'static [&'static str])> {
+    let (libraries, out) = (libraries(), Path::new(env!("CARGO_TARGET_TMPDIR")));
+    let mut programs = Vec::new();
+    for (name, language) in LANGUAGES {
+        for is_static in [false, true] {
+            let Some(mut command) = compiler(name) else {
+                continue;
+            };
+            let kind = if is_static { "static" } else { "shared" };
+            let program = out.join(format!("{example}-{name}-{kind}"));
+            let source = own(&format!("examples/{example}.c"));
+            command
+                .args(language)
+                .arg(source)
+                .args(["-x", "none", "-o"]);
+            command.arg(&program);
+            if is_static {
+                command.arg(libraries.join("libtumble_capi.a"));
+                // What Rust's own library is linked with.
+                command.args(["-lpthread", "-ldl", "-lm"]);
+            } else {
+                command.arg("-L").arg(&libraries).arg("-ltumble_capi");
+                command.arg(format!("-Wl,-rpath,{}", libraries.display()));
+            }
+            succeed(&mut command);
+            programs.push((program, devices(is_static)));
+        }
+    }
+    programs
+}
+
+/// The CPU, and for shared libraries a Vulkan device where there is one.
+fn devices(is_static: bool) -> &'static [&'static str] {
+    match is_static || support::vulkan_devices().is_empty() {
+        true => &["cpu"],
+        false => &["cpu", "vulkan"],
+    }
+}
+
+/// On the CPU and on a Vulkan device.
 #[test]
 fn the_example_in_c_prints_the_engines_bits() {
-    let Some(_) = compiler("cc") else {
-        return;
-    };
-    let (libraries, expected) = (libraries(), expected());
-    let out = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    for is_static in [false, true] {
-        let program = out.join(if is_static { "static" } else { "shared" });
-        let mut command = compiler("cc").unwrap();
-        command
-            .arg("-std=c99")
-            .arg(own("examples/evaluate.c"))
-            .arg("-o")
-            .arg(&program);
-        if is_static {
-            command.arg(libraries.join("libtumble_capi.a"));
-            // What Rust's own library is linked with.
-            command.args(["-lpthread", "-ldl", "-lm"]);
-        } else {
-            command.arg("-L").arg(&libraries).arg("-ltumble_capi");
-            command.arg(format!("-Wl,-rpath,{}", libraries.display()));
-        }
-        succeed(&mut command);
-        let has_vulkan = Device::list().is_ok_and(|devices| !devices.is_empty());
-        let devices: &[&str] = match has_vulkan && !is_static {
-            true => &["cpu", "vulkan"],
-            false => &["cpu"],
-        };
+    let expected = expected();
+    for (program, devices) in programs("evaluate") {
         for device in devices {
             let said = succeed(Command::new(&program).arg(device).arg(pendulum()));
             assert!(said == expected, "{device}, {}: {said}", program.display());
@@ -149,7 +184,55 @@ fn the_example_in_c_prints_the_engines_bits() {
     }
 }
 
-/// Engines are written in C++.
+/// A chain of three joints, for those who have no model at hand.
+const CHAIN: &str = "HIERARCHY\nROOT hip\n{\nOFFSET 0 1 0\nCHANNELS 6 Xposition Yposition Zposition \
+    Zrotation Xrotation Yrotation\nJOINT knee\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation \
+    Yrotation\nJOINT foot\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\n\
+    OFFSET 0 0 0.2\n}\n}\n}\n}\nMOTION\nFrames: 3\nFrame Time: 0.25\n\
+    0 1 0 0 0 0 0 0 0 0 0 0\n0 1 1 10 20 30 5 40 0 0 -20 3\n0 1 2 0 5 60 0 10 0 2 0 9\n";
+
+/// The example compares the bytes itself; here, that it did, and that all programs found the same.
+#[test]
+fn crowds_in_c_have_the_same_bytes_on_the_cpu_and_a_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = folder.path().join("chain.bvh");
+    std::fs::write(&chain, CHAIN).unwrap();
+    let mut first = None;
+    for (program, devices) in programs("crowd") {
+        for device in devices {
+            let said = succeed(Command::new(&program).arg(device).arg(&chain));
+            let lines = |what: &str| said.lines().filter(|line| line.starts_with(what)).count();
+            assert!(
+                said.contains("figures: 3000 instances of 13 joints, 3 clips\n"),
+                "{said}"
+            );
+            assert!(
+                said.contains("file: 300 instances of 3 joints, 1 clips\n"),
+                "{said}"
+            );
+            assert_eq!(
+                (lines("figures "), lines("file ")),
+                (4 * 8, 4 * 6),
+                "{said}"
+            );
+            assert!(said.ends_with("all bytes are the same\n"), "{said}");
+            let first = first.get_or_insert_with(|| said.clone());
+            assert!(said == *first, "{device}, {}: {said}", program.display());
+        }
+    }
+    let Some(first) = first else {
+        return;
+    };
+    // Frames differ from one another.
+    let mut hashes: Vec<&str> = first
+        .lines()
+        .filter_map(|line| line.split(' ').nth(3))
+        .collect();
+    hashes.sort_unstable();
+    hashes.dedup();
+    assert!(hashes.len() >= 4 * 14, "{first}");
+}
+
 #[test]
 fn the_header_is_c_plus_plus_too() {
     let Some(mut command) = compiler("c++") else {

@@ -54,6 +54,22 @@ impl ChannelMethods<'_> {
             .then_some(first)
     }
 
+    /// The one method for the translations and scales of all tracks; `None` where their samplers
+    /// differ. Keys that are all the same count for none: every method holds them.
+    #[must_use]
+    pub fn vector_method_of(&self, clip: &Motion) -> Option<VectorMethod> {
+        let channels = [Channel::Translation, Channel::Scale];
+        let tracks = 0..clip.set.track_count();
+        let all = tracks.flat_map(|track| channels.map(|channel| (track, channel)));
+        let mut methods = all.filter_map(|(track, channel)| {
+            let own = clip.set.vector_keys(channel, track)?;
+            let moves = !own.tangents.is_empty() || own.keys.iter().any(|key| *key != own.keys[0]);
+            moves.then(|| self.vector_method(clip.channel(track).of(channel)))
+        });
+        let first = methods.next().unwrap_or_default();
+        methods.all(|method| method == first).then_some(first)
+    }
+
     /// The method of tracks whose rotation has no sampler. One at rest has one key, which every
     /// method holds: it goes with most of the others.
     fn resting_method(&self, clip: &Motion) -> Method {
@@ -374,5 +390,33 @@ mod tests {
             [found[2], found[6], found[12], found[13]],
             [keys[1], keys[1], keys[0], keys[1]]
         );
+    }
+
+    #[test]
+    fn still_vectors_go_with_every_method() {
+        let mut clip = Motion::default();
+        for _ in 0..3 {
+            clip.set.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
+        }
+        let methods = ChannelMethods::AUTHORED;
+        assert_eq!(methods.vector_method_of(&clip), Some(VectorMethod::Linear));
+        let (times, moving) = ([0.0, 1.0], [Vec3::ZERO, Vec3::X]);
+        clip.channels = [Sampler::Step, Sampler::Cubic, Sampler::Linear]
+            .map(|sampler| Channels {
+                translation: Some(sampler),
+                scale: Some(sampler),
+                ..Channels::default()
+            })
+            .to_vec();
+        clip.set
+            .set_translations(0, &times, &[Vec3::Y; 2], &[])
+            .unwrap();
+        clip.set.set_translations(2, &times, &moving, &[]).unwrap();
+        assert_eq!(methods.vector_method_of(&clip), Some(VectorMethod::Linear));
+        let tangents = [[Vec3::Z; 2]; 2];
+        clip.set
+            .set_scales(1, &times, &[Vec3::ONE; 2], &tangents)
+            .unwrap();
+        assert_eq!(methods.vector_method_of(&clip), None);
     }
 }

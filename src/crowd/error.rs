@@ -153,6 +153,14 @@ pub enum CrowdError {
         /// What was given.
         wrap: WrapMode,
     },
+    /// One of many changes is refused.
+    #[error("change {change}: {reason}")]
+    Change {
+        /// Its place among them.
+        change: usize,
+        /// Why.
+        reason: Box<CrowdError>,
+    },
     /// A time that is no number, or out of reach.
     #[error("{seconds} s; times and steps of a crowd are finite, and within 2^52 ticks")]
     Seconds {

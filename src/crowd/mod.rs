@@ -2,6 +2,7 @@
 //! go on the CPU or on a Vulkan device, with the same bits.
 
 pub(crate) mod clip_tables;
+pub(crate) mod clock;
 pub(crate) mod error;
 pub(crate) mod instances;
 pub(crate) mod layer;

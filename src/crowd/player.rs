@@ -16,9 +16,6 @@ use crate::memory::zeroed;
 use crate::shader::CrowdEntry;
 use crate::twin::crowd_matrices::to_any_half;
 
-/// The farthest that a clock goes, ticks: whole numbers of f64.
-const FARTHEST: f64 = (1u64 << 52) as f64;
-
 /// Many instances of a library's skeleton, each of which plays clips at its own time and speed.
 ///
 /// All of them follow one clock, which counts whole ticks: where an instance stands is a function of
@@ -28,9 +25,9 @@ const FARTHEST: f64 = (1u64 << 52) as f64;
 /// The CPU and every Vulkan device give the same bits.
 pub struct Crowd {
     engine: Engine,
-    library: CrowdLibrary,
+    pub(crate) library: CrowdLibrary,
     cells: Cells,
-    instances: Instances,
+    pub(crate) instances: Instances,
     layers: usize,
     bases: usize,
     pub(crate) device: Option<Arc<DeviceCrowd>>,
@@ -140,60 +137,6 @@ impl Crowd {
         &self.library
     }
 
-    /// The clock, ticks.
-    #[must_use]
-    pub fn clock(&self) -> u64 {
-        self.instances.clock()
-    }
-
-    /// Sets the clock, ticks; all instances move with it, forwards or backwards.
-    ///
-    /// # Errors
-    /// From 2^52 ticks on, which is two centuries at 705 600 ticks a second.
-    pub fn set_clock(&mut self, ticks: u64) -> Result<(), CrowdError> {
-        let given = ticks as f64;
-        if given >= FARTHEST {
-            let seconds = given / f64::from(self.library.ticks_per_second());
-            return Err(CrowdError::Seconds { seconds });
-        }
-        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
-        self.instances.set_clock(ticks, clips, masks);
-        Ok(())
-    }
-
-    /// Moves the clock on by some ticks.
-    ///
-    /// # Errors
-    /// As [`Crowd::set_clock`].
-    pub fn advance_ticks(&mut self, ticks: u64) -> Result<(), CrowdError> {
-        self.set_clock(self.clock().saturating_add(ticks))
-    }
-
-    /// Moves the clock on by the ticks nearest to some seconds. Where the sum must not drift, as in a
-    /// film at 30000/1001 frames a second, [`Crowd::set_clock`] to the ticks of each frame's time.
-    ///
-    /// # Errors
-    /// When the seconds are negative or no number, and as [`Crowd::set_clock`].
-    pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
-        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
-        if !(0.0..FARTHEST).contains(&ticks) {
-            return Err(CrowdError::Seconds { seconds });
-        }
-        self.advance_ticks(ticks as u64)
-    }
-
-    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`].
-    ///
-    /// # Errors
-    /// When it is no number, or out of reach.
-    pub fn ticks_of(&self, seconds: f64) -> Result<i64, CrowdError> {
-        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
-        match ticks.abs() < FARTHEST {
-            true => Ok(ticks as i64),
-            false => Err(CrowdError::Seconds { seconds }),
-        }
-    }
-
     /// Sets what a layer of an instance plays from now on: 16 bytes that reach the device with the next
     /// evaluation.
     ///
@@ -206,12 +149,41 @@ impl Crowd {
         layer: usize,
         plays: CrowdLayer,
     ) -> Result<(), CrowdError> {
+        let (place, entry) = self.packed(instance, layer, plays)?;
+        self.instances.set(place, entry);
+        Ok(())
+    }
+
+    /// Sets what many layers play, an instance, a layer and what it plays each; of two changes of
+    /// one layer the later one counts.
+    ///
+    /// # Errors
+    /// As [`Crowd::set`], with the place of the first change that is refused; then everything stays.
+    pub fn set_all(&mut self, changes: &[(usize, usize, CrowdLayer)]) -> Result<(), CrowdError> {
+        for (change, &(instance, layer, plays)) in changes.iter().enumerate() {
+            if let Err(reason) = self.packed(instance, layer, plays) {
+                let reason = Box::new(reason);
+                return Err(CrowdError::Change { change, reason });
+            }
+        }
+        for &(instance, layer, plays) in changes {
+            self.set(instance, layer, plays)?;
+        }
+        Ok(())
+    }
+
+    /// The place of a layer's entry, and the entry for what it is to play.
+    fn packed(
+        &self,
+        instance: usize,
+        layer: usize,
+        plays: CrowdLayer,
+    ) -> Result<(usize, CrowdEntry), CrowdError> {
         let place = self.place(instance, layer)?;
         let (clips, masks) = (&self.library.tables.clips, self.library.masks());
         let weight = if layer == 0 { 1.0 } else { plays.weight };
         let entry = CrowdLayer { weight, ..plays }.packed(clips, masks, self.clock())?;
-        self.instances.set(place, entry);
-        Ok(())
+        Ok((place, entry))
     }
 
     /// What a layer of an instance plays, and where it stands now. Speed and weight are as they were
@@ -273,6 +245,9 @@ impl Crowd {
             return self.wait_into(output);
         }
         self.check(values.into())?;
+        if self.submitted.is_some() {
+            return Err(CrowdError::StillSubmitted);
+        }
         self.on_cpu(values, output);
         Ok(())
     }
@@ -325,6 +300,15 @@ impl Crowd {
         Ok(())
     }
 
+    /// What was submitted and not taken yet.
+    #[must_use]
+    pub fn submitted(&self) -> Option<CrowdOutput> {
+        match &self.submitted {
+            None => None,
+            Some(Submitted::OnCpu(output, _) | Submitted::OnDevice(output)) => Some(*output),
+        }
+    }
+
     /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
     ///
     /// # Errors
@@ -370,10 +354,7 @@ impl Crowd {
 
     /// Takes a submission for memory of this length: its values, or `None` where the device has them.
     fn taken(&mut self, given: usize, half: bool) -> Result<Option<Vec<[f32; 4]>>, CrowdError> {
-        let output = match &self.submitted {
-            None => return Err(CrowdError::NothingSubmitted),
-            Some(Submitted::OnCpu(output, _) | Submitted::OnDevice(output)) => *output,
-        };
+        let output = self.submitted().ok_or(CrowdError::NothingSubmitted)?;
         if output.is_half != half {
             let is_half = output.is_half;
             return Err(CrowdError::Precision { is_half });

@@ -480,6 +480,8 @@ fn submissions_are_taken_once() {
         crowd.submit(CrowdValues::Rotations).unwrap();
         crowd.set(3, 0, CrowdLayer::new(1).at(100_000)).unwrap();
         assert!(crowd.submit(CrowdValues::Local).is_err(), "{name}");
+        let at_once = crowd.evaluate_into(CrowdValues::Rotations, &mut found);
+        assert_eq!(at_once.unwrap_err(), CrowdError::StillSubmitted, "{name}");
         let mut half = vec![[0; 4]; still.len()];
         assert!(crowd.wait_half_into(&mut half).is_err());
         while !crowd.poll().unwrap() {

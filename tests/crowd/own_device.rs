@@ -1,75 +1,13 @@
 //! Crowds on an application's own device, recorded into its own command buffers.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
-use ash::vk;
 use tumble::{
     CrowdError, CrowdLayer, CrowdOutput, CrowdTarget, CrowdValues, Mapping, VulkanBuffer, method,
 };
 
 use super::{ALL, cpu, layer, library};
-use crate::application::Application;
+use crate::application::{Application, Commands};
 use crate::support::{Random, vulkan_devices};
-
-/// Command buffers of an application.
-struct Commands<'a> {
-    application: &'a Application,
-    pool: vk::CommandPool,
-}
-
-impl<'a> Commands<'a> {
-    fn new(application: &'a Application) -> Self {
-        let info = vk::CommandPoolCreateInfo::default();
-        // SAFETY: plain creation; destroyed in `drop`.
-        let pool = unsafe { application.device.create_command_pool(&info, None) }.unwrap();
-        Self { application, pool }
-    }
-
-    /// A command buffer with what `record` leaves in it.
-    fn recorded(&self, record: impl FnOnce(vk::CommandBuffer)) -> vk::CommandBuffer {
-        let device = &self.application.device;
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(self.pool)
-            .command_buffer_count(1);
-        // SAFETY: plain use of a device that is alive.
-        unsafe {
-            let commands = device.allocate_command_buffers(&info).unwrap()[0];
-            let info = vk::CommandBufferBeginInfo::default();
-            device.begin_command_buffer(commands, &info).unwrap();
-            record(commands);
-            device.end_command_buffer(commands).unwrap();
-            commands
-        }
-    }
-
-    /// Submits several without a wait between them, then waits.
-    fn run(&self, all: &[vk::CommandBuffer]) {
-        for &commands in all {
-            let own = [commands];
-            let submit = [vk::SubmitInfo::default().command_buffers(&own)];
-            let fence = vk::Fence::null();
-            // SAFETY: nobody else uses the queue.
-            unsafe {
-                let device = &self.application.device;
-                device
-                    .queue_submit(self.application.queue, &submit, fence)
-                    .unwrap();
-            }
-        }
-        // SAFETY: as above.
-        unsafe { self.application.device.device_wait_idle() }.unwrap();
-    }
-}
-
-impl Drop for Commands<'_> {
-    fn drop(&mut self) {
-        // SAFETY: nothing is in flight.
-        unsafe {
-            self.application
-                .device
-                .destroy_command_pool(self.pool, None);
-        }
-    }
-}
 
 /// Several frames in flight, each into a buffer of its own, in every form: the bits of the CPU.
 #[test]

@@ -120,7 +120,11 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
         },
     ];
     for plays in hostile {
-        crowd.set(1, 1, plays).unwrap_err();
+        let reason = crowd.set(1, 1, plays).unwrap_err().to_string();
+        let good = CrowdLayer::new(0).at(5_555);
+        let refused = crowd.set_all(&[(0, 0, good), (1, 1, plays), (9, 9, good)]);
+        let refused = refused.unwrap_err().to_string();
+        assert_eq!(refused, format!("change 1: {reason}"));
     }
     assert!(crowd.set(3, 0, plays).is_err() && crowd.set(0, 2, plays).is_err());
     assert!(crowd.get(3, 0).is_err() && crowd.tick(0, 2).is_err());
@@ -138,6 +142,10 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
         CrowdError::OutputLength { given, needed }
     );
     assert_eq!(bits(&evaluated(&mut crowd, CrowdValues::Skinning)), before);
+    let changes = [(0, 0, plays.at(9)), (2, 1, plays), (0, 0, plays.at(7_777))];
+    crowd.set_all(&changes).unwrap();
+    assert_eq!(crowd.get(0, 0).unwrap(), plays.at(7_777));
+    assert_eq!(crowd.get(2, 1).unwrap(), plays);
     // Times far outside are folded, not refused.
     for time in [i64::MIN, i64::MAX] {
         crowd.set(0, 0, plays.at(time)).unwrap();

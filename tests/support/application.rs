@@ -9,11 +9,11 @@ pub(crate) struct Application {
     pub(crate) instance: ash::Instance,
     pub(crate) physical_device: vk::PhysicalDevice,
     pub(crate) device: ash::Device,
-    entry: ash::Entry,
+    pub(crate) entry: ash::Entry,
     pub(crate) queue: vk::Queue,
     /// A queue that only copies, where the device has one.
     pub(crate) copy_queue: Option<VulkanQueue>,
-    shader_int64: bool,
+    pub(crate) shader_int64: bool,
 }
 
 impl Application {
@@ -139,6 +139,67 @@ impl Drop for Application {
         unsafe {
             self.device.destroy_device(None);
             self.instance.destroy_instance(None);
+        }
+    }
+}
+
+/// Command buffers of an application.
+pub(crate) struct Commands<'a> {
+    application: &'a Application,
+    pool: vk::CommandPool,
+}
+
+impl<'a> Commands<'a> {
+    pub(crate) fn new(application: &'a Application) -> Self {
+        let info = vk::CommandPoolCreateInfo::default();
+        // SAFETY: plain creation; destroyed in `drop`.
+        let pool = unsafe { application.device.create_command_pool(&info, None) }.unwrap();
+        Self { application, pool }
+    }
+
+    /// A command buffer with what `record` leaves in it.
+    pub(crate) fn recorded(&self, record: impl FnOnce(vk::CommandBuffer)) -> vk::CommandBuffer {
+        let device = &self.application.device;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(self.pool)
+            .command_buffer_count(1);
+        // SAFETY: plain use of a device that is alive.
+        unsafe {
+            let commands = device.allocate_command_buffers(&info).unwrap()[0];
+            let info = vk::CommandBufferBeginInfo::default();
+            device.begin_command_buffer(commands, &info).unwrap();
+            record(commands);
+            device.end_command_buffer(commands).unwrap();
+            commands
+        }
+    }
+
+    /// Submits several without a wait between them, then waits.
+    pub(crate) fn run(&self, all: &[vk::CommandBuffer]) {
+        for &commands in all {
+            let own = [commands];
+            let submit = [vk::SubmitInfo::default().command_buffers(&own)];
+            let fence = vk::Fence::null();
+            // SAFETY: nobody else uses the queue.
+            unsafe {
+                let device = &self.application.device;
+                device
+                    .queue_submit(self.application.queue, &submit, fence)
+                    .unwrap();
+            }
+        }
+        // SAFETY: as above.
+        unsafe { self.application.device.device_wait_idle() }.unwrap();
+    }
+}
+
+impl Drop for Commands<'_> {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in flight.
+        unsafe {
+            self.application
+                .device
+                .destroy_command_pool(self.pool, None);
         }
     }
 }

@@ -1,0 +1,8 @@
+//! Crowds: many instances of one skeleton, each at its own time in clips of its own.
+
+pub mod file;
+pub mod layer;
+pub mod library;
+pub mod output;
+pub mod player;
+pub mod target;

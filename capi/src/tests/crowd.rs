@@ -1,0 +1,448 @@
+//! Crowds through the interface of C: the bits of the engine's own.
+
+use std::ffi::{CStr, c_char};
+use std::ptr::{null, null_mut};
+
+use glam::{Affine3A, Mat3A, Quat, Vec3};
+use tumble::{
+    Crowd, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Device, Engine, Skeleton, TrackSet,
+    VectorMethod, WrapMode, method,
+};
+
+use super::{cpu, defaults, words};
+use crate::crowd::layer::*;
+use crate::crowd::library::*;
+use crate::crowd::output::*;
+use crate::crowd::player::*;
+use crate::engine::*;
+use crate::handle;
+use crate::result::*;
+use crate::set::*;
+use crate::set_vectors::*;
+
+pub(super) const ALL: [CrowdValues; 4] = [
+    CrowdValues::Rotations,
+    CrowdValues::Local,
+    CrowdValues::Model,
+    CrowdValues::Skinning,
+];
+
+pub(super) const PARENTS: [i32; 4] = [1, -1, 1, -1];
+const OFFSETS: [[f32; 3]; 4] = [
+    [0.0, -0.5, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.1, 0.4, 0.0],
+    [2.0, 0.0, 0.0],
+];
+const MASK: [f32; 4] = [1.0, 0.5, 0.0, 1.0];
+
+#[track_caller]
+pub(super) fn done(result: TumbleResult) {
+    assert_eq!(result, TumbleResult::Ok, "{}", words());
+}
+
+/// Keys of joints that all turn differently; one is moved, another one scaled.
+fn set(number: u32) -> TrackSet {
+    let mut set = TrackSet::new();
+    for joint in 0..4u32 {
+        let count = if joint == 3 { 2 } else { 9 };
+        let times: Vec<f64> = (0..count).map(|key| 0.1 + f64::from(key) * 0.25).collect();
+        let key = |key: u32| {
+            let turn = (key * (number + 1) + joint) as f32 * 0.3;
+            Quat::from_rotation_x(turn.sin()) * Quat::from_rotation_z(turn.cos() * 0.5)
+        };
+        let keys: Vec<Quat> = (0..count).map(key).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let vectors = [[0.0, 1.0, 0.0], [0.3, 1.1, 0.2], [0.0, 1.0, 0.5]];
+    let tangents = vectors.map(|own| [Vec3::from(own), -Vec3::from(own)]);
+    let times = [0.0, 0.7, 2.0];
+    set.set_translations(1, &times, &vectors, &tangents)
+        .unwrap();
+    set.set_scales(0, &times, &vectors.map(|own| own.map(|x| x + 1.0)), &[])
+        .unwrap();
+    set
+}
+
+/// The same set, made by C's functions.
+fn c_set(own: &TrackSet) -> *mut TumbleSet {
+    let mut set = null_mut();
+    // SAFETY: pointers to as many numbers as are told, and places for handles.
+    unsafe {
+        done(tumble_set_new(&raw mut set));
+        for track in own.tracks() {
+            let keys: Vec<[f32; 4]> = track.keys.iter().map(Quat::to_array).collect();
+            let (times, keys) = (track.times.as_ptr(), keys.as_ptr().cast());
+            done(tumble_set_push(set, null(), times, keys, track.times.len()));
+        }
+        let channels: [(_, _, unsafe extern "C" fn(_, _, _, _, _, _) -> _); 2] = [
+            (tumble::Channel::Translation, 1, tumble_set_translations),
+            (tumble::Channel::Scale, 0, tumble_set_scales),
+        ];
+        for (channel, track, give) in channels {
+            let vectors = own.vector_keys(channel, track).unwrap();
+            let keys: Vec<[f32; 3]> = vectors.keys.iter().map(Vec3::to_array).collect();
+            let tangents: Vec<[[f32; 3]; 2]> =
+                (vectors.tangents.iter().map(|both| both.map(Vec3::into))).collect();
+            let tangents = match tangents.is_empty() {
+                true => null(),
+                false => tangents.as_ptr().cast::<f32>(),
+            };
+            let (times, keys) = (vectors.times.as_ptr(), keys.as_ptr().cast::<f32>());
+            let count = vectors.times.len();
+            done(give(set, track, times, keys, tangents, count));
+        }
+    }
+    set
+}
+
+fn bind(joint: usize) -> Affine3A {
+    let turned = Mat3A::from_rotation_y(0.3 * joint as f32);
+    Affine3A::from_mat3_translation(turned.into(), Vec3::new(0.5, -0.25, joint as f32))
+}
+
+pub(super) fn push(
+    library: *mut TumbleCrowdLibrary,
+    set: *const TumbleSet,
+    vectors: Option<&CStr>,
+) -> TumbleResult {
+    let slerp = crate::interpolation::TumbleInterpolation {
+        method: c"slerp".as_ptr(),
+        ..defaults()
+    };
+    let vectors: *const c_char = vectors.map_or(null(), CStr::as_ptr);
+    // SAFETY: a structure and text; the number is not wanted.
+    unsafe { tumble_crowd_library_push(library, set, &raw const slerp, vectors, null_mut()) }
+}
+
+/// A library of three clips, a mask, a reference pose and inverse bind matrices, by C and by Rust.
+pub(super) fn libraries() -> (*mut TumbleCrowdLibrary, CrowdLibrary) {
+    let parents = PARENTS.map(|parent| usize::try_from(parent).ok());
+    let skeleton = Skeleton::new(parents.to_vec(), OFFSETS.map(Vec3::from).to_vec()).unwrap();
+    let mut own = CrowdLibrary::new(&skeleton).unwrap();
+    let mut library = null_mut();
+    let (parents, offsets) = (PARENTS.as_ptr(), OFFSETS.as_ptr().cast());
+    // SAFETY: pointers to as many numbers as are told, and a place for the handle.
+    done(unsafe { tumble_crowd_library_new(parents, offsets, 4, 0, &raw mut library) });
+    for number in 0..3 {
+        let set = set(number);
+        let (name, vectors) = match number {
+            0 => (None, VectorMethod::Linear),
+            1 => (Some(c"gltf-cubic"), VectorMethod::GltfCubic),
+            _ => (Some(c"step"), VectorMethod::Step),
+        };
+        own.push(&set, method::SLERP, vectors).unwrap();
+        let set = c_set(&set);
+        done(push(library, set, name));
+        done(tumble_set_free(set));
+    }
+    own.push_mask(&MASK).unwrap();
+    own.set_reference(2, 1, 70_560).unwrap();
+    let matrices = [0, 1, 2, 3].map(bind);
+    own.set_inverse_bind(&matrices).unwrap();
+    let rows = matrices.map(|matrix| {
+        let columns = matrix.to_cols_array_2d();
+        [0, 1, 2].map(|row| columns.map(|column| column[row]))
+    });
+    let mut mask = 0;
+    // SAFETY: as above.
+    unsafe {
+        let (weights, mask) = (MASK.as_ptr(), &raw mut mask);
+        done(tumble_crowd_library_push_mask(library, weights, 4, mask));
+        done(tumble_crowd_library_set_inverse_bind(
+            library,
+            rows.as_ptr().cast(),
+            4,
+        ));
+    }
+    assert_eq!(mask, 1);
+    done(tumble_crowd_library_set_reference(library, 2, 1, 70_560));
+    (library, own)
+}
+
+pub(super) fn c_crowd(
+    engine: *const TumbleEngine,
+    library: *const TumbleCrowdLibrary,
+    (instances, layers): (usize, usize),
+) -> *mut TumbleCrowd {
+    let mut crowd = null_mut();
+    // SAFETY: a place for the handle.
+    done(unsafe { tumble_crowd_new(engine, library, instances, layers, &raw mut crowd) });
+    crowd
+}
+
+/// All zeros, and the size.
+pub(super) fn still() -> TumbleCrowdLayer {
+    TumbleCrowdLayer {
+        size: size_of::<TumbleCrowdLayer>(),
+        instance: 0,
+        layer: 0,
+        clip: 0,
+        time: 0,
+        speed: 0.0,
+        weight: 0.0,
+        wrap: 0,
+        additive: 0,
+        mask: 0,
+    }
+}
+
+pub(super) fn set_layers(crowd: *mut TumbleCrowd, layers: &[TumbleCrowdLayer]) -> TumbleResult {
+    // SAFETY: as many structures as are told.
+    unsafe { tumble_crowd_set(crowd, layers.as_ptr(), layers.len()) }
+}
+
+/// What everybody plays in some frame, in both forms; not every layer in every frame.
+fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdLayer, CrowdLayer)> {
+    let mut all = Vec::new();
+    for place in 0..instances * layers {
+        if frame > 0 && !(place + frame).is_multiple_of(3) {
+            continue;
+        }
+        let wraps = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror];
+        let own = CrowdLayer {
+            clip: (place + frame) % 3,
+            time: place as i64 * 50_000 - 200_000,
+            speed: place as f32 * 0.125 - 1.0,
+            wrap: wraps[(place + frame) % 3],
+            weight: (place % 5) as f32 * 0.25,
+            additive: place % 4 == 1,
+            mask: place.is_multiple_of(2).then_some(0),
+        };
+        let layer = TumbleCrowdLayer {
+            instance: place / layers,
+            layer: place % layers,
+            clip: own.clip,
+            time: own.time,
+            speed: own.speed,
+            weight: own.weight,
+            wrap: ((place + frame) % 3) as u32,
+            additive: own.additive.into(),
+            mask: own.mask.map_or(0, |mask| mask + 1),
+            ..still()
+        };
+        all.push((layer, own));
+    }
+    all
+}
+
+pub(super) fn count(crowd: *const TumbleCrowd, values: CrowdValues) -> usize {
+    let mut count = 0;
+    // SAFETY: a place for the number.
+    done(unsafe { tumble_crowd_output_count(crowd, values as u32, &raw mut count) });
+    count
+}
+
+/// The bits of a result, of 32 or of 16 each, evaluated at once or submitted.
+pub(super) fn bits(crowd: *mut TumbleCrowd, output: CrowdOutput, submits: bool) -> Vec<u32> {
+    let (values, half) = (output.values as u32, output.is_half);
+    let count = count(crowd, output.values);
+    let (mut floats, mut halves) = (vec![f32::NAN; count], vec![0xffff_u16; count]);
+    let (into, half_into) = (floats.as_mut_ptr(), halves.as_mut_ptr());
+    // SAFETY: memory of that size, and a place for the truth value.
+    unsafe {
+        match (submits, half) {
+            (false, false) => done(tumble_crowd_evaluate(crowd, values, into, count)),
+            (false, true) => done(tumble_crowd_evaluate_half(crowd, values, half_into, count)),
+            (true, _) => {
+                done(tumble_crowd_submit(crowd, values, half.into()));
+                let mut is_done = false;
+                while !is_done {
+                    done(tumble_crowd_poll(crowd, &raw mut is_done));
+                }
+                match half {
+                    false => done(tumble_crowd_wait(crowd, into, count)),
+                    true => done(tumble_crowd_wait_half(crowd, half_into, count)),
+                }
+            }
+        }
+    }
+    match half {
+        false => floats.into_iter().map(f32::to_bits).collect(),
+        true => halves.into_iter().map(u32::from).collect(),
+    }
+}
+
+/// The same by the engine.
+pub(super) fn own_bits(crowd: &mut Crowd, output: CrowdOutput) -> Vec<u32> {
+    let len = crowd.output_len(output);
+    match output.is_half {
+        false => {
+            let mut found = vec![[f32::NAN; 4]; len];
+            crowd.evaluate_into(output.values, &mut found).unwrap();
+            found.as_flattened().iter().map(|x| x.to_bits()).collect()
+        }
+        true => {
+            let mut found = vec![[0xffff; 4]; len];
+            crowd.evaluate_half_into(output.values, &mut found).unwrap();
+            found.as_flattened().iter().map(|&x| x.into()).collect()
+        }
+    }
+}
+
+/// The CPU, and the first Vulkan device where there is one.
+pub(super) fn engines() -> Vec<*mut TumbleEngine> {
+    let has_vulkan = Device::list().is_ok_and(|devices| !devices.is_empty());
+    assert!(
+        has_vulkan || std::env::var_os("CI").is_none(),
+        "CI must have a Vulkan device"
+    );
+    let mut engines = vec![cpu()];
+    if has_vulkan {
+        let mut engine = null_mut();
+        // SAFETY: text, null and a place for the handle.
+        done(unsafe { tumble_engine_open(c"vulkan".as_ptr(), null(), &raw mut engine) });
+        engines.push(engine);
+    } else {
+        eprintln!("NO VULKAN DEVICE: the CPU alone was compared");
+    }
+    engines
+}
+
+#[test]
+fn crowds_have_the_bits_of_the_engines() {
+    let shape = (37, 3);
+    let (library, own) = libraries();
+    assert_eq!(tumble_crowd_library_clip_count(library), own.clips());
+    assert_eq!(
+        tumble_crowd_library_clip_ticks(library, 1),
+        own.ticks(1).unwrap()
+    );
+    assert_eq!(tumble_crowd_library_ticks_per_second(library), 705_600);
+    let outputs = ALL.map(|values| [CrowdOutput::from(values), CrowdOutput::half(values)]);
+    for engine in engines() {
+        let mut expected = own_crowd(&own, shape);
+        let crowd = c_crowd(engine, library, shape);
+        for frame in 0..3 {
+            let both = plays(frame, shape);
+            let layers: Vec<TumbleCrowdLayer> = both.iter().map(|own| own.0).collect();
+            done(set_layers(crowd, &layers));
+            for (layer, plays) in both {
+                expected.set(layer.instance, layer.layer, plays).unwrap();
+            }
+            match frame {
+                2 => {
+                    done(tumble_crowd_set_clock(crowd, 1 << 40));
+                    expected.set_clock(1 << 40).unwrap();
+                }
+                _ => {
+                    done(tumble_crowd_advance(crowd, 0.1));
+                    expected.advance(0.1).unwrap();
+                }
+            }
+            for output in outputs.as_flattened() {
+                let wanted = own_bits(&mut expected, *output);
+                for submits in [false, true] {
+                    assert!(
+                        bits(crowd, *output, submits) == wanted,
+                        "{output:?}, frame {frame}"
+                    );
+                }
+            }
+        }
+        let mut told = TumbleCrowdLayer {
+            instance: 5,
+            layer: 1,
+            ..still()
+        };
+        let (mut tick, mut clock) = (0, 0);
+        // SAFETY: a structure, and places for the numbers.
+        unsafe {
+            done(tumble_crowd_get(crowd, &raw mut told));
+            done(tumble_crowd_tick(crowd, 5, 1, &raw mut tick));
+            done(tumble_crowd_clock(crowd, &raw mut clock));
+        }
+        let plays = told.change(0).unwrap();
+        assert_eq!(plays, (5, 1, expected.get(5, 1).unwrap()));
+        assert_eq!(tick, expected.tick(5, 1).unwrap());
+        assert_eq!(clock, 1 << 40);
+        // A crowd needs neither its engine nor its library.
+        done(tumble_engine_free(engine));
+        let output = CrowdOutput::from(CrowdValues::Model);
+        assert!(bits(crowd, output, false) == own_bits(&mut expected, output));
+        done(tumble_crowd_free(crowd));
+    }
+    done(tumble_crowd_library_free(library));
+}
+
+pub(super) fn own_crowd(library: &CrowdLibrary, (instances, layers): (usize, usize)) -> Crowd {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    engine.crowd(library, instances, layers).unwrap()
+}
+
+/// Threads that set and evaluate one crowd at once are served one after another; one that frees it ends
+/// nobody's call.
+#[test]
+fn crowds_may_be_used_by_threads() {
+    let shape = (64, 2);
+    let (library, own) = libraries();
+    let both = plays(0, shape);
+    let mut expected = own_crowd(&own, shape);
+    for (layer, plays) in &both {
+        expected.set(layer.instance, layer.layer, *plays).unwrap();
+    }
+    let output = CrowdOutput::from(CrowdValues::Skinning);
+    let expected = own_bits(&mut expected, output);
+    for engine in engines() {
+        let crowd = c_crowd(engine, library, shape);
+        let all: Vec<TumbleCrowdLayer> = both.iter().map(|own| own.0).collect();
+        let shared = crowd.addr();
+        let crowd_of = move || std::ptr::without_provenance_mut::<TumbleCrowd>(shared);
+        std::thread::scope(|scope| {
+            for part in all.chunks(32) {
+                scope.spawn(move || {
+                    for layer in part {
+                        done(set_layers(crowd_of(), &[*layer]));
+                        assert_eq!(bits(crowd_of(), output, false).len(), 64 * 4 * 12);
+                    }
+                });
+            }
+        });
+        assert!(bits(crowd, output, false) == expected);
+        let count = count(crowd, output.values);
+        std::thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(move || {
+                    let mut memory = vec![0.0; count];
+                    loop {
+                        let into = memory.as_mut_ptr();
+                        // SAFETY: memory of that size.
+                        match unsafe { tumble_crowd_evaluate(crowd_of(), 3, into, count) } {
+                            TumbleResult::Ok => {}
+                            TumbleResult::InvalidHandle => break,
+                            other => panic!("{other:?}: {}", words()),
+                        }
+                    }
+                });
+            }
+            scope.spawn(move || {
+                std::thread::yield_now();
+                done(tumble_crowd_free(crowd_of()));
+            });
+        });
+        done(tumble_engine_free(engine));
+    }
+}
+
+/// A call that ends in a panic leaves what its lock guards unknown: it is not used again.
+#[test]
+fn a_crowd_is_not_used_after_a_panic() {
+    let (library, _) = libraries();
+    let engine = cpu();
+    let crowd = c_crowd(engine, library, (1, 1));
+    let result = code(|| {
+        let crowd = handle::get(crowd)?;
+        let _state = crowd.lock()?;
+        panic!("on purpose")
+    });
+    assert_eq!(result, TumbleResult::Internal);
+    let result = tumble_crowd_advance(crowd, 0.1);
+    super::fails(
+        result,
+        TumbleResult::Internal,
+        "earlier call with this crowd",
+    );
+    done(tumble_crowd_free(crowd));
+    done(tumble_crowd_library_free(library));
+    done(tumble_engine_free(engine));
+}
