@@ -50,7 +50,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     let kind = sampler.kind();
     let latest = latest_times(spans);
     let mut found = Fitted {
-        pieces: Vec::with_capacity(3 * spans.len()),
+        pieces: Vec::with_capacity(2 * spans.len()),
         ends: vec![[[0.0; 4]; 2]; spans.len()],
     };
     let mut counts = vec![1u32; spans.len()];
@@ -60,7 +60,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
         cuts: 0,
     });
     let mut waiting: Vec<Waiting> = whole.collect();
-    prepared.segments.reserve(3 * spans.len());
+    prepared.segments.reserve(spans.len());
     let mut block: Vec<Waiting> = Vec::with_capacity(MOST);
     let mut own_spans: Vec<Span> = Vec::with_capacity(MOST);
     let mut lanes = Box::new(FittedLanes::NONE);
@@ -176,6 +176,7 @@ struct InFit<'a> {
 }
 
 impl InLanes for InFit<'_> {
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];

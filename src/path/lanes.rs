@@ -42,6 +42,7 @@ pub(crate) struct Directions<'a, const PLACES: usize> {
 }
 
 impl<const PLACES: usize> InLanes for Directions<'_, PLACES> {
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, two, three] = all::<L, 3>([0.0, 2.0, 3.0]);
@@ -123,6 +124,7 @@ impl Rolled {
 }
 
 impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one, two] = all::<L, 3>([0.0, 1.0, 2.0]);
@@ -259,18 +261,18 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
                 clenshaw(&roll, x).store(&mut angles[lane..]);
             }
             let own = sines_and_cosines(&angles);
-            let added = match self.rolls {
-                Some(rolls) => Some(sines_and_cosines(&rolls[place])),
-                None => None,
-            };
+            let mut added = [[0.0; MOST]; 2];
+            if let Some(rolls) = self.rolls {
+                added = sines_and_cosines(&rolls[place]);
+            }
             for lane in (0..self.count).step_by(L::COUNT) {
                 let middle = load::<L, 3>(&self.pieces.middle, lane);
                 let base = load::<L, 4>(&self.pieces.base, lane);
                 let way = load::<L, 3>(&self.ways[place], lane);
                 let turn = least_turn(middle, way);
                 let mut rotation = product(turn, about_z(base, load::<L, 2>(&own, lane)));
-                if let Some(added) = &added {
-                    rotation = about_z(rotation, load::<L, 2>(added, lane));
+                if self.rolls.is_some() {
+                    rotation = about_z(rotation, load::<L, 2>(&added, lane));
                 }
                 if let Some(body) = self.body {
                     rotation = product(rotation, all::<L, 4>(body));
@@ -311,8 +313,8 @@ fn clenshaw<R: Real>(coefficients: &[R; NODES + 1], x: R) -> R {
 #[inline(always)]
 fn sines_and_cosines(angles: &Row) -> [Row; 2] {
     let mut found = [[0.0; MOST]; 2];
-    for lane in 0..MOST {
-        (found[0][lane], found[1][lane]) = sine_cosine(0.5 * angles[lane]);
+    for (lane, angle) in angles.iter().enumerate() {
+        (found[0][lane], found[1][lane]) = sine_cosine(0.5 * angle);
     }
     found
 }

@@ -32,7 +32,7 @@ const BATCH: usize = 64;
 
 /// The most keys, beside those of one path, that are followed together: as many as fill the vector
 /// lanes, and whose numbers stay in a thread's cache.
-const TOGETHER: usize = 512;
+const TOGETHER: usize = 256;
 
 /// Prepared positions and rotations, and what is unusual about them.
 pub(crate) struct PreparedPaths {

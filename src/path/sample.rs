@@ -367,15 +367,13 @@ impl InLanes for ByKeys<'_> {
         for lane in (0..MOST).step_by(L::COUNT) {
             let [from, to, first, last, start, end] = lanes::load::<L, 6>(&self.times.0, lane);
             let width = to - from;
-            for place in 0..PLACES {
+            for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {
                     END => to,
-                    _ => from + width * L::Doubles::all(PARTS[place]),
+                    _ => from + width * L::Doubles::all(part),
                 };
                 let t = ((time - first) / (last - first)).larger(zero).smaller(one);
-                t.larger(start)
-                    .smaller(end)
-                    .store(&mut self.places[place][lane..]);
+                t.larger(start).smaller(end).store(&mut row[lane..]);
             }
         }
     }
