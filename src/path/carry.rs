@@ -4,7 +4,6 @@
 //! `A = [1 + m·w; m × w] / |·|` from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` from
 //! the middle on. Only the constant roll of a piece depends on the pieces before it.
 
-use std::cmp::Ordering;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
@@ -76,8 +75,11 @@ struct Unturned {
 
 /// The pieces of some stretches, before they are turned.
 pub(crate) struct Uncarried {
+    /// In the order in which they were found.
     pieces: Vec<Unturned>,
-    /// The first piece of each stretch, and the end of the last one's.
+    /// Their places in the order of stretches and parameters.
+    order: Vec<usize>,
+    /// Where in `order` the pieces of each stretch begin, and where those of the last one end.
     firsts: Vec<usize>,
 }
 
@@ -94,7 +96,8 @@ impl Uncarried {
             });
         }
         let mut counts = vec![1; stretches.len()];
-        let mut found: Vec<(usize, Unturned)> = Vec::with_capacity(stretches.len());
+        let mut pieces: Vec<Unturned> = Vec::with_capacity(stretches.len());
+        let mut found: Vec<Waiting> = Vec::with_capacity(stretches.len());
         let mut done = 0;
         while done < waiting.len() {
             let some = done..waiting.len().min(done + MOST);
@@ -111,12 +114,16 @@ impl Uncarried {
                     }
                     continue;
                 }
-                found.push((stretch, block.unturned(lane, from, to)));
+                pieces.push(block.unturned(lane, from, to));
+                found.push(waiting[place]);
             }
         }
+        let mut order: Vec<usize> = (0..pieces.len()).collect();
         if done > stretches.len() {
-            let order = |own: &(usize, Unturned)| (own.0, own.1.piece.from);
-            found.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap_or(Ordering::Equal));
+            order.sort_unstable_by(|&a, &b| {
+                let (a, b) = (&found[a], &found[b]);
+                a.stretch.cmp(&b.stretch).then(a.from.total_cmp(&b.from))
+            });
         }
         let mut firsts = Vec::with_capacity(stretches.len() + 1);
         firsts.push(0);
@@ -124,22 +131,30 @@ impl Uncarried {
             firsts.push(firsts[firsts.len() - 1] + count);
         }
         Self {
-            pieces: found.into_iter().map(|(_, own)| own).collect(),
+            pieces,
+            order,
             firsts,
         }
     }
 
+    /// The places of a stretch's pieces.
+    fn places(&self, stretch: usize) -> &[usize] {
+        &self.order[self.firsts[stretch]..self.firsts[stretch + 1]]
+    }
+
     /// The directions at both ends of a stretch.
     pub(crate) fn ends(&self, stretch: usize) -> [DVec3; 2] {
-        let own = &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]];
-        [own[0].ways[0], own[own.len() - 1].ways[1]]
+        let own = self.places(stretch);
+        let [first, last] = [own[0], own[own.len() - 1]].map(|place| &self.pieces[place]);
+        [first.ways[0], last.ways[1]]
     }
 
     /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
     /// end.
     pub(crate) fn carry(&self, stretch: usize, start: DQuat, pieces: &mut Vec<Piece>) -> DQuat {
         let mut rotation = start;
-        for own in &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]] {
+        for &place in self.places(stretch) {
+            let own = &self.pieces[place];
             let unrolled = own.turns[0].conjugate() * rotation;
             let base = unrolled * own.rolls[0];
             rotation = own.turns[1] * (base * own.rolls[1]);
@@ -189,15 +204,18 @@ impl Block {
                 lanes::set(&mut self.headings, lane, way);
             }
         }
+        let (mut centers, mut halves) = ([0.0; MOST], [0.0; MOST]);
         for lane in 0..MOST {
             let (from, to) = (self.from[lane], self.to[lane]);
-            let (center, half) = (0.5 * (from + to), 0.5 * (to - from));
-            for (place, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
-                place[lane] = center + half * node;
-            }
-            self.places[MIDDLE][lane] = center;
-            (self.places[FROM][lane], self.places[TO][lane]) = (from, to);
+            (centers[lane], halves[lane]) = (0.5 * (from + to), 0.5 * (to - from));
         }
+        for (row, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
+            for ((place, center), half) in row.iter_mut().zip(&centers).zip(&halves) {
+                *place = center + half * node;
+            }
+        }
+        self.places[MIDDLE] = centers;
+        (self.places[FROM], self.places[TO]) = (self.from, self.to);
         in_lanes(&mut Directions {
             count: waiting.len(),
             polynomials: &self.headings,

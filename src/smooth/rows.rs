@@ -161,20 +161,20 @@ impl Row<'_> {
 #[inline(always)]
 fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
     let [mut squares, mut sines, mut ratios] = [[0.0; LANES]; 3];
-    for i in 0..LANES {
+    for (i, square) in squares.iter_mut().enumerate() {
         let turn = pose_steps::turn(at(from, i), at(to, i));
-        squares[i] = pose_steps::square_of(turn);
+        *square = pose_steps::square_of(turn);
         put(found, i, turn);
     }
-    for i in 0..LANES {
-        sines[i] = root(squares[i]);
-        ratios[i] = reciprocal_root(squares[i]);
+    for ((square, sine), ratio) in squares.iter().zip(&mut sines).zip(&mut ratios) {
+        *sine = root(*square);
+        *ratio = reciprocal_root(*square);
     }
-    for i in 0..LANES {
-        ratios[i] = arc_tangent(sines[i], found[3][i]) * ratios[i];
+    for ((sine, cosine), ratio) in sines.iter().zip(&found[3]).zip(&mut ratios) {
+        *ratio *= arc_tangent(*sine, *cosine);
     }
-    for i in 0..LANES {
-        let step = pose_steps::scaled(at(found, i), squares[i], ratios[i]);
+    for (i, (square, ratio)) in squares.iter().zip(&ratios).enumerate() {
+        let step = pose_steps::scaled(at(found, i), *square, *ratio);
         put(found, i, step.map(canonical));
     }
 }
