@@ -10,9 +10,10 @@ use std::sync::LazyLock;
 use glam::{DQuat, DVec3};
 
 use crate::fit::double::fit::MOST;
-use crate::math::quaternion::sine_cosine;
-use crate::path::lanes::{Carried, Integrand, Row, Ways};
-use crate::path::route::{Route, Stretch};
+use crate::math::quaternion::{Quaternion, sine_cosine};
+use crate::path::lanes::{self, Directions, Polynomials, Rolled, Rolling, Row, at};
+use crate::path::route::{Heading, Route, Stretch};
+use crate::simd::dispatch::in_lanes;
 
 /// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
 pub(crate) const NODES: usize = 11;
@@ -28,26 +29,26 @@ const SHORTEST: f64 = 1e-12;
 const MOST_PIECES: usize = 1 << 14;
 
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
-/// k and degree j, 0 beyond the last degree.
+/// k and degree j.
 struct Chebyshev {
     nodes: [f64; NODES],
-    cosines: [Row; NODES],
+    cosines: [[f64; NODES]; NODES],
 }
 
 static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     let cosine =
         |j: usize, k: usize| sine_cosine(PI * j as f64 * (k as f64 + 0.5) / NODES as f64).1;
-    let own = |j, k| if j < NODES { cosine(j, k) } else { 0.0 };
     Chebyshev {
         nodes: std::array::from_fn(|k| cosine(1, k)),
-        cosines: std::array::from_fn(|k| std::array::from_fn(|j| own(j, k))),
+        cosines: std::array::from_fn(|k| std::array::from_fn(|j| cosine(j, k))),
     }
 });
 
-/// The lanes of a piece's middle and ends, behind those of the nodes.
-const MIDDLE: usize = NODES;
+/// The places of a piece's middle and ends, behind those of the nodes.
+pub(crate) const MIDDLE: usize = NODES;
 const FROM: usize = NODES + 1;
 const TO: usize = NODES + 2;
+const PLACES: usize = NODES + 3;
 
 /// A piece of a stretch.
 #[derive(Debug, Clone)]
@@ -61,138 +62,233 @@ pub(crate) struct Piece {
     pub(crate) roll: [f64; NODES + 1],
 }
 
-/// Carries a rotation along a stretch: its pieces, and the rotation at the end.
-pub(crate) fn carry(route: &Route, stretch: &Stretch, start: DQuat) -> (Vec<Piece>, DQuat) {
-    let mut pieces = Vec::new();
-    let mut waiting = vec![(stretch.from, stretch.to)];
-    let mut rotation = start;
-    while let Some((from, to)) = waiting.pop() {
-        let (mut piece, fits, [first, last]) = Piece::new(route, stretch, from, to);
-        let middle = 0.5 * (from + to);
-        let is_finest = to - from <= SHORTEST || pieces.len() + waiting.len() >= MOST_PIECES;
-        if !fits && !is_finest && from < middle && middle < to {
-            waiting.extend([(middle, to), (from, middle)]);
-            continue;
-        }
-        let unrolled = least_turn(piece.middle, first).conjugate() * rotation;
-        piece.base = unrolled * about_z(-piece.roll(-1.0));
-        rotation = piece.rotation(last, to);
-        pieces.push(piece);
-    }
-    (pieces, rotation)
+/// A piece whose rotation is not known yet, and what turns one from its start to its end.
+struct Unturned {
+    piece: Piece,
+    /// The directions at its ends.
+    ways: [DVec3; 2],
+    /// The least turns to these from that at the middle.
+    turns: [DQuat; 2],
+    /// The rolls from the start to the middle, and from there to the end.
+    rolls: [DQuat; 2],
 }
 
-/// The rotations of a body at places of a stretch with these pieces, to which rolls are added.
-pub(crate) fn rotations(
-    route: &Route,
-    stretch: &Stretch,
-    pieces: &[Piece],
-    places: &Row,
-    rolls: &Row,
-    body: DQuat,
-) -> [Row; 4] {
-    let of = |t: f64| pieces.partition_point(|piece| piece.from <= t).max(1) - 1;
-    let ways = Ways::new(route, stretch, places);
-    let own = places.map(of);
-    let carried = |piece: usize| Carried {
-        piece: &pieces[piece],
-        ways: &ways,
-        places,
-        rolls,
-        body: body.to_array(),
-        rotations: [[0.0; MOST]; 4],
+/// The pieces of some stretches, before they are turned.
+pub(crate) struct Uncarried {
+    /// In the order in which they were found.
+    pieces: Vec<Unturned>,
+    /// Their places in the order of stretches and parameters.
+    order: Vec<usize>,
+    /// Where in `order` the pieces of each stretch begin, and where those of the last one end.
+    firsts: Vec<usize>,
+}
+
+impl Uncarried {
+    /// Cuts stretches of any paths into pieces in which the roll is exact.
+    pub(crate) fn new(stretches: &[(&Route, &Stretch)]) -> Self {
+        let mut block = Box::new(Block::NONE);
+        let mut waiting: Vec<Waiting> = Vec::with_capacity(stretches.len());
+        for (stretch, (_, own)) in stretches.iter().enumerate() {
+            waiting.push(Waiting {
+                stretch,
+                from: own.from,
+                to: own.to,
+            });
+        }
+        let mut counts = vec![1; stretches.len()];
+        let mut pieces: Vec<Unturned> = Vec::with_capacity(stretches.len());
+        let mut found: Vec<Waiting> = Vec::with_capacity(stretches.len());
+        let mut done = 0;
+        while done < waiting.len() {
+            let some = done..waiting.len().min(done + MOST);
+            done = some.end;
+            block.find(stretches, &waiting[some.clone()]);
+            for (lane, place) in some.enumerate() {
+                let Waiting { stretch, from, to } = waiting[place];
+                let middle = 0.5 * (from + to);
+                let is_finest = to - from <= SHORTEST || counts[stretch] > MOST_PIECES;
+                if !block.fits(lane) && !is_finest && from < middle && middle < to {
+                    counts[stretch] += 1;
+                    for (from, to) in [(from, middle), (middle, to)] {
+                        waiting.push(Waiting { stretch, from, to });
+                    }
+                    continue;
+                }
+                pieces.push(block.unturned(lane, from, to));
+                found.push(waiting[place]);
+            }
+        }
+        let mut order: Vec<usize> = (0..pieces.len()).collect();
+        if done > stretches.len() {
+            order.sort_unstable_by(|&a, &b| {
+                let (a, b) = (&found[a], &found[b]);
+                a.stretch.cmp(&b.stretch).then(a.from.total_cmp(&b.from))
+            });
+        }
+        let mut firsts = Vec::with_capacity(stretches.len() + 1);
+        firsts.push(0);
+        for count in counts {
+            firsts.push(firsts[firsts.len() - 1] + count);
+        }
+        Self {
+            pieces,
+            order,
+            firsts,
+        }
+    }
+
+    /// The places of a stretch's pieces.
+    fn places(&self, stretch: usize) -> &[usize] {
+        &self.order[self.firsts[stretch]..self.firsts[stretch + 1]]
+    }
+
+    /// The directions at both ends of a stretch.
+    pub(crate) fn ends(&self, stretch: usize) -> [DVec3; 2] {
+        let own = self.places(stretch);
+        let [first, last] = [own[0], own[own.len() - 1]].map(|place| &self.pieces[place]);
+        [first.ways[0], last.ways[1]]
+    }
+
+    /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
+    /// end.
+    pub(crate) fn carry(&self, stretch: usize, start: DQuat, pieces: &mut Vec<Piece>) -> DQuat {
+        let mut rotation = start;
+        for &place in self.places(stretch) {
+            let own = &self.pieces[place];
+            let unrolled = own.turns[0].conjugate() * rotation;
+            let base = unrolled * own.rolls[0];
+            rotation = own.turns[1] * (base * own.rolls[1]);
+            pieces.push(Piece {
+                base,
+                ..own.piece.clone()
+            });
+        }
+        rotation
+    }
+}
+
+/// A part of a stretch that waits to become a piece.
+#[derive(Clone, Copy)]
+struct Waiting {
+    stretch: usize,
+    from: f64,
+    to: f64,
+}
+
+/// Pieces that are found at once, one in each lane.
+struct Block {
+    from: Row,
+    to: Row,
+    headings: Polynomials,
+    places: [Row; PLACES],
+    ways: [[Row; 3]; PLACES],
+    changes: [[Row; 3]; PLACES],
+    rolled: Rolled,
+}
+
+impl Block {
+    const NONE: Self = Self {
+        from: [0.0; MOST],
+        to: [0.0; MOST],
+        headings: [[[0.0; MOST]; 3]; 4],
+        places: [[0.0; MOST]; PLACES],
+        ways: [[[0.0; MOST]; 3]; PLACES],
+        changes: [[[0.0; MOST]; 3]; PLACES],
+        rolled: Rolled::NONE,
     };
-    let mut found = carried(own[0]).find();
-    // Where places lie on several pieces, each piece gives the rotations of its own.
-    let [first, last] = [own.iter().min(), own.iter().max()].map(|piece| *piece.unwrap_or(&0));
-    for piece in (first..=last).filter(|piece| *piece != own[0] && own.contains(piece)) {
-        let other = carried(piece).find();
-        for lane in (0..MOST).filter(|&lane| own[lane] == piece) {
-            for (found, other) in found.iter_mut().zip(&other) {
-                found[lane] = other[lane];
-            }
-        }
-    }
-    found
-}
 
-impl Piece {
-    /// A piece without its rotation, whether its roll is exact, and the directions at its ends.
-    fn new(route: &Route, stretch: &Stretch, from: f64, to: f64) -> (Self, bool, [DVec3; 2]) {
-        let (center, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let mut places = [center; MOST];
-        for (place, node) in places.iter_mut().zip(&CHEBYSHEV.nodes) {
-            *place = center + half * node;
-        }
-        (places[FROM], places[TO]) = (from, to);
-        let ways = Ways::new(route, stretch, &places);
-        let [middle, first, last] = [MIDDLE, FROM, TO].map(|lane| DVec3::from(ways.at(lane)));
-        let mut integrand = Integrand {
-            ways: &ways,
-            middle: middle.to_array(),
-            half,
-            cosines: &CHEBYSHEV.cosines,
-            to_middle: [0.0; MOST],
-            coefficients: [0.0; MOST],
-        };
-        integrand.find();
-        let least = integrand.to_middle[..NODES]
-            .iter()
-            .fold(1.0f64, |a, &b| a.min(b));
-        let own = &integrand.coefficients[..NODES];
-        // The integral of T_j is (T_{j+1}/(j+1) - T_{j-1}/(j-1))/2.
-        let mut roll: [f64; NODES + 1] = std::array::from_fn(|j| {
-            let next = own.get(j + 1).copied().unwrap_or(0.0);
-            if j == 0 {
-                0.0
-            } else {
-                (own[j - 1] - next) / (2 * j) as f64
+    fn find(&mut self, stretches: &[(&Route, &Stretch)], waiting: &[Waiting]) {
+        for (lane, own) in waiting.iter().enumerate() {
+            (self.from[lane], self.to[lane]) = (own.from, own.to);
+            if let Heading::Polynomial(way) = &stretches[own.stretch].1.heading {
+                lanes::set(&mut self.headings, lane, way);
             }
+        }
+        let (mut centers, mut halves) = ([0.0; MOST], [0.0; MOST]);
+        for lane in 0..MOST {
+            let (from, to) = (self.from[lane], self.to[lane]);
+            (centers[lane], halves[lane]) = (0.5 * (from + to), 0.5 * (to - from));
+        }
+        for (row, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
+            for ((place, center), half) in row.iter_mut().zip(&centers).zip(&halves) {
+                *place = center + half * node;
+            }
+        }
+        self.places[MIDDLE] = centers;
+        (self.places[FROM], self.places[TO]) = (self.from, self.to);
+        in_lanes(&mut Directions {
+            count: waiting.len(),
+            polynomials: &self.headings,
+            places: &self.places,
+            ways: &mut self.ways,
+            changes: Some(&mut self.changes),
         });
-        let rest = own[NODES - 1].abs() + own[NODES - 2].abs();
-        // T_j(0) is 1, 0, -1, 0 and so on.
-        let at_middle: f64 = (2..=NODES)
-            .step_by(2)
-            .map(|j| if j % 4 == 0 { roll[j] } else { -roll[j] })
-            .sum();
-        roll[0] = -at_middle;
-        let piece = Self {
-            from,
-            to,
-            middle,
-            base: DQuat::IDENTITY,
-            roll,
-        };
-        let fits = least > 0.5 && rest <= TOLERANCE;
-        (piece, fits, [first, last])
-    }
-
-    /// ψ at x, from -1 to 1, by Clenshaw's recurrence.
-    fn roll(&self, x: f64) -> f64 {
-        let (mut next, mut own) = (0.0, 0.0);
-        for c in self.roll[1..].iter().rev() {
-            (next, own) = (own, c + 2.0 * x * own - next);
+        for (lane, own) in waiting.iter().enumerate() {
+            let (route, stretch) = stretches[own.stretch];
+            if let Heading::Polynomial(_) = stretch.heading {
+                continue;
+            }
+            for place in 0..PLACES {
+                let [way, change] = stretch.way(route, self.places[place][lane]);
+                for c in 0..3 {
+                    self.ways[place][c][lane] = way[c];
+                    self.changes[place][c][lane] = change[c];
+                }
+            }
         }
-        self.roll[0] + x * own - next
+        in_lanes(&mut Rolling {
+            count: waiting.len(),
+            ways: &self.ways,
+            changes: &self.changes,
+            from: &self.from,
+            to: &self.to,
+            cosines: &CHEBYSHEV.cosines,
+            own: &mut self.rolled,
+        });
     }
 
-    fn rotation(&self, way: DVec3, t: f64) -> DQuat {
-        let x = (2.0 * t - self.from - self.to) / (self.to - self.from).max(f64::MIN_POSITIVE);
-        let roll = about_z(self.roll(x.clamp(-1.0, 1.0)));
-        least_turn(self.middle, way) * (self.base * roll)
+    /// Whether the roll of a lane's piece is exact.
+    fn fits(&self, lane: usize) -> bool {
+        self.rolled.least[lane] > 0.5 && self.rolled.rest[lane] <= TOLERANCE
+    }
+
+    fn unturned(&self, lane: usize, from: f64, to: f64) -> Unturned {
+        let way = |place: usize| DVec3::from_array(at(&self.ways[place], lane));
+        let Rolled {
+            roll,
+            turns,
+            halves,
+            ..
+        } = &self.rolled;
+        let roll_of = |end: usize| {
+            let [sine, cosine] = at(&halves[end], lane);
+            DQuat::from_xyzw(0.0, 0.0, sine, cosine)
+        };
+        let turn = |end: usize| turn_of(at(&turns[end], lane));
+        Unturned {
+            piece: Piece {
+                from,
+                to,
+                middle: way(MIDDLE),
+                base: DQuat::IDENTITY,
+                roll: at(roll, lane),
+            },
+            ways: [way(FROM), way(TO)],
+            turns: [turn(0), turn(1)],
+            rolls: [roll_of(0), roll_of(1)],
+        }
     }
 }
 
 /// The turn by the least angle from one direction to another that is not opposite.
 pub(crate) fn least_turn(from: DVec3, to: DVec3) -> DQuat {
-    let axis = from.cross(to);
-    let own = DQuat::from_xyzw(axis.x, axis.y, axis.z, 1.0 + from.dot(to));
-    let length = own.length();
-    if length > 0.0 {
-        own / length
-    } else {
-        DQuat::IDENTITY
-    }
+    turn_of(lanes::least_turn(from.to_array(), to.to_array()))
+}
+
+/// A turn, or none where numbers overflow.
+fn turn_of(turn: Quaternion) -> DQuat {
+    let turn = DQuat::from_array(turn);
+    if turn.is_nan() { DQuat::IDENTITY } else { turn }
 }
 
 /// The rotation carried over a corner: by the least turn, and where the direction is reversed by half

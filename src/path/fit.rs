@@ -1,25 +1,17 @@
-//! Fits what is sampled along a path by the polynomials that the kernels evaluate, cut in two until
+//! Fits what is sampled along paths by the polynomials that the kernels evaluate, cut in two until
 //! they do.
 
-use bytemuck::Zeroable;
-
-use crate::fit::double::fit::{MOST, Samples, TOLERANCE, interpolate};
+use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
 use crate::fit::nodes::FULL_NODES;
-use crate::math::canonical::{canonical, round_quat};
-use crate::path::lanes::Row;
+use crate::math::canonical::round_quat;
+use crate::math::quaternion::{Quaternion, Real, dot};
+use crate::path::lanes::{Row, at, load};
+use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
-use crate::time::spans::{NONE, Source};
-
-/// Pairs of nodes.
-const PAIRS: usize = 5;
-
-/// The places of a span's samples: its nodes, pair by pair, then its middle and its ends.
-const MIDDLE: usize = 2 * PAIRS;
-const START: usize = MIDDLE + 1;
-const END: usize = MIDDLE + 2;
+use crate::simd::lanes::{Doubles, Lanes, canonical};
+use crate::time::spans::Source;
 
 /// How often a span is cut in two: what then does not fit is shorter than the resolution of time,
 /// and its middle stands for it.
@@ -35,246 +27,253 @@ const LARGEST: f64 = 2.5e-7;
 /// The part of the latest time that the rounding of times, and of lengths made of them, may hide.
 const UNKNOWN: f64 = 64.0 * f64::EPSILON;
 
-/// What is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// Unit quaternions of either sign.
-    Rotation,
-    /// Vectors of any length.
-    Vector,
+/// What gives the values of paths.
+pub(crate) struct Fitted {
+    /// Pieces of spans in order: the span's place in the list, when the piece starts, and what gives
+    /// its values.
+    pub(crate) pieces: Vec<(u32, f64, Source)>,
+    /// The values at the start and at the end of each span of the list.
+    pub(crate) ends: Vec<[Quaternion; 2]>,
 }
 
-/// A part of a path's time, from one time to another, on one stretch.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
-    pub(crate) stretch: usize,
-    pub(crate) from: f64,
-    pub(crate) to: f64,
+/// A span, or a part of one, that waits to be fitted.
+#[derive(Clone, Copy)]
+struct Waiting {
+    span: Span,
+    /// The place of the whole span in the list.
+    own: u32,
+    cuts: u32,
 }
 
-/// Gives the values on a stretch at some times: a row for each component.
-pub(crate) type Sample<'a> = dyn Fn(usize, &Row) -> [Row; 4] + 'a;
-
-/// The value on a stretch at one time.
-pub(crate) fn value_at(sample: &Sample<'_>, stretch: usize, time: f64) -> [f64; 4] {
-    sample(stretch, &[time; MOST]).map(|row| row[0])
-}
-
-/// Fits spans of a path, given in order, and adds them to what is prepared.
-pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], kind: Kind, sample: &Sample<'_>) {
-    let whole = spans.iter().enumerate().rev();
-    let mut waiting: Vec<(Span, u32, usize)> = whole.map(|(i, &span)| (span, 0, i)).collect();
-    let mut pieces = vec![1u32; spans.len()];
-    let ends = [spans.first(), spans.last()].into_iter().flatten();
-    let latest = ends.fold(0.0f64, |latest, span| {
-        latest.max(span.from.abs()).max(span.to.abs())
+/// Fits spans of paths, and adds their segments and constants to what is prepared.
+pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler<'_>) -> Fitted {
+    let kind = sampler.kind();
+    let latest = latest_times(spans);
+    let mut found = Fitted {
+        pieces: Vec::with_capacity(2 * spans.len()),
+        ends: vec![[[0.0; 4]; 2]; spans.len()],
+    };
+    let mut counts = vec![1u32; spans.len()];
+    let whole = (0..spans.len()).rev().map(|own| Waiting {
+        span: spans[own],
+        own: own as u32,
+        cuts: 0,
     });
-    let mut done: Vec<(f64, Source)> = Vec::with_capacity(spans.len());
+    let mut waiting: Vec<Waiting> = whole.collect();
+    prepared.segments.reserve(spans.len());
+    let mut block: Vec<Waiting> = Vec::with_capacity(MOST);
+    let mut own_spans: Vec<Span> = Vec::with_capacity(MOST);
+    let mut lanes = Box::new(FittedLanes::NONE);
     while !waiting.is_empty() {
-        let block = waiting.split_off(waiting.len().saturating_sub(MOST));
-        let segments = &mut prepared.segments.polynomials;
-        let mut fitted = Fitted::new(kind, &block, sample, segments);
-        in_lanes(&mut fitted);
-        let Fitted {
-            tails,
+        block.clear();
+        block.extend(waiting.drain(waiting.len().saturating_sub(MOST)..));
+        own_spans.clear();
+        own_spans.extend(block.iter().map(|own| own.span));
+        let samples = sampler.sample(&own_spans);
+        in_lanes(&mut InFit {
+            count: block.len(),
+            kind,
             samples,
-            units,
-            places,
-            ..
-        } = fitted;
-        for (lane, &(span, cuts, own)) in block.iter().enumerate() {
-            let segment = &mut segments[places[lane]];
-            for own in &mut segment.coefficients {
-                *own = own.map(|c| canonical(c * units[lane]));
+            own: &mut lanes,
+        });
+        for (lane, own) in block.iter().enumerate() {
+            let Waiting { span, cuts, .. } = *own;
+            let place = own.own as usize;
+            if cuts == 0 {
+                found.ends[place] = [START, END].map(|end| at(&samples[end], lane));
             }
-            let middle = span.from + 0.5 * (span.to - span.from);
+            let width = span.to - span.from;
+            let middle = span.from + 0.5 * width;
             let is_finest = cuts == MOST_CUTS
-                || pieces[own] == MOST_PIECES
+                || counts[place] == MOST_PIECES
                 || middle <= span.from
                 || middle >= span.to;
             // A time is known within its own rounding, which is more of a shorter span.
-            let known = UNKNOWN * latest / (span.to - span.from);
-            let is_smooth =
-                samples.is_smooth[lane] && f64::from(tails[lane]) <= f64::from(TOLERANCE) + known;
-            if is_smooth
-                && ends_fit(
-                    kind,
-                    segment,
-                    samples.ends[lane],
-                    (LARGEST + known) * f64::from(units[lane]),
-                )
-            {
-                done.push((span.from, Source::Segment(places[lane] as u32)));
+            let known = UNKNOWN * latest[span.path as usize] / width;
+            let source = if lanes.fits(lane, known) {
+                let segments = &mut prepared.segments.polynomials;
+                segments.push(lanes.segments[lane]);
+                Source::Segment(segments.len() as u32 - 1)
             } else if is_finest {
-                let value = round_quat(value_at(sample, span.stretch, middle));
-                *segment = PolynomialSegment::zeroed();
-                prepared.constants.push(value);
-                done.push((
-                    span.from,
-                    Source::Constant(prepared.constants.len() as u32 - 1),
-                ));
+                Source::Constant(prepared.constant(round_quat(at(&samples[MIDDLE], lane))))
             } else {
-                *segment = PolynomialSegment::zeroed();
-                pieces[own] += 1;
-                waiting.push((
-                    Span {
-                        from: middle,
-                        ..span
-                    },
-                    cuts + 1,
-                    own,
-                ));
-                waiting.push((Span { to: middle, ..span }, cuts + 1, own));
-            }
-        }
-    }
-    done.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (start, source) in done {
-        prepared.push_span(start, source, NONE);
-    }
-}
-
-/// Samples of curves in lanes, and what is made of them.
-struct Fitted<'a> {
-    count: usize,
-    samples: Lane,
-    units: [f32; MOST],
-    places: [usize; MOST],
-    tails: [f32; MOST],
-    segments: &'a mut Vec<PolynomialSegment>,
-}
-
-struct Lane {
-    numbers: Samples<[f32; MOST], PAIRS>,
-    is_smooth: [bool; MOST],
-    /// The values at the start and the end of each span.
-    ends: [[[f64; 4]; 2]; MOST],
-}
-
-impl<'a> Fitted<'a> {
-    fn new(
-        kind: Kind,
-        block: &[(Span, u32, usize)],
-        sample: &Sample<'_>,
-        segments: &'a mut Vec<PolynomialSegment>,
-    ) -> Self {
-        let first = segments.len();
-        segments.resize(first + block.len(), PolynomialSegment::zeroed());
-        let mut own = Self {
-            count: block.len(),
-            samples: Lane {
-                numbers: Samples::all([0.0; MOST]),
-                is_smooth: [true; MOST],
-                ends: [[[0.0; 4]; 2]; MOST],
-            },
-            units: [1.0; MOST],
-            places: std::array::from_fn(|lane| first + lane.min(block.len())),
-            tails: [0.0; MOST],
-            segments,
-        };
-        for (lane, (span, ..)) in block.iter().enumerate() {
-            own.sample(kind, lane, *span, sample);
-        }
-        own
-    }
-
-    /// Samples a span in a unit near its largest value, a power of two.
-    fn sample(&mut self, kind: Kind, lane: usize, span: Span, sample: &Sample<'_>) {
-        let (from, width) = (span.from, span.to - span.from);
-        let mut times = [span.to; MOST];
-        times[START] = span.from;
-        times[MIDDLE] = from + width * 0.5;
-        for (k, node) in FULL_NODES.at.iter().enumerate() {
-            for (side, s) in [-f64::from(*node), f64::from(*node)]
-                .into_iter()
-                .enumerate()
-            {
-                times[2 * k + side] = from + width * (0.5 + s);
-            }
-        }
-        let rows = sample(span.stretch, &times);
-        let value = |place: usize| rows.map(|row| row[place]);
-        let between = value(MIDDLE);
-        let mut is_smooth = true;
-        let mut near = |value: [f64; 4]| {
-            if kind == Kind::Vector {
-                return value;
-            }
-            let cosine: f64 = value.iter().zip(between).map(|(a, b)| a * b).sum();
-            is_smooth &= cosine.abs() > 0.5;
-            if cosine < 0.0 {
-                value.map(|c| -c)
-            } else {
-                value
-            }
-        };
-        let pairs: [[[f64; 4]; 2]; PAIRS] =
-            std::array::from_fn(|k| [2 * k, 2 * k + 1].map(|place| near(value(place))));
-        let unit = match kind {
-            Kind::Rotation => 1.0,
-            Kind::Vector => {
-                let all = pairs.as_flattened().as_flattened().iter().chain(&between);
-                let largest = all.fold(0.0f64, |largest, c| largest.max(c.abs()));
-                if largest > 1e-30 {
-                    f64::from_bits(largest.to_bits() & (0x7ff << 52))
-                } else {
-                    1.0
+                counts[place] += 1;
+                let (mut first, mut second) = (*own, *own);
+                (first.span.to, second.span.from) = (middle, middle);
+                for mut half in [second, first] {
+                    half.cuts += 1;
+                    waiting.push(half);
                 }
-            }
-        };
-        // The unit is a power of two: its inverse is exact.
-        let scale = 1.0 / unit;
-        let Samples { middle, even, odd } = &mut self.samples.numbers;
-        for c in 0..4 {
-            middle[c][lane] = (between[c] * scale) as f32;
-            for (k, [before, after]) in pairs.iter().enumerate() {
-                let rise = (after[c] - between[c]) * scale;
-                let fall = (before[c] - between[c]) * scale;
-                even[k][c][lane] = (rise + fall) as f32;
-                odd[k][c][lane] = (rise - fall) as f32;
-            }
+                continue;
+            };
+            found.pieces.push((own.own, span.from, source));
         }
-        self.samples.is_smooth[lane] = is_smooth;
-        self.samples.ends[lane] = [START, END].map(value);
-        self.units[lane] = unit as f32;
+    }
+    (found.pieces).sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    found
+}
+
+/// The largest magnitude of the times of each path.
+fn latest_times(spans: &[Span]) -> Vec<f64> {
+    let paths = spans.last().map_or(0, |span| span.path as usize + 1);
+    let mut latest = vec![0.0f64; paths];
+    for span in spans {
+        let own = &mut latest[span.path as usize];
+        *own = own.max(span.from.abs()).max(span.to.abs());
+    }
+    latest
+}
+
+/// Polynomials through the samples of a block of spans.
+struct FittedLanes {
+    segments: [PolynomialSegment; MOST],
+    /// The powers of two near the largest values.
+    units: [f32; MOST],
+    /// Estimates of twice the truncation error, in units.
+    tails: [f32; MOST],
+    /// The errors at the ends.
+    errors: Row,
+    /// 1 where rotations turn too far for one polynomial, else 0.
+    are_far: Row,
+}
+
+impl FittedLanes {
+    const NONE: Self = Self {
+        segments: [PolynomialSegment {
+            coefficients: [[0.0; 4]; 2 * PAIRS + 1],
+        }; MOST],
+        units: [1.0; MOST],
+        tails: [0.0; MOST],
+        errors: [0.0; MOST],
+        are_far: [0.0; MOST],
+    };
+
+    /// Whether the polynomial of a lane is near its curve, of which this error cannot be known.
+    fn fits(&self, lane: usize, known: f64) -> bool {
+        self.are_far[lane] == 0.0
+            && f64::from(self.tails[lane]) <= f64::from(TOLERANCE) + known
+            && self.errors[lane] <= (LARGEST + known) * f64::from(self.units[lane])
     }
 }
 
-impl InLanes for Fitted<'_> {
+/// The segment of each lane.
+const LANES: [usize; MOST] = {
+    let mut lanes = [0; MOST];
+    let mut lane = 0;
+    while lane < MOST {
+        lanes[lane] = lane;
+        lane += 1;
+    }
+    lanes
+};
+
+/// Fits a block of spans.
+struct InFit<'a> {
+    count: usize,
+    kind: Kind,
+    samples: &'a Samples,
+    own: &'a mut FittedLanes,
+}
+
+impl InLanes for InFit<'_> {
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        // The lanes of the last vector that have no curve write to one more segment.
-        self.segments.push(PolynomialSegment::zeroed());
+        let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
         for lane in (0..self.count).step_by(L::COUNT) {
-            let mut places = [0; MOST];
-            places[..L::COUNT].copy_from_slice(&self.places[lane..lane + L::COUNT]);
-            let samples = self.samples.numbers.at::<L>(lane);
-            let tails = interpolate(false, &FULL_NODES, &samples, &places, self.segments);
-            tails.store(&mut self.tails[lane..lane + L::COUNT]);
+            let middle = load::<L, 4>(&self.samples[MIDDLE], lane);
+            let mut values = [[zero; 4]; 2 * PAIRS];
+            let mut is_far = zero;
+            let mut largest = zero;
+            for (value, samples) in values.iter_mut().zip(self.samples) {
+                *value = load::<L, 4>(samples, lane);
+                if self.kind == Kind::Vector {
+                    for c in 0..4 {
+                        largest = magnitude(value[c]).larger(largest);
+                    }
+                    continue;
+                }
+                // Of both signs the one nearer to the middle.
+                let cosine = dot(*value, middle);
+                is_far = L::Doubles::all(FAR).up_to(magnitude(cosine), is_far, one);
+                let sign = cosine.up_to(zero, -one, one);
+                for c in 0..4 {
+                    value[c] = value[c] * sign;
+                }
+            }
+            is_far.store(&mut self.own.are_far[lane..]);
+            let mut scales = [1.0; MOST];
+            if self.kind == Kind::Vector {
+                for c in 0..4 {
+                    largest = magnitude(middle[c]).larger(largest);
+                }
+                largest.store(&mut scales);
+                for (scale, unit) in scales.iter_mut().zip(&mut self.own.units[lane..]) {
+                    let own = power_of_two(*scale);
+                    // The inverse of a power of two is exact.
+                    (*scale, *unit) = (1.0 / own, own as f32);
+                }
+            }
+            let scale = L::Doubles::load(&scales);
+            let mut numbers = fit::Samples::<L, PAIRS>::all(L::all(0.0));
+            for c in 0..4 {
+                numbers.middle[c] = L::rounded(middle[c] * scale);
+                for k in 0..PAIRS {
+                    let rise = (values[2 * k + 1][c] - middle[c]) * scale;
+                    let fall = (values[2 * k][c] - middle[c]) * scale;
+                    numbers.even[k][c] = L::rounded(rise + fall);
+                    numbers.odd[k][c] = L::rounded(rise - fall);
+                }
+            }
+            let (mut powers, tails) = coefficients(false, &FULL_NODES, &numbers);
+            tails.store(&mut self.own.tails[lane..lane + L::COUNT]);
+            let unit = L::load(&self.own.units[lane..]);
+            for power in &mut powers {
+                for c in 0..4 {
+                    power[c] = power[c] * unit;
+                }
+                *power = canonical(*power);
+            }
+            let mut error = zero;
+            for (s, end) in [(-0.5, START), (0.5, END)] {
+                let expected = load::<L, 4>(&self.samples[end], lane);
+                let (mut off, mut off_negated, mut farthest) = (zero, zero, zero);
+                for c in 0..4 {
+                    let mut found = zero;
+                    for power in powers.iter().rev() {
+                        found = found * L::Doubles::all(s) + power[c].widened();
+                    }
+                    off = magnitude(found - expected[c]).larger(off);
+                    off_negated = magnitude(found + expected[c]).larger(off_negated);
+                    let own = L::Doubles::all(f64::MAX);
+                    farthest = magnitude(found).up_to(own, farthest, one);
+                }
+                if self.kind == Kind::Rotation {
+                    off = off.smaller(off_negated);
+                }
+                let infinite = L::Doubles::all(f64::INFINITY);
+                error = farthest.up_to(zero, off, infinite).larger(error);
+            }
+            error.store(&mut self.own.errors[lane..]);
+            let places = &LANES[lane..lane + L::COUNT];
+            L::store_powers(&powers, &mut self.own.segments, places);
         }
-        self.segments.pop();
     }
 }
 
-/// Whether a polynomial is near the curve's values at both ends of its span.
-fn ends_fit(kind: Kind, segment: &PolynomialSegment, ends: [[f64; 4]; 2], largest: f64) -> bool {
-    [-0.5, 0.5].into_iter().zip(ends).all(|(s, expected)| {
-        let found: [f64; 4] = std::array::from_fn(|c| {
-            let powers = segment.coefficients.iter().rev();
-            powers.fold(0.0, |sum, power| sum * s + f64::from(power[c]))
-        });
-        let off = |sign: f64| {
-            let each = found
-                .iter()
-                .zip(expected)
-                .map(|(a, b)| (a - sign * b).abs());
-            each.fold(0.0f64, f64::max)
-        };
-        let least = if kind == Kind::Rotation {
-            off(1.0).min(off(-1.0))
-        } else {
-            off(1.0)
-        };
-        least <= largest && found.iter().all(|c| c.is_finite())
-    })
+/// The cosine of half the largest turn from the middle that one polynomial may fit, and a bit more.
+const FAR: f64 = 0.5f64.next_up();
+
+/// The largest power of two that a magnitude reaches; 1 if that is tiny.
+fn power_of_two(magnitude: f64) -> f64 {
+    if magnitude > 1e-30 {
+        f64::from_bits(magnitude.to_bits() & (0x7ff << 52))
+    } else {
+        1.0
+    }
+}
+
+#[inline(always)]
+fn magnitude<R: Real>(number: R) -> R {
+    number.larger(-number)
 }

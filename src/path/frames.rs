@@ -1,10 +1,11 @@
 //! The rotations of a body along its path.
 
-use glam::{DMat3, DQuat, DVec3};
+use std::ops::Range;
 
-use crate::fit::double::fit::MOST;
-use crate::path::carry::{Piece, about_z, around_corner, carry, least_turn, rotations};
-use crate::path::lanes::Row;
+use glam::{DQuat, DVec3, Vec3};
+
+use crate::path::axes;
+use crate::path::carry::{Piece, Uncarried, about_z, around_corner, least_turn};
 use crate::path::options::{Follow, FollowWarning, Frame, Twist};
 use crate::path::polynomial::Polynomial;
 use crate::path::rolls::{Rolls, is_half_turn, unwrapped, wrapped};
@@ -12,8 +13,8 @@ use crate::path::route::{Heading, Route, Stretch, signed};
 
 /// What gives the rotations of a stretch.
 enum Turn {
-    /// A carried frame with its pieces, and the place of the rolls added to it.
-    Carried(Vec<Piece>, usize),
+    /// A carried frame with the places of its pieces, and that of the rolls added to it.
+    Carried(Range<usize>, usize),
     /// The x axis is this polynomial's direction. Within the given distance of the upward direction
     /// it has none, and the axis before is kept.
     Fixed(Option<Polynomial>, DVec3),
@@ -26,6 +27,8 @@ pub(crate) struct Frames {
     pub(crate) route: Route,
     pub(crate) stretches: Vec<Stretch>,
     turns: Vec<Turn>,
+    /// The pieces of all carried frames.
+    pieces: Vec<Piece>,
     rolls: Vec<Rolls>,
     up: DVec3,
     body: DQuat,
@@ -42,19 +45,22 @@ const UPRIGHT: f64 = 1e-6;
 const INFLECTED: f64 = 1e-7;
 
 impl Frames {
-    /// The rotations of a body on the `track`th path, which has upward directions at some keys.
+    /// The rotations of a body on the `track`th path, which has upward directions at some keys. The
+    /// stretches of minimal frames are the next of those that wait to be carried.
     pub(crate) fn new(
-        route: Route,
-        stretches: Vec<Stretch>,
+        (route, stretches): (Route, Vec<Stretch>),
         follow: &Follow,
-        ups: &[Option<DVec3>],
+        ups: &[Option<Vec3>],
         track: usize,
+        (uncarried, next): (&Uncarried, &mut usize),
         warnings: &mut Vec<FollowWarning>,
     ) -> Self {
+        let count = stretches.len();
         let mut own = Self {
             route,
             stretches,
-            turns: Vec::new(),
+            turns: Vec::with_capacity(count),
+            pieces: Vec::new(),
             rolls: Vec::new(),
             up: follow.up.normalize(),
             body: follow.body(),
@@ -62,7 +68,10 @@ impl Frames {
         let mut left_over = 0.0;
         match follow.frame {
             Frame::Fixed => own.fix(),
-            Frame::Minimal => left_over = own.carry_all(follow, ups),
+            Frame::Minimal => {
+                left_over = own.carry_all(follow, ups, uncarried, *next);
+                *next += count;
+            }
             Frame::Frenet => own.frenet(),
         }
         if is_half_turn(left_over) && left_over != 0.0 {
@@ -71,19 +80,22 @@ impl Frames {
         own
     }
 
-    /// The rotations at places of a stretch, `x y z w`.
-    pub(crate) fn rotations(&self, stretch: usize, places: &Row) -> [Row; 4] {
-        let own = &self.stretches[stretch];
-        let side: &dyn Fn(DVec3, f64) -> DVec3 = match &self.turns[stretch] {
+    /// The pieces of a stretch with a carried frame, and the rolls added to them.
+    pub(crate) fn carried(&self, stretch: usize) -> Option<(&[Piece], &Rolls)> {
+        match &self.turns[stretch] {
             Turn::Carried(pieces, rolls) => {
-                let rolls = &self.rolls[*rolls];
-                let rolls = match rolls.are_spread() {
-                    true => places.map(|t| rolls.at(self.route.lengths.at(own.interval, t))),
-                    false => [rolls.at(0.0); MOST],
-                };
-                return rotations(&self.route, own, pieces, places, &rolls, self.body);
+                Some((&self.pieces[pieces.clone()], &self.rolls[*rolls]))
             }
-            Turn::Fixed(x, kept) => &move |way, t| {
+            _ => None,
+        }
+    }
+
+    /// What the x axis is to be near to at a place of a stretch whose frame is not carried, with the
+    /// direction there.
+    pub(crate) fn side(&self, stretch: usize, t: f64, way: DVec3) -> DVec3 {
+        let own = &self.stretches[stretch];
+        match &self.turns[stretch] {
+            Turn::Fixed(x, kept) => {
                 let is_upright = self.up.cross(way).length() < UPRIGHT;
                 let near_start = t - own.from < own.to - t || x.is_none();
                 match x {
@@ -91,18 +103,15 @@ impl Frames {
                     Some(x) => x.at(t),
                     None => self.up.cross(way),
                 }
-            },
-            Turn::Frenet(x) => &move |_, t| x.at(t),
-        };
-        let mut found = [[0.0; MOST]; 4];
-        for (lane, &t) in places.iter().enumerate() {
-            let way = own.way(&self.route, t)[0];
-            let rotation = of_axes(side(way, t), way) * self.body;
-            for (found, own) in found.iter_mut().zip(rotation.to_array()) {
-                found[lane] = own;
             }
+            Turn::Frenet(x) => x.at(t),
+            Turn::Carried(..) => DVec3::ZERO,
         }
-        found
+    }
+
+    /// The rotation of the body with such a side.
+    pub(crate) fn rotation(&self, side: DVec3, way: DVec3) -> DQuat {
+        of_axes(side, way) * self.body
     }
 
     /// Makes the y axis as near to the upward direction as it can be.
@@ -159,18 +168,18 @@ impl Frames {
 
     /// Carries a frame along the whole path, and spreads what given upward directions and the end of
     /// a closed path leave over. Returns the largest such angle.
-    fn carry_all(&mut self, follow: &Follow, ups: &[Option<DVec3>]) -> f64 {
-        let given = |key: usize| ups.get(key).copied().flatten();
-        let start = self.stretches[0].way(&self.route, self.stretches[0].from)[0];
+    fn carry_all(
+        &mut self,
+        follow: &Follow,
+        ups: &[Option<Vec3>],
+        uncarried: &Uncarried,
+        first_stretch: usize,
+    ) -> f64 {
+        let given = |key: usize| ups.get(key).copied().flatten().map(Vec3::as_dvec3);
+        let [start, _] = uncarried.ends(first_stretch);
         let first = first_rotation(given(0).unwrap_or(self.up), start);
-        let intervals = self.route.curves.len();
-        let starts: Vec<usize> = (0..intervals)
-            .map(|interval| {
-                self.stretches
-                    .partition_point(|own| own.interval < interval)
-            })
-            .collect();
         self.rolls.push(Rolls::default());
+        self.pieces.reserve(self.stretches.len());
         let mut points = vec![(0.0, 0.0)];
         let mut most = 0.0f64;
         let mut at_end = first;
@@ -181,34 +190,33 @@ impl Frames {
             most = most.max(wrapped(angle - near).abs());
             points.push((length, angle));
         };
+        let mut arriving = start;
+        let mut before = 0;
         for stretch in 0..self.stretches.len() {
-            let way = self.stretches[stretch].way(&self.route, self.stretches[stretch].from)[0];
+            let [way, end] = uncarried.ends(first_stretch + stretch);
             if stretch > 0 {
-                let before = &self.stretches[stretch - 1];
-                at_end = around_corner(at_end, before.way(&self.route, before.to)[0], way);
+                at_end = around_corner(at_end, arriving, way);
             }
             let interval = self.stretches[stretch].interval;
-            if stretch > 0
-                && starts[interval] == stretch
+            if interval > before
                 && let Some(up) = given(interval)
             {
                 let length = self.route.lengths.of(interval)[0];
                 give(&mut points, length, at_end, first_rotation(up, way));
             }
-            at_end = self.carry_one(stretch, at_end, 0);
+            at_end = self.carry_one(at_end, 0, (uncarried, first_stretch + stretch));
+            (arriving, before) = (end, interval);
         }
-        let last = &self.stretches[self.stretches.len() - 1];
-        let way = last.way(&self.route, last.to)[0];
-        if let Some(up) = given(intervals) {
+        if let Some(up) = given(self.route.curves.len()) {
             give(
                 &mut points,
                 self.route.lengths.total(),
                 at_end,
-                first_rotation(up, way),
+                first_rotation(up, arriving),
             );
         }
         if follow.is_closed() && follow.twist == Twist::Spread {
-            let arrived = around_corner(at_end, way, start);
+            let arrived = around_corner(at_end, arriving, start);
             give(&mut points, self.route.lengths.total(), arrived, first);
         }
         self.rolls[0] = Rolls::through(&points);
@@ -216,9 +224,15 @@ impl Frames {
     }
 
     /// Carries a rotation along a stretch, to which some rolls are added; returns it at the end.
-    fn carry_one(&mut self, stretch: usize, start: DQuat, rolls: usize) -> DQuat {
-        let (pieces, end) = carry(&self.route, &self.stretches[stretch], start);
-        self.turns.push(Turn::Carried(pieces, rolls));
+    fn carry_one(
+        &mut self,
+        start: DQuat,
+        rolls: usize,
+        (uncarried, place): (&Uncarried, usize),
+    ) -> DQuat {
+        let first = self.pieces.len();
+        let end = uncarried.carry(place, start, &mut self.pieces);
+        (self.turns).push(Turn::Carried(first..self.pieces.len(), rolls));
         end
     }
 
@@ -228,6 +242,10 @@ impl Frames {
         let normals: Vec<Option<Polynomial>> = (self.stretches.iter())
             .map(|own| self.normal(own))
             .collect();
+        // On straight parts turns are spread over the length.
+        if normals.iter().any(Option::is_none) && self.route.lengths.is_empty() {
+            self.route.measure();
+        }
         let mut before: Option<DQuat> = None;
         let mut stretch = 0;
         while stretch < self.stretches.len() {
@@ -259,11 +277,14 @@ impl Frames {
                 let own = &self.stretches[own];
                 lengths.at(own.interval, if at_end { own.to } else { own.from })
             });
+            let straight = self.stretches[stretch..end].iter();
+            let straight: Vec<_> = straight.map(|own| (&self.route, own)).collect();
+            let uncarried = Uncarried::new(&straight);
             for own in stretch..end {
                 if own > stretch {
                     rotation = around_corner(rotation, self.ends(own - 1)[1], self.ends(own)[0]);
                 }
-                rotation = self.carry_one(own, rotation, rolls);
+                rotation = self.carry_one(rotation, rolls, (&uncarried, own - stretch));
             }
             if let Some(Some(next)) = normals.get(end) {
                 let [way, _] = self.ends(end);
@@ -325,7 +346,7 @@ impl Frames {
 /// The rotation that takes z to a direction and x as near as possible to a side.
 fn of_axes(side: DVec3, way: DVec3) -> DQuat {
     let side = across(side, way);
-    DQuat::from_mat3(&DMat3::from_cols(side, way.cross(side), way)).normalize()
+    DQuat::from_array(axes::of_axes(side.to_array(), way.to_array()))
 }
 
 /// The part of a vector across a direction, of unit length.

@@ -1,243 +1,320 @@
-//! Directions and carried rotations at many places of a stretch at once, in vector lanes.
+//! Directions and carried rotations in vector lanes. A lane is a piece of a stretch, or a span of
+//! time on one, of as many paths as it takes to fill a block; all lanes take their places in turn.
 
 use crate::fit::double::fit::MOST;
 use crate::math::quaternion::{
-    Quaternion, Real, Vector, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
+    Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
-use crate::path::carry::{NODES, Piece};
+use crate::path::carry::{MIDDLE, NODES, Piece};
 use crate::path::polynomial::Polynomial;
-use crate::path::route::{Heading, NO_DIRECTION, Route, Stretch};
-use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::path::route::NO_DIRECTION;
+use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
 
-/// A number for each place.
+/// A number for each lane.
 pub(crate) type Row = [f64; MOST];
 
-/// Directions at places of a stretch, and their derivatives by the interval's parameter.
-pub(crate) struct Ways {
-    pub(crate) ways: [Row; 3],
-    pub(crate) changes: [Row; 3],
+/// Polynomials: the coefficients of 1, t, t², t³.
+pub(crate) type Polynomials = [[Row; 3]; 4];
+
+/// Sets the polynomial of a lane.
+pub(crate) fn set(polynomials: &mut Polynomials, lane: usize, own: &Polynomial) {
+    for (rows, power) in polynomials.iter_mut().zip(own.0) {
+        for (row, c) in rows.iter_mut().zip(power.to_array()) {
+            row[lane] = c;
+        }
+    }
 }
 
-impl Ways {
-    pub(crate) fn new(route: &Route, stretch: &Stretch, places: &Row) -> Self {
-        let mut own = Self {
-            ways: [[0.0; MOST]; 3],
-            changes: [[0.0; MOST]; 3],
-        };
-        if let Heading::Polynomial(vector) = &stretch.heading {
-            in_lanes(&mut OfPolynomial {
-                vector,
-                places,
-                own: &mut own,
-            });
-        } else {
-            for (lane, &place) in places.iter().enumerate() {
-                let [way, change] = stretch.way(route, place);
+/// The vector of a lane.
+pub(crate) fn at<const N: usize>(rows: &[Row; N], lane: usize) -> [f64; N] {
+    rows.map(|row| row[lane])
+}
+
+/// The directions of polynomials at places, and their derivatives if they are asked for.
+pub(crate) struct Directions<'a, const PLACES: usize> {
+    /// How many lanes there are.
+    pub(crate) count: usize,
+    pub(crate) polynomials: &'a Polynomials,
+    pub(crate) places: &'a [Row; PLACES],
+    pub(crate) ways: &'a mut [[Row; 3]; PLACES],
+    pub(crate) changes: Option<&'a mut [[Row; 3]; PLACES]>,
+}
+
+impl<const PLACES: usize> InLanes for Directions<'_, PLACES> {
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let [zero, two, three] = all::<L, 3>([0.0, 2.0, 3.0]);
+        let none = L::Doubles::all(NO_DIRECTION);
+        for lane in (0..self.count).step_by(L::COUNT) {
+            let mut powers = [[zero; 3]; 4];
+            for (power, rows) in powers.iter_mut().zip(self.polynomials) {
+                *power = load::<L, 3>(rows, lane);
+            }
+            for place in 0..PLACES {
+                let t = L::Doubles::load(&self.places[place][lane..]);
+                let mut vector = powers[3];
                 for c in 0..3 {
-                    (own.ways[c][lane], own.changes[c][lane]) = (way[c], change[c]);
+                    vector[c] =
+                        ((vector[c] * t + powers[2][c]) * t + powers[1][c]) * t + powers[0][c];
+                }
+                let length = square(vector).root();
+                // Written out here and below: closures are not always inlined.
+                let mut way = [zero; 3];
+                for c in 0..3 {
+                    way[c] = vector[c] / length;
+                    let own = length.up_to(none, zero, way[c]);
+                    own.store(&mut self.ways[place][c][lane..]);
+                }
+                let Some(changes) = &mut self.changes else {
+                    continue;
+                };
+                let mut change = [zero; 3];
+                for c in 0..3 {
+                    change[c] = (powers[3][c] * three * t + powers[2][c] * two) * t + powers[1][c];
+                }
+                let across = minus(change, scaled(way, dot3(way, change)));
+                for c in 0..3 {
+                    let own = length.up_to(none, zero, across[c] / length);
+                    own.store(&mut changes[place][c][lane..]);
                 }
             }
         }
-        own
-    }
-
-    /// The direction at one place.
-    pub(crate) fn at(&self, lane: usize) -> Vector {
-        self.ways.map(|row| row[lane])
     }
 }
 
-/// The directions of a polynomial.
-struct OfPolynomial<'a> {
-    vector: &'a Polynomial,
-    places: &'a Row,
-    own: &'a mut Ways,
+/// The rolls of pieces, and what turns a rotation from a piece's start to its end.
+pub(crate) struct Rolling<'a, const PLACES: usize> {
+    /// How many pieces there are.
+    pub(crate) count: usize,
+    /// Directions at the nodes, at [`MIDDLE`], at the start and at the end, and their derivatives.
+    pub(crate) ways: &'a [[Row; 3]; PLACES],
+    pub(crate) changes: &'a [[Row; 3]; PLACES],
+    pub(crate) from: &'a Row,
+    pub(crate) to: &'a Row,
+    /// `cosines[k][j]` is the Chebyshev polynomial of degree j at node k.
+    pub(crate) cosines: &'a [[f64; NODES]; NODES],
+    pub(crate) own: &'a mut Rolled,
 }
 
-impl InLanes for OfPolynomial<'_> {
+/// What is found of each piece.
+pub(crate) struct Rolled {
+    /// Chebyshev coefficients of the roll.
+    pub(crate) roll: [Row; NODES + 1],
+    /// The least cosine of the angles from the middle's direction.
+    pub(crate) least: Row,
+    /// The magnitudes of the integrand's last two coefficients.
+    pub(crate) rest: Row,
+    /// The least turns from the middle's direction to that at the start and at the end.
+    pub(crate) turns: [[Row; 4]; 2],
+    /// The sines and cosines of half the rolls from the start to the middle and from there to the
+    /// end.
+    pub(crate) halves: [[Row; 2]; 2],
+}
+
+impl Rolled {
+    pub(crate) const NONE: Self = Self {
+        roll: [[0.0; MOST]; NODES + 1],
+        least: [0.0; MOST],
+        rest: [0.0; MOST],
+        turns: [[[0.0; MOST]; 4]; 2],
+        halves: [[[0.0; MOST]; 2]; 2],
+    };
+}
+
+impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let [own, rise, bend, twist] = self.vector.0;
-        let powers = [
-            all::<L, 3>(own.to_array()),
-            all::<L, 3>(rise.to_array()),
-            all::<L, 3>(bend.to_array()),
-            all::<L, 3>(twist.to_array()),
-        ];
-        let [first, second, third, _] = self.vector.derivative().0;
-        let slopes = [
-            all::<L, 3>(first.to_array()),
-            all::<L, 3>(second.to_array()),
-            all::<L, 3>(third.to_array()),
-        ];
-        for lane in (0..MOST).step_by(L::COUNT) {
-            let t = L::Doubles::load(&self.places[lane..]);
-            let [mut vector, mut change] = [powers[3], slopes[2]];
-            for c in 0..3 {
-                vector[c] = ((vector[c] * t + powers[2][c]) * t + powers[1][c]) * t + powers[0][c];
-                change[c] = (change[c] * t + slopes[1][c]) * t + slopes[0][c];
-            }
-            let length = square(vector).root();
-            let (zero, none) = (L::Doubles::all(0.0), L::Doubles::all(NO_DIRECTION));
-            // Written out here and below: closures are not always inlined.
-            let mut way = [zero; 3];
-            for c in 0..3 {
-                way[c] = vector[c] / length;
-            }
-            let along = dot3(way, change);
-            let across = minus(change, scaled(way, along));
-            for c in 0..3 {
-                let change = across[c] / length;
-                (length.up_to(none, zero, way[c])).store(&mut self.own.ways[c][lane..]);
-                (length.up_to(none, zero, change)).store(&mut self.own.changes[c][lane..]);
-            }
-        }
-    }
-}
-
-/// The integrand of a piece's roll at places, and its Chebyshev coefficients.
-pub(crate) struct Integrand<'a> {
-    pub(crate) ways: &'a Ways,
-    /// The direction at the middle of the piece.
-    pub(crate) middle: Vector,
-    /// Half of the piece's length, in parameters.
-    pub(crate) half: f64,
-    /// `cosines[k][j]` is the Chebyshev polynomial of degree j at node k, 0 beyond the last degree.
-    pub(crate) cosines: &'a [Row; NODES],
-    /// The cosines of the angles to the middle's direction.
-    pub(crate) to_middle: Row,
-    pub(crate) coefficients: Row,
-}
-
-impl Integrand<'_> {
-    pub(crate) fn find(&mut self) {
-        in_lanes(self);
-    }
-}
-
-impl InLanes for Integrand<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let (middle, half) = (all::<L, 3>(self.middle), L::Doubles::all(self.half));
-        let mut values = [0.0; MOST];
-        for lane in (0..MOST).step_by(L::COUNT) {
-            let way = load::<L, 3>(&self.ways.ways, lane);
-            let change = load::<L, 3>(&self.ways.changes, lane);
-            let cosine = dot3(middle, way);
-            let rest = (L::Doubles::all(1.0) + cosine).larger(L::Doubles::all(1e-9));
-            let value = half * dot3(cross3(middle, way), change) / rest;
-            cosine.store(&mut self.to_middle[lane..]);
-            value.store(&mut values[lane..]);
-        }
-        for degree in (0..MOST).step_by(L::COUNT) {
-            let mut sum = L::Doubles::all(0.0);
-            for (value, cosines) in values.iter().zip(self.cosines) {
-                sum = sum + L::Doubles::all(*value) * L::Doubles::load(&cosines[degree..]);
-            }
-            let own = sum * L::Doubles::all(2.0) / L::Doubles::all(NODES as f64);
-            own.store(&mut self.coefficients[degree..]);
-        }
-    }
-}
-
-/// Numbers of lanes from `lane` on.
-#[inline(always)]
-fn load<L: Lanes, const N: usize>(rows: &[Row; N], lane: usize) -> [L::Doubles; N] {
-    let mut own = [L::Doubles::all(0.0); N];
-    for c in 0..N {
-        own[c] = L::Doubles::load(&rows[c][lane..]);
-    }
-    own
-}
-
-/// The same numbers in every lane.
-#[inline(always)]
-fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
-    let mut own = [L::Doubles::all(0.0); N];
-    for c in 0..N {
-        own[c] = L::Doubles::all(numbers[c]);
-    }
-    own
-}
-
-/// The rotations of a body at places of one piece of a stretch.
-pub(crate) struct Carried<'a> {
-    pub(crate) piece: &'a Piece,
-    pub(crate) ways: &'a Ways,
-    pub(crate) places: &'a Row,
-    /// Rolls added to those of the piece.
-    pub(crate) rolls: &'a Row,
-    /// The rotation from the body to z forward, y up.
-    pub(crate) body: Quaternion,
-    pub(crate) rotations: [Row; 4],
-}
-
-impl Carried<'_> {
-    pub(crate) fn find(mut self) -> [Row; 4] {
-        in_lanes(&mut self);
-        self.rotations
-    }
-}
-
-impl InLanes for Carried<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let piece = self.piece;
         let [zero, one, two] = all::<L, 3>([0.0, 1.0, 2.0]);
-        let [from, to] = all::<L, 2>([piece.from, piece.to]);
-        let width = L::Doubles::all((piece.to - piece.from).max(f64::MIN_POSITIVE));
-        let mut rolls = [[0.0; MOST], *self.rolls];
-        for lane in (0..MOST).step_by(L::COUNT) {
-            let t = L::Doubles::load(&self.places[lane..]);
-            let x = ((two * t - from - to) / width).larger(-one).smaller(one);
-            // Clenshaw's recurrence.
-            let (mut next, mut own) = (zero, zero);
-            for &c in piece.roll[1..].iter().rev() {
-                (next, own) = (own, L::Doubles::all(c) + two * x * own - next);
+        let mut angles = [[0.0; MOST]; 2];
+        for lane in (0..self.count).step_by(L::COUNT) {
+            let [from, to] = [
+                L::Doubles::load(&self.from[lane..]),
+                L::Doubles::load(&self.to[lane..]),
+            ];
+            let half = L::Doubles::all(0.5) * (to - from);
+            let middle = load::<L, 3>(&self.ways[MIDDLE], lane);
+            let mut least = one;
+            let mut values = [zero; NODES];
+            for (k, value) in values.iter_mut().enumerate() {
+                let way = load::<L, 3>(&self.ways[k], lane);
+                let change = load::<L, 3>(&self.changes[k], lane);
+                let cosine = dot3(middle, way);
+                let rest = (one + cosine).larger(L::Doubles::all(1e-9));
+                *value = half * dot3(cross3(middle, way), change) / rest;
+                least = cosine.smaller(least);
             }
-            let roll = L::Doubles::all(piece.roll[0]) + x * own - next;
-            roll.store(&mut rolls[0][lane..]);
+            least.store(&mut self.own.least[lane..]);
+            let mut own = [zero; NODES + 2];
+            for degree in 0..NODES {
+                let mut sum = zero;
+                for (value, cosines) in values.iter().zip(self.cosines) {
+                    sum = sum + *value * L::Doubles::all(cosines[degree]);
+                }
+                own[degree] = sum * two / L::Doubles::all(NODES as f64);
+            }
+            let [last, before] = [own[NODES - 1], own[NODES - 2]];
+            let rest = last.larger(-last) + before.larger(-before);
+            rest.store(&mut self.own.rest[lane..]);
+            // The integral of T_j is (T_{j+1}/(j+1) - T_{j-1}/(j-1))/2, and T_j(0) is 1, 0, -1, 0 and
+            // so on.
+            let mut roll = [zero; NODES + 1];
+            let mut at_middle = zero;
+            for j in 1..=NODES {
+                roll[j] = (own[j - 1] - own[j + 1]) / L::Doubles::all((2 * j) as f64);
+                if j % 2 == 0 {
+                    at_middle = at_middle + if j % 4 == 0 { roll[j] } else { -roll[j] };
+                }
+            }
+            roll[0] = -at_middle;
+            store(roll, &mut self.own.roll, lane);
+            let width = (to - from).larger(L::Doubles::all(f64::MIN_POSITIVE));
+            let x = ((two * to - from - to) / width).larger(-one).smaller(one);
+            (-clenshaw(&roll, -one)).store(&mut angles[0][lane..]);
+            clenshaw(&roll, x).store(&mut angles[1][lane..]);
+            for end in 0..2 {
+                let way = load::<L, 3>(&self.ways[MIDDLE + 1 + end], lane);
+                store(least_turn(middle, way), &mut self.own.turns[end], lane);
+            }
         }
-        let [sines, cosines] = halves(&rolls);
-        let base = all::<L, 4>(piece.base.to_array());
-        let middle = all::<L, 3>(piece.middle.to_array());
-        let body = all::<L, 4>(self.body);
-        for lane in (0..MOST).step_by(L::COUNT) {
-            let way = load::<L, 3>(&self.ways.ways, lane);
-            let own = [
-                L::Doubles::load(&sines[0][lane..]),
-                L::Doubles::load(&cosines[0][lane..]),
-            ];
-            let added = [
-                L::Doubles::load(&sines[1][lane..]),
-                L::Doubles::load(&cosines[1][lane..]),
-            ];
-            let [x, y, z] = cross3(middle, way);
-            let mut turn = [x, y, z, one + dot3(middle, way)];
-            let length = dot(turn, turn).root();
-            for (c, own) in turn.iter_mut().enumerate() {
-                let identity = if c == 3 { one } else { zero };
-                *own = length.up_to(zero, identity, *own / length);
+        for (angles, halves) in angles.iter().zip(&mut self.own.halves) {
+            *halves = sines_and_cosines(angles);
+        }
+    }
+}
+
+/// The pieces of some lanes.
+pub(crate) struct Pieces {
+    from: Row,
+    to: Row,
+    roll: [Row; NODES + 1],
+    middle: [Row; 3],
+    base: [Row; 4],
+}
+
+impl Pieces {
+    pub(crate) const NONE: Self = Self {
+        from: [0.0; MOST],
+        to: [0.0; MOST],
+        roll: [[0.0; MOST]; NODES + 1],
+        middle: [[0.0; MOST]; 3],
+        base: [[0.0; MOST]; 4],
+    };
+
+    /// Sets the piece of a lane.
+    pub(crate) fn set(&mut self, lane: usize, piece: &Piece) {
+        (self.from[lane], self.to[lane]) = (piece.from, piece.to);
+        for (row, c) in self.roll.iter_mut().zip(piece.roll) {
+            row[lane] = c;
+        }
+        for (row, c) in self.middle.iter_mut().zip(piece.middle.to_array()) {
+            row[lane] = c;
+        }
+        for (row, c) in self.base.iter_mut().zip(piece.base.to_array()) {
+            row[lane] = c;
+        }
+    }
+}
+
+/// The rotations of bodies at places of carried frames.
+pub(crate) struct Carried<'a, const PLACES: usize> {
+    /// How many lanes there are.
+    pub(crate) count: usize,
+    /// The pieces of the first place.
+    pub(crate) pieces: &'a mut Pieces,
+    /// From a place on, in order, a lane has another piece.
+    pub(crate) others: &'a [(usize, usize, &'a Piece)],
+    pub(crate) places: &'a [Row; PLACES],
+    pub(crate) ways: &'a [[Row; 3]; PLACES],
+    /// Rolls added to those of the pieces, if there are any.
+    pub(crate) rolls: Option<&'a [Row; PLACES]>,
+    /// The rotation from the body to z forward, y up, if it is not the identity.
+    pub(crate) body: Option<Quaternion>,
+    pub(crate) rotations: &'a mut [[Row; 4]; PLACES],
+}
+
+impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let [one, two] = all::<L, 2>([1.0, 2.0]);
+        let least_width = L::Doubles::all(f64::MIN_POSITIVE);
+        let mut others = self.others;
+        for place in 0..PLACES {
+            while let [(from, lane, piece), rest @ ..] = others
+                && *from <= place
+            {
+                self.pieces.set(*lane, piece);
+                others = rest;
             }
-            let carried = product(turn, about_z(base, own));
-            let rotation = product(about_z(carried, added), body);
-            for (own, row) in rotation.into_iter().zip(&mut self.rotations) {
-                own.store(&mut row[lane..]);
+            let mut angles = [0.0; MOST];
+            for lane in (0..self.count).step_by(L::COUNT) {
+                let [from, to] = [
+                    L::Doubles::load(&self.pieces.from[lane..]),
+                    L::Doubles::load(&self.pieces.to[lane..]),
+                ];
+                let t = L::Doubles::load(&self.places[place][lane..]);
+                let width = (to - from).larger(least_width);
+                let x = ((two * t - from - to) / width).larger(-one).smaller(one);
+                let roll = load::<L, { NODES + 1 }>(&self.pieces.roll, lane);
+                clenshaw(&roll, x).store(&mut angles[lane..]);
+            }
+            let own = sines_and_cosines(&angles);
+            let mut added = [[0.0; MOST]; 2];
+            if let Some(rolls) = self.rolls {
+                added = sines_and_cosines(&rolls[place]);
+            }
+            for lane in (0..self.count).step_by(L::COUNT) {
+                let middle = load::<L, 3>(&self.pieces.middle, lane);
+                let base = load::<L, 4>(&self.pieces.base, lane);
+                let way = load::<L, 3>(&self.ways[place], lane);
+                let turn = least_turn(middle, way);
+                let mut rotation = product(turn, about_z(base, load::<L, 2>(&own, lane)));
+                if self.rolls.is_some() {
+                    rotation = about_z(rotation, load::<L, 2>(&added, lane));
+                }
+                if let Some(body) = self.body {
+                    rotation = product(rotation, all::<L, 4>(body));
+                }
+                store(rotation, &mut self.rotations[place], lane);
             }
         }
     }
+}
+
+/// The turn by the least angle from one direction to another that is not opposite.
+#[inline(always)]
+pub(crate) fn least_turn<R: Real>(from: [R; 3], to: [R; 3]) -> [R; 4] {
+    let (zero, one) = (R::all(0.0), R::all(1.0));
+    let [x, y, z] = cross3(from, to);
+    let own = [x, y, z, one + dot3(from, to)];
+    let length = dot(own, own).root();
+    [
+        length.up_to(zero, zero, own[0] / length),
+        length.up_to(zero, zero, own[1] / length),
+        length.up_to(zero, zero, own[2] / length),
+        length.up_to(zero, one, own[3] / length),
+    ]
+}
+
+/// A sum of Chebyshev polynomials at x, from -1 to 1, by Clenshaw's recurrence.
+#[inline(always)]
+fn clenshaw<R: Real>(coefficients: &[R; NODES + 1], x: R) -> R {
+    let twice = R::all(2.0) * x;
+    let (mut next, mut own) = (R::all(0.0), R::all(0.0));
+    for &c in coefficients[1..].iter().rev() {
+        (next, own) = (own, c + twice * own - next);
+    }
+    coefficients[0] + x * own - next
 }
 
 /// The sines and cosines of half the angles.
 #[inline(always)]
-fn halves(angles: &[Row; 2]) -> [[Row; 2]; 2] {
-    let mut found = [[[0.0; MOST]; 2]; 2];
-    for (of, angles) in angles.iter().enumerate() {
-        for (lane, angle) in angles.iter().enumerate() {
-            let (sine, cosine) = sine_cosine(0.5 * angle);
-            (found[0][of][lane], found[1][of][lane]) = (sine, cosine);
-        }
+fn sines_and_cosines(angles: &Row) -> [Row; 2] {
+    let mut found = [[0.0; MOST]; 2];
+    for (lane, angle) in angles.iter().enumerate() {
+        (found[0][lane], found[1][lane]) = sine_cosine(0.5 * angle);
     }
     found
 }
@@ -251,4 +328,32 @@ fn about_z<R: Real>([x, y, z, w]: [R; 4], [sine, cosine]: [R; 2]) -> [R; 4] {
         w * sine + z * cosine,
         w * cosine - z * sine,
     ]
+}
+
+/// Numbers of lanes from `lane` on.
+#[inline(always)]
+pub(crate) fn load<L: Lanes, const N: usize>(rows: &[Row; N], lane: usize) -> [L::Doubles; N] {
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::Doubles::load(&rows[c][lane..]);
+    }
+    own
+}
+
+/// Stores numbers to lanes from `lane` on.
+#[inline(always)]
+pub(crate) fn store<D: Doubles, const N: usize>(own: [D; N], rows: &mut [Row; N], lane: usize) {
+    for c in 0..N {
+        own[c].store(&mut rows[c][lane..]);
+    }
+}
+
+/// The same numbers in every lane.
+#[inline(always)]
+fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::Doubles::all(numbers[c]);
+    }
+    own
 }

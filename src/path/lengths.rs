@@ -29,7 +29,7 @@ const FINEST: u32 = 24;
 impl Lengths {
     /// The lengths of curves with these slopes, which vanish at these parameters: their speed has a
     /// corner there.
-    pub(crate) fn new(slopes: Vec<Polynomial>, stops: &[Vec<f64>]) -> Self {
+    pub(crate) fn new<'a>(slopes: Vec<Polynomial>, stops: impl Iterator<Item = &'a [f64]>) -> Self {
         let mut own = Self {
             marks: Vec::with_capacity(slopes.len()),
             slopes,
@@ -51,6 +51,11 @@ impl Lengths {
             own.marks.push(marks);
         }
         own
+    }
+
+    /// Whether there are no intervals, or their lengths are not known yet.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.marks.is_empty()
     }
 
     /// The length of the whole path.

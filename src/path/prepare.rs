@@ -1,32 +1,38 @@
 //! Prepares the paths of a set: positions and rotations become segments, as those of other tracks.
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
-use crate::fit::double::fit::MOST;
 use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_curve::Curves;
-use crate::path::fit::{Kind, Sample, Span, fit, value_at};
+use crate::path::carry::Uncarried;
+use crate::path::fit::fit;
 use crate::path::frames::Frames;
-use crate::path::lanes::Row;
 use crate::path::options::{
     Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
 };
 use crate::path::polynomial::Polynomial;
-use crate::path::route::{Route, stretches};
+use crate::path::route::{Route, Stretch, stretches};
+use crate::path::sample::{Kind, Sampler, Span};
 use crate::path::schedule::Schedule;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
-use crate::time::spans::{NONE, Part};
+use crate::time::spans::{NONE, Part, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
 
 /// The number of paths that are prepared as one piece of work.
 const BATCH: usize = 64;
+
+/// The most keys, beside those of one path, that are followed together: as many as fill the vector
+/// lanes, and whose numbers stay in a thread's cache.
+const TOGETHER: usize = 256;
 
 /// Prepared positions and rotations, and what is unusual about them.
 pub(crate) struct PreparedPaths {
@@ -59,8 +65,11 @@ impl PreparedPaths {
         let batch = |first: usize| {
             let mut own = [&positions, &rotations].map(Prepared::new);
             let mut warnings = Vec::new();
-            for track in first..set.track_count().min(first + BATCH) {
-                add(&mut own, set, track, follow, &positions, &mut warnings)?;
+            let mut tracks = first..set.track_count().min(first + BATCH);
+            while !tracks.is_empty() {
+                let some = tracks.start..tracks.start + few(set, tracks.clone());
+                tracks.start = some.end;
+                add(&mut own, set, some, follow, &positions, &mut warnings)?;
             }
             Ok((own, warnings))
         };
@@ -78,6 +87,17 @@ impl PreparedPaths {
             warnings,
         })
     }
+}
+
+/// How many of some tracks, the first among them, have at most as many keys as are followed together.
+fn few(set: &TrackSet, tracks: Range<usize>) -> usize {
+    let mut keys = 0;
+    let fit = tracks.skip(1).take_while(|&track| {
+        let path = set.vectors(Channel::Translation, track);
+        keys += path.map_or(0, |path| path.keys.len());
+        keys <= TOGETHER
+    });
+    1 + fit.count()
 }
 
 /// The path of a track, checked.
@@ -111,181 +131,241 @@ fn route(path: &VectorTrack, follow: &Follow) -> Route {
     let spreads =
         follow.is_closed() && follow.twist == Twist::Spread && follow.frame == Frame::Minimal;
     let needs_lengths = spreads
-        || follow.frame == Frame::Frenet
         || follow.speed != PathSpeed::Keys
         || matches!(follow.direction, Direction::Ahead(_))
         || path.ups.iter().any(Option::is_some);
-    Route::new(
+    let mut route = Route::new(
         path.keys[0].as_dvec3(),
         polynomials.collect(),
         Schedule::new(follow.speed, &path.times),
         follow.is_closed(),
-        needs_lengths,
-    )
+    );
+    if needs_lengths {
+        route.measure();
+    }
+    route
 }
 
-/// Adds the positions and rotations of one track.
-fn add(
-    [positions, rotations]: &mut [Prepared; 2],
-    set: &TrackSet,
+/// The path of a track, with its stretches; without any if it stands still.
+struct Checked<'a> {
     track: usize,
+    path: &'a VectorTrack,
+    route: Route,
+    stretches: Option<Vec<Stretch>>,
+}
+
+impl<'a> Checked<'a> {
+    fn new(set: &'a TrackSet, track: usize, follow: &Follow) -> Result<Self, FollowError> {
+        let path = path_of(set, track, follow)?;
+        if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
+            return Err(FollowError::UpsUnused { track });
+        }
+        let route = route(path, follow);
+        // The body that others look at looks along its own path.
+        let direction = match follow.direction {
+            Direction::Track(target) if target == track => Direction::Tangent,
+            direction => direction,
+        };
+        let target = match direction {
+            Direction::Track(target) if target >= set.track_count() => {
+                return Err(FollowError::Target { track, target });
+            }
+            Direction::Track(target) => Some(self::route(path_of(set, target, follow)?, follow)),
+            _ => None,
+        };
+        let stretches = stretches(&route, direction, target.as_ref(), follow.speed);
+        Ok(Self {
+            track,
+            path,
+            route,
+            stretches,
+        })
+    }
+}
+
+/// A track, and the place of its path among those that move, with the number of its spans.
+struct Walk<'a> {
+    track: usize,
+    path: &'a VectorTrack,
+    moving: Option<(usize, usize)>,
+}
+
+/// Adds the positions and rotations of some tracks.
+fn add(
+    prepared: &mut [Prepared; 2],
+    set: &TrackSet,
+    tracks: Range<usize>,
     follow: &Follow,
     interpolation: &Interpolation,
     warnings: &mut Vec<FollowWarning>,
 ) -> Result<(), FollowError> {
-    let path = path_of(set, track, follow)?;
-    if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
-        return Err(FollowError::UpsUnused { track });
-    }
-    let own = route(path, follow);
-    // The body that others look at looks along its own path.
-    let direction = match follow.direction {
-        Direction::Track(target) if target == track => Direction::Tangent,
-        direction => direction,
-    };
-    let target = match direction {
-        Direction::Track(target) if target >= set.track_count() => {
-            return Err(FollowError::Target { track, target });
-        }
-        Direction::Track(target) => Some(route(path_of(set, target, follow)?, follow)),
-        _ => None,
-    };
-    let is_retimed = follow.speed != PathSpeed::Keys && own.lengths.total() > 0.0;
-    if !is_retimed {
-        vectors::add(
-            positions,
-            track,
-            Some(path),
-            Vec3::ZERO,
-            follow.method,
-            interpolation,
-        );
-    }
-    let (found, own) = match stretches(&own, direction, target.as_ref(), follow.speed) {
-        Some(found) => (found, own),
-        None => {
-            warnings.push(FollowWarning::StandsStill { track });
-            if is_retimed {
-                vectors::add(
-                    positions,
-                    track,
-                    Some(path),
-                    Vec3::ZERO,
-                    follow.method,
-                    interpolation,
-                );
-            }
-            add_still(rotations, track, path, follow);
-            return Ok(());
-        }
-    };
-    let ups: Vec<Option<DVec3>> = path.ups.iter().map(|up| up.map(Vec3::as_dvec3)).collect();
-    let frames = Frames::new(own, found, follow, &ups, track, warnings);
-    let route = &frames.route;
-    let mut spans: Vec<Span> = Vec::with_capacity(frames.stretches.len());
-    let (start, end) = route.schedule.span();
-    let stands = follow.speed != PathSpeed::Keys && !is_retimed;
-    for (stretch, own) in frames.stretches.iter().enumerate() {
-        let [from, to] = match stands {
-            true => [start, end],
-            false => {
-                [own.from, own.to].map(|t| route.schedule.time(&route.lengths, own.interval, t))
-            }
-        };
-        let to = if stretch + 1 == frames.stretches.len() {
-            end
+    let checked = tracks.map(|track| Checked::new(set, track, follow));
+    let checked = checked.collect::<Result<Vec<_>, _>>()?;
+    let minimal = (checked.iter()).filter(|_| follow.frame == Frame::Minimal);
+    let carried: Vec<(&Route, &Stretch)> = minimal
+        .flat_map(|own| (own.stretches.iter().flatten()).map(|stretch| (&own.route, stretch)))
+        .collect();
+    let uncarried = Uncarried::new(&carried);
+    let mut next = 0;
+    let (mut walks, mut paths, mut spans) = (Vec::new(), Vec::new(), Vec::new());
+    for own in checked {
+        let Checked { track, path, .. } = own;
+        let mut moving = None;
+        if let Some(stretches) = own.stretches {
+            let given = (&uncarried, &mut next);
+            let frames = Frames::new(
+                (own.route, stretches),
+                follow,
+                &path.ups,
+                track,
+                given,
+                warnings,
+            );
+            let first = spans.len();
+            add_spans(&mut spans, &frames, paths.len(), follow);
+            moving = Some((paths.len(), spans.len() - first));
+            paths.push(frames);
         } else {
-            to
-        };
-        let mut from = from;
+            warnings.push(FollowWarning::StandsStill { track });
+        }
+        walks.push(Walk {
+            track,
+            path,
+            moving,
+        });
+    }
+    let [positions, rotations] = prepared;
+    let adding = Adding {
+        walks: &walks,
+        paths: &paths,
+        follow,
+        interpolation,
+    };
+    adding.add(positions, &spans, Kind::Vector);
+    adding.add(rotations, &spans, Kind::Rotation);
+    Ok(())
+}
+
+/// Whether a body is where its speed says, and not where its keys do.
+fn is_retimed(route: &Route, follow: &Follow) -> bool {
+    follow.speed != PathSpeed::Keys && route.lengths.total() > 0.0
+}
+
+/// Whether a body stands on its path, of which it may turn all the same.
+fn stands(route: &Route, follow: &Follow) -> bool {
+    follow.speed != PathSpeed::Keys && !is_retimed(route, follow)
+}
+
+/// How many of a path's stretches are used.
+fn count_used(frames: &Frames, follow: &Follow) -> usize {
+    match stands(&frames.route, follow) {
+        true => 1,
+        false => frames.stretches.len(),
+    }
+}
+
+/// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
+fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize, follow: &Follow) {
+    let Frames {
+        route, stretches, ..
+    } = frames;
+    let (start, end) = route.schedule.span();
+    let (stands, count) = (stands(route, follow), count_used(frames, follow));
+    for (stretch, own) in stretches[..count].iter().enumerate() {
+        let time = |t: f64| (route.schedule).time(&route.lengths, own.interval, t);
+        let is_last = stretch + 1 == count;
+        let mut from = if stands { start } else { time(own.from) };
+        let to = if is_last { end } else { time(own.to) };
         for joint in route.schedule.joints(from..to).chain([to]) {
             if joint > from {
                 spans.push(Span {
-                    stretch,
+                    path: path as u32,
+                    stretch: stretch as u32,
                     from,
                     to: joint,
                 });
                 from = joint;
             }
         }
-        if stands {
-            break;
+    }
+}
+
+/// Adds the positions or the rotations of tracks.
+struct Adding<'a> {
+    walks: &'a [Walk<'a>],
+    paths: &'a [Frames],
+    follow: &'a Follow,
+    /// That of positions.
+    interpolation: &'a Interpolation,
+}
+
+impl Adding<'_> {
+    fn add(&self, prepared: &mut Prepared, spans: &[Span], kind: Kind) {
+        let follow = self.follow;
+        let is_fitted =
+            |path: usize| kind == Kind::Rotation || is_retimed(&self.paths[path].route, follow);
+        let own = spans.iter().copied();
+        let own: Vec<Span> = own.filter(|span| is_fitted(span.path as usize)).collect();
+        let mut sampler = Sampler::new(self.paths, kind, follow);
+        let fitted = fit(prepared, &own, &mut sampler);
+        let is_spread = follow.frame != Frame::Minimal || follow.twist == Twist::Spread;
+        let repeats = follow.is_closed() && (kind == Kind::Vector || is_spread);
+        let (mut pieces, mut next) = (&fitted.pieces[..], 0);
+        for walk in self.walks {
+            let Some((path, count)) = walk.moving.filter(|moving| is_fitted(moving.0)) else {
+                match kind {
+                    // Positions at the times of the keys are cubics already.
+                    Kind::Vector => vectors::add(
+                        prepared,
+                        walk.track,
+                        Some(walk.path),
+                        Vec3::ZERO,
+                        follow.method,
+                        self.interpolation,
+                    ),
+                    // A body that never moves looks along +z.
+                    Kind::Rotation => walk.add(prepared, &[], [follow.body().to_array(); 2], true),
+                }
+                continue;
+            };
+            let frames = &self.paths[path];
+            let (start, end) = frames.route.schedule.span();
+            let last = count_used(frames, follow) - 1;
+            let mut value = |stretch: usize, time: f64| {
+                // Most often a span begins or ends there.
+                let places = next..next + count;
+                for place in [places.clone().next(), places.last()].into_iter().flatten() {
+                    let span = own[place];
+                    let times = [span.from, span.to].into_iter();
+                    for (at, value) in times.zip(fitted.ends[place]) {
+                        if span.stretch as usize == stretch && at == time {
+                            return value;
+                        }
+                    }
+                }
+                sampler.value(path, stretch, time)
+            };
+            let values = [value(0, start), value(last, end)];
+            next += count;
+            let (now, rest) =
+                pieces.split_at(pieces.partition_point(|piece| (piece.0 as usize) < next));
+            pieces = rest;
+            walk.add(prepared, now, values, repeats);
         }
     }
-    let places = |stretch: usize, times: &Row| {
-        let own = &frames.stretches[stretch];
-        // Lanes that are left repeat the time before: finding a place by its length is dear.
-        let mut known = (f64::NAN, own.from);
-        times.map(|time| {
-            if !stands && time != known.0 {
-                let t = route.schedule.parameter(&route.lengths, own.interval, time);
-                known = (time, t.clamp(own.from, own.to));
-            }
-            known.1
-        })
-    };
-    if is_retimed {
-        let sample = |stretch: usize, times: &Row| {
-            let curve = &route.curves[frames.stretches[stretch].interval];
-            let all = places(stretch, times).map(|t| curve.at(t));
-            [0, 1, 2, 3].map(|c| all.map(|own| if c < 3 { own[c] } else { 0.0 }))
-        };
-        let ends = [(0, start), (frames.stretches.len() - 1, end)];
-        let part = Ends::new(
-            track,
-            path,
-            ends.map(|(stretch, time)| value_at(&sample, stretch, time)),
-        );
-        part.add(positions, &spans, Kind::Vector, &sample, follow.is_closed());
-    }
-    let sample = |stretch: usize, times: &Row| frames.rotations(stretch, &places(stretch, times));
-    let last = if stands {
-        0
-    } else {
-        frames.stretches.len() - 1
-    };
-    let ends = [(0, start), (last, end)].map(|(stretch, time)| value_at(&sample, stretch, time));
-    let ends = Ends::new(track, path, ends);
-    let repeats =
-        follow.is_closed() && (follow.frame != Frame::Minimal || follow.twist == Twist::Spread);
-    ends.add(rotations, &spans, Kind::Rotation, &sample, repeats);
-    Ok(())
 }
 
-/// Adds the rotation of a body that never moves: it looks along +z.
-fn add_still(rotations: &mut Prepared, track: usize, path: &VectorTrack, follow: &Follow) {
-    let value = follow.body().to_array();
-    let ends = Ends::new(track, path, [value; 2]);
-    let sample = |_: usize, _: &Row| value.map(|c| [c; MOST]);
-    ends.add(rotations, &[], Kind::Rotation, &sample, true);
-}
-
-/// A track's first and last values, which are held outside its times.
-struct Ends<'a> {
-    track: usize,
-    path: &'a VectorTrack,
-    values: [[f64; 4]; 2],
-}
-
-impl<'a> Ends<'a> {
-    fn new(track: usize, path: &'a VectorTrack, values: [[f64; 4]; 2]) -> Self {
-        Self {
-            track,
-            path,
-            values,
-        }
-    }
-
-    /// Adds the track's spans as a part. If it repeats, the last value is the first.
+impl Walk<'_> {
+    /// Adds a part with these pieces of spans. The first and last values are held outside its times;
+    /// if it repeats, the last is the first.
     fn add(
         &self,
         prepared: &mut Prepared,
-        spans: &[Span],
-        kind: Kind,
-        sample: &Sample<'_>,
+        pieces: &[(u32, f64, Source)],
+        values: [[f64; 4]; 2],
         repeats: bool,
     ) {
-        let [first, last] = self.values.map(round_quat);
+        let [first, last] = values.map(round_quat);
         let before = prepared.constant(first);
         let after = if repeats {
             before
@@ -293,7 +373,9 @@ impl<'a> Ends<'a> {
             prepared.constant(last)
         };
         let from = prepared.spans.len();
-        fit(prepared, spans, kind, sample);
+        for &(_, start, source) in pieces {
+            prepared.push_span(start, source, NONE);
+        }
         if let Some(key) = prepared.spans.keys.get_mut(from) {
             *key = before;
         }
@@ -306,6 +388,8 @@ impl<'a> Ends<'a> {
             after,
             beyond: None,
         });
-        debug_assert!(before != NONE);
     }
 }
+
+#[cfg(test)]
+mod tests;

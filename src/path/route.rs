@@ -15,9 +15,9 @@ pub(crate) struct Route {
     /// The positions of each interval.
     pub(crate) curves: Vec<Polynomial>,
     pub(crate) slopes: Vec<Polynomial>,
-    /// Where each interval's curve stops.
-    pub(crate) stops: Vec<Vec<f64>>,
-    /// Empty if nothing asks for them.
+    /// Where each interval's curve stops, and its slope divided by these zeros.
+    divided: Vec<(Vec<f64>, Polynomial)>,
+    /// Empty until they are [measured](Self::measure).
     pub(crate) lengths: Lengths,
     pub(crate) schedule: Schedule,
     pub(crate) is_closed: bool,
@@ -40,7 +40,6 @@ impl Route {
         curves: Vec<Polynomial>,
         schedule: Schedule,
         is_closed: bool,
-        needs_lengths: bool,
     ) -> Self {
         let ends = || {
             curves
@@ -67,28 +66,35 @@ impl Route {
                 }
             })
             .collect();
-        let stops: Vec<Vec<f64>> = slopes
+        let divided: Vec<(Vec<f64>, Polynomial)> = slopes
             .iter()
             .map(|slope| match slope.size() {
-                0.0 => Vec::new(),
-                size => slope.without_zeros(STOPPED * size).0,
+                0.0 => (Vec::new(), *slope),
+                size => slope.without_zeros(STOPPED * size),
             })
             .collect();
-        let lengths = match needs_lengths {
-            true => Lengths::new(slopes.clone(), &stops),
-            false => Lengths::default(),
-        };
         Self {
             start,
             curves,
             slopes,
-            stops,
-            lengths,
+            divided,
+            lengths: Lengths::default(),
             schedule,
             is_closed,
             size,
             far,
         }
+    }
+
+    /// Finds the lengths, which not every path needs.
+    pub(crate) fn measure(&mut self) {
+        let stops = self.divided.iter().map(|own| &own.0[..]);
+        self.lengths = Lengths::new(self.slopes.clone(), stops);
+    }
+
+    /// Where an interval's curve stops.
+    fn stops(&self, interval: usize) -> &[f64] {
+        &self.divided[interval].0
     }
 
     /// The position at a time.
@@ -176,10 +182,8 @@ impl Stretch {
     fn ahead(&self, route: &Route, t: f64, distance: f64) -> Way {
         let slope = route.slopes[self.interval].at(t);
         let tangent = || {
-            // Deflated by its stops, the slope has a direction there too.
-            let own = &route.slopes[self.interval];
-            let rest = own.without_zeros(STOPPED * own.size());
-            let way = signed(&rest, 0.5 * (self.from + self.to));
+            // Divided by its zeros, the slope has a direction where the curve stops too.
+            let way = signed(&route.divided[self.interval], 0.5 * (self.from + self.to));
             [way.at(t), way.derivative().at(t)]
         };
         let (interval, at, beyond) = route.ahead(self.interval, t, distance);
@@ -227,34 +231,35 @@ pub(crate) fn stretches(
     target: Option<&Route>,
     speed: PathSpeed,
 ) -> Option<Vec<Stretch>> {
-    let mut all: Vec<Stretch> = Vec::new();
+    let mut all: Vec<Stretch> = Vec::with_capacity(route.curves.len());
+    let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..route.curves.len() {
         // At given speeds, a body's motion is not smooth where its curve stops.
-        let mut cuts = match speed {
-            PathSpeed::Keys => Vec::new(),
-            _ => route.stops[interval].clone(),
-        };
+        cuts.clear();
+        if speed != PathSpeed::Keys {
+            cuts.extend(route.stops(interval));
+        }
         let slope = &route.slopes[interval];
-        let mut polynomial = None;
-        let mut sighted = |vector: Polynomial, tolerance: f64, cuts: &mut Vec<f64>| {
-            if vector.size() <= tolerance {
-                polynomial = Some(None);
-                return;
-            }
-            let divided = vector.without_zeros(tolerance);
-            cuts.extend(&divided.0);
-            polynomial = Some(Some(divided));
-        };
-        match direction {
-            Direction::Tangent if slope.size() == 0.0 => polynomial = Some(None),
-            Direction::Tangent => sighted(*slope, STOPPED * slope.size(), &mut cuts),
+        let seen;
+        let polynomial = match direction {
+            Direction::Tangent if slope.size() == 0.0 => Some(None),
+            Direction::Tangent => Some(Some(&route.divided[interval])),
             Direction::Point(point) => {
                 let mut own = route.curves[interval].map(|c| -c);
                 own.0[0] += point;
-                sighted(own, HELD * route.size, &mut cuts);
+                let tolerance = HELD * route.size;
+                seen = (own.size() > tolerance).then(|| own.without_zeros(tolerance));
+                Some(seen.as_ref())
             }
+            _ => None,
+        };
+        if let Some((zeros, _)) = polynomial.flatten() {
+            cuts.extend(zeros);
+        }
+        match direction {
+            Direction::Tangent | Direction::Point(_) => {}
             Direction::Ahead(distance) => {
-                cuts.extend(&route.stops[interval]);
+                cuts.extend(route.stops(interval));
                 let [from, to] = route.lengths.of(interval);
                 let total = route.lengths.total();
                 let rounds: &[f64] = if route.is_closed { &[0.0, 1.0] } else { &[0.0] };
@@ -294,7 +299,7 @@ pub(crate) fn stretches(
         }
         for pair in cuts.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            let heading = match (&polynomial, direction, target) {
+            let heading = match (polynomial, direction, target) {
                 (Some(Some(divided)), ..) => {
                     Heading::Polynomial(signed(divided, 0.5 * (from + to)))
                 }
@@ -327,6 +332,14 @@ fn settle(route: &Route, all: &mut [Stretch]) -> bool {
     let Some(mut last) = first.into_iter().find(|way| *way != DVec3::ZERO) else {
         return false;
     };
+    let is_open = |own: &Stretch| match &own.heading {
+        Heading::Still(way) => *way == DVec3::ZERO,
+        Heading::Body(..) => true,
+        _ => false,
+    };
+    if !all.iter().any(is_open) {
+        return true;
+    }
     for own in all {
         match &mut own.heading {
             Heading::Still(way) if *way == DVec3::ZERO => *way = last,
@@ -344,7 +357,7 @@ impl Route {
         let ends = self.curves.len();
         let mut times: Vec<f64> = (0..ends)
             .flat_map(|interval| {
-                let stops = self.stops[interval].iter().copied();
+                let stops = self.stops(interval).iter().copied();
                 let places = stops.chain([0.0, 1.0]);
                 places.map(move |t| self.schedule.time(&self.lengths, interval, t))
             })

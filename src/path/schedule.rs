@@ -26,10 +26,15 @@ impl Schedule {
         (self.keys[0], self.keys[self.keys.len() - 1])
     }
 
+    /// The key times between which an interval lies.
+    pub(crate) fn keys_of(&self, interval: usize) -> [f64; 2] {
+        [self.keys[interval], self.keys[interval + 1]]
+    }
+
     /// The time of a place in an interval.
     pub(crate) fn time(&self, lengths: &Lengths, interval: usize, t: f64) -> f64 {
         if self.speed == PathSpeed::Keys {
-            let (from, to) = (self.keys[interval], self.keys[interval + 1]);
+            let [from, to] = self.keys_of(interval);
             return if t == 1.0 { to } else { from + (to - from) * t };
         }
         let (start, end) = self.span();
@@ -40,7 +45,7 @@ impl Schedule {
     /// The parameter of an interval at a time in it.
     pub(crate) fn parameter(&self, lengths: &Lengths, interval: usize, time: f64) -> f64 {
         if self.speed == PathSpeed::Keys {
-            let (from, to) = (self.keys[interval], self.keys[interval + 1]);
+            let [from, to] = self.keys_of(interval);
             return ((time - from) / (to - from)).clamp(0.0, 1.0);
         }
         lengths.parameter(interval, self.length(lengths, time))

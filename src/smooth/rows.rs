@@ -7,6 +7,7 @@ use crate::math::quaternion::{exp, product, unit};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingKernel};
+use crate::twin::arc_tangent::{arc_tangent, reciprocal_root, root};
 use crate::twin::{pose_smooth, pose_steps};
 
 /// The samples of a track among those of others.
@@ -155,6 +156,29 @@ impl Row<'_> {
     }
 }
 
+/// [`pose_steps::pose`] of rotations, taken apart: each of its long chains of operations is a loop of
+/// its own, in which a processor works on several vectors at once.
+#[inline(always)]
+fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
+    let [mut squares, mut sines, mut ratios] = [[0.0; LANES]; 3];
+    for (i, square) in squares.iter_mut().enumerate() {
+        let turn = pose_steps::turn(at(from, i), at(to, i));
+        *square = pose_steps::square_of(turn);
+        put(found, i, turn);
+    }
+    for ((square, sine), ratio) in squares.iter().zip(&mut sines).zip(&mut ratios) {
+        *sine = root(*square);
+        *ratio = reciprocal_root(*square);
+    }
+    for ((sine, cosine), ratio) in sines.iter().zip(&found[3]).zip(&mut ratios) {
+        *ratio *= arc_tangent(*sine, *cosine);
+    }
+    for (i, (square, ratio)) in squares.iter().zip(&ratios).enumerate() {
+        let step = pose_steps::scaled(at(found, i), *square, *ratio);
+        put(found, i, step.map(canonical));
+    }
+}
+
 /// Smooths consecutive samples of a row on the CPU.
 pub(crate) struct Block<'a> {
     pub(crate) pass: Pass<'a>,
@@ -200,12 +224,13 @@ impl Block<'_> {
                 }
             }
             let mut found: Components = [[0.0; LANES]; 4];
-            for i in 0..LANES {
-                put(
-                    &mut found,
-                    i,
-                    pose_steps::pose(at(&from, i), at(&to, i), ARE_ROTATIONS),
-                );
+            if ARE_ROTATIONS {
+                rotation_steps(&from, &to, &mut found);
+            } else {
+                for i in 0..LANES {
+                    let step = pose_steps::pose(at(&from, i), at(&to, i), false);
+                    put(&mut found, i, step);
+                }
             }
             for (steps, found) in self.steps.iter_mut().zip(&found) {
                 steps[lane..lane + LANES].copy_from_slice(found);

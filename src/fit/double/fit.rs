@@ -351,8 +351,7 @@ impl FitBlock {
 }
 
 /// Interpolates samples and writes the coefficients to each lane's segment. Returns estimates of
-/// twice the truncation error, which depend on whether the curves are [entire](Shape::entire).
-#[allow(clippy::needless_range_loop)]
+/// twice the truncation error.
 #[inline(always)]
 pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
@@ -361,6 +360,20 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
     places: &[usize; MOST],
     segments: &mut [PolynomialSegment],
 ) -> L {
+    let (powers, tails) = coefficients(are_entire, nodes, samples);
+    L::store_powers(&powers[..=2 * PAIRS], segments, places);
+    tails
+}
+
+/// The coefficients of the polynomials through samples, and estimates of twice the truncation error,
+/// which depend on whether the curves are [entire](Shape::entire).
+#[allow(clippy::needless_range_loop)]
+#[inline(always)]
+pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
+    are_entire: bool,
+    nodes: &Nodes<PAIRS>,
+    samples: &Samples<L, PAIRS>,
+) -> ([[L; 4]; POWERS], L) {
     let mut powers = [canonical(samples.middle); POWERS];
     let mut tails = L::all(0.0);
     for c in 0..4 {
@@ -372,8 +385,7 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
             powers[2 * i + 2][c] = even[i].canonical();
         }
     }
-    L::store_powers(&powers[..=2 * PAIRS], segments, places);
-    tails
+    (powers, tails)
 }
 
 /// Copies the numbers of some lanes to consecutive lanes from `start` on.

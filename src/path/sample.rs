@@ -1,0 +1,380 @@
+//! Samples spans of followed paths in f64: positions and rotations at the places from which they are
+//! fitted, a span in each vector lane.
+
+use glam::DVec3;
+
+use crate::fit::double::fit::MOST;
+use crate::fit::nodes::FULL_NODES;
+use crate::math::quaternion::{Quaternion, Real};
+use crate::path::axes::ByAxes;
+use crate::path::carry::Piece;
+use crate::path::frames::Frames;
+use crate::path::lanes::{self, Carried, Directions, Pieces, Polynomials, Row};
+use crate::path::options::{Follow, PathSpeed};
+use crate::path::route::Heading;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::{Doubles, Lanes};
+
+/// Pairs of nodes.
+pub(crate) const PAIRS: usize = 5;
+
+/// The places of a span's samples: its nodes, pair by pair, then its middle and its ends.
+pub(crate) const MIDDLE: usize = 2 * PAIRS;
+pub(crate) const START: usize = MIDDLE + 1;
+pub(crate) const END: usize = MIDDLE + 2;
+const PLACES: usize = MIDDLE + 3;
+
+/// Where the places lie, as parts of the span.
+const PARTS: [f64; PLACES] = {
+    let mut parts = [0.0; PLACES];
+    let mut k = 0;
+    while k < PAIRS {
+        let node = FULL_NODES.at[k] as f64;
+        (parts[2 * k], parts[2 * k + 1]) = (0.5 - node, 0.5 + node);
+        k += 1;
+    }
+    (parts[MIDDLE], parts[START], parts[END]) = (0.5, 0.0, 1.0);
+    parts
+};
+
+/// What is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Unit quaternions of either sign.
+    Rotation,
+    /// Vectors of any length.
+    Vector,
+}
+
+/// A part of a path's time, from one time to another, on one stretch.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    /// The path's place in a list of frames.
+    pub(crate) path: u32,
+    pub(crate) stretch: u32,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+}
+
+/// Values at the places of spans, a row for each of their four components.
+pub(crate) type Samples = [[Row; 4]; PLACES];
+
+/// Samples spans of some paths; its memory is kept for the next ones.
+pub(crate) struct Sampler<'a> {
+    paths: &'a [Frames],
+    kind: Kind,
+    speed: PathSpeed,
+    /// The rotation from the body to z forward, y up, if it is not the identity.
+    body: Option<Quaternion>,
+    rows: Box<Rows>,
+}
+
+/// The numbers of a block of spans.
+struct Rows {
+    times: Times,
+    places: [Row; PLACES],
+    polynomials: Polynomials,
+    ways: [[Row; 3]; PLACES],
+    pieces: Pieces,
+    rolls: [Row; PLACES],
+    sides: [[Row; 3]; PLACES],
+    by_axes: Samples,
+    values: Samples,
+}
+
+impl<'a> Sampler<'a> {
+    pub(crate) fn new(paths: &'a [Frames], kind: Kind, follow: &Follow) -> Self {
+        let body = follow.body().to_array();
+        let row = [0.0; MOST];
+        Self {
+            paths,
+            kind,
+            speed: follow.speed,
+            body: (body != [0.0, 0.0, 0.0, 1.0]).then_some(body),
+            rows: Box::new(Rows {
+                times: Times::NONE,
+                places: [row; PLACES],
+                polynomials: [[row; 3]; 4],
+                ways: [[row; 3]; PLACES],
+                pieces: Pieces::NONE,
+                rolls: [row; PLACES],
+                sides: [[row; 3]; PLACES],
+                by_axes: [[row; 4]; PLACES],
+                values: [[row; 4]; PLACES],
+            }),
+        }
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// The value on a stretch of a path at one time.
+    pub(crate) fn value(&mut self, path: usize, stretch: usize, time: f64) -> [f64; 4] {
+        let span = Span {
+            path: path as u32,
+            stretch: stretch as u32,
+            from: time,
+            to: time,
+        };
+        lanes::at(&self.sample(&[span])[START], 0)
+    }
+
+    /// The values on at most as many spans as there are lanes.
+    pub(crate) fn sample(&mut self, spans: &[Span]) -> &Samples {
+        if self.speed == PathSpeed::Keys {
+            self.places_by_keys(spans);
+        } else {
+            self.places_by_length(spans);
+        }
+        match self.kind {
+            Kind::Vector => self.positions(spans),
+            Kind::Rotation => self.rotations(spans),
+        }
+        &self.rows.values
+    }
+
+    fn places_by_keys(&mut self, spans: &[Span]) {
+        let Rows { times, places, .. } = &mut *self.rows;
+        for (lane, span) in spans.iter().enumerate() {
+            let Frames {
+                route, stretches, ..
+            } = &self.paths[span.path as usize];
+            let own = &stretches[span.stretch as usize];
+            let [first, last] = route.schedule.keys_of(own.interval);
+            let numbers = [span.from, span.to, first, last, own.from, own.to];
+            for (row, number) in times.0.iter_mut().zip(numbers) {
+                row[lane] = number;
+            }
+        }
+        in_lanes(&mut ByKeys { times, places });
+    }
+
+    fn places_by_length(&mut self, spans: &[Span]) {
+        for (lane, span) in spans.iter().enumerate() {
+            let Frames {
+                route, stretches, ..
+            } = &self.paths[span.path as usize];
+            let own = &stretches[span.stretch as usize];
+            let width = span.to - span.from;
+            for (place, (row, part)) in self.rows.places.iter_mut().zip(PARTS).enumerate() {
+                let time = match place {
+                    END => span.to,
+                    _ => span.from + width * part,
+                };
+                row[lane] = if route.lengths.total() > 0.0 {
+                    let t = (route.schedule).parameter(&route.lengths, own.interval, time);
+                    t.clamp(own.from, own.to)
+                } else {
+                    // A path without length is stood on.
+                    own.from
+                };
+            }
+        }
+    }
+
+    fn positions(&mut self, spans: &[Span]) {
+        let Rows { places, values, .. } = &mut *self.rows;
+        for (lane, span) in spans.iter().enumerate() {
+            let Frames {
+                route, stretches, ..
+            } = &self.paths[span.path as usize];
+            let curve = &route.curves[stretches[span.stretch as usize].interval];
+            for (value, place) in values.iter_mut().zip(&*places) {
+                let at = curve.at(place[lane]);
+                for c in 0..3 {
+                    value[c][lane] = at[c];
+                }
+                value[3][lane] = 0.0;
+            }
+        }
+    }
+
+    fn rotations(&mut self, spans: &[Span]) {
+        let paths = self.paths;
+        let rows = &mut *self.rows;
+        for (lane, span) in spans.iter().enumerate() {
+            let own = &paths[span.path as usize].stretches[span.stretch as usize];
+            if let Heading::Polynomial(way) = &own.heading {
+                lanes::set(&mut rows.polynomials, lane, way);
+            }
+        }
+        in_lanes(&mut Directions {
+            count: spans.len(),
+            polynomials: &rows.polynomials,
+            places: &rows.places,
+            ways: &mut rows.ways,
+            changes: None,
+        });
+        for (lane, span) in spans.iter().enumerate() {
+            let own = &paths[span.path as usize];
+            let stretch = &own.stretches[span.stretch as usize];
+            if let Heading::Polynomial(_) = stretch.heading {
+                continue;
+            }
+            for (ways, place) in rows.ways.iter_mut().zip(&rows.places) {
+                let [way, _] = stretch.way(&own.route, place[lane]);
+                for c in 0..3 {
+                    ways[c][lane] = way[c];
+                }
+            }
+        }
+        self.carried(spans);
+        self.by_axes(spans);
+    }
+
+    /// The rotations of the other frames.
+    fn by_axes(&mut self, spans: &[Span]) {
+        let Rows {
+            places,
+            ways,
+            sides,
+            by_axes,
+            values,
+            ..
+        } = &mut *self.rows;
+        let is_carried = |span: &Span| {
+            let own = &self.paths[span.path as usize];
+            own.carried(span.stretch as usize).is_some()
+        };
+        let mut others = (spans.iter().enumerate())
+            .filter(|(_, span)| !is_carried(span))
+            .peekable();
+        if others.peek().is_none() {
+            return;
+        }
+        for (lane, span) in others.clone() {
+            let own = &self.paths[span.path as usize];
+            for (place, side) in sides.iter_mut().enumerate() {
+                let way = DVec3::from_array(lanes::at(&ways[place], lane));
+                let found = own.side(span.stretch as usize, places[place][lane], way);
+                for (row, c) in side.iter_mut().zip(found.to_array()) {
+                    row[lane] = c;
+                }
+            }
+        }
+        let mut are_along = [0.0; MOST];
+        in_lanes(&mut ByAxes {
+            count: spans.len(),
+            sides,
+            ways,
+            body: self.body,
+            rotations: by_axes,
+            are_along: &mut are_along,
+        });
+        for (lane, span) in others {
+            for (place, value) in values.iter_mut().enumerate() {
+                let mut rotation = lanes::at(&by_axes[place], lane);
+                if are_along[lane] != 0.0 {
+                    let [side, way] = [&sides[place], &ways[place]]
+                        .map(|rows| DVec3::from_array(lanes::at(rows, lane)));
+                    let own = &self.paths[span.path as usize];
+                    rotation = own.rotation(side, way).to_array();
+                }
+                for (row, c) in value.iter_mut().zip(rotation) {
+                    row[lane] = c;
+                }
+            }
+        }
+    }
+
+    /// The rotations of carried frames.
+    fn carried(&mut self, spans: &[Span]) {
+        let paths = self.paths;
+        let Rows {
+            places,
+            ways,
+            pieces,
+            rolls,
+            values,
+            ..
+        } = &mut *self.rows;
+        let mut others: Vec<(usize, usize, &'a Piece)> = Vec::new();
+        let (mut any, mut are_rolled) = (false, false);
+        for (lane, span) in spans.iter().enumerate() {
+            let own = &paths[span.path as usize];
+            let Some((all, added)) = own.carried(span.stretch as usize) else {
+                continue;
+            };
+            any = true;
+            are_rolled |= added.are_spread() || added.at(0.0) != 0.0;
+            if let [only] = all {
+                pieces.set(lane, only);
+                continue;
+            }
+            let mut before = usize::MAX;
+            for (place, row) in places.iter().enumerate() {
+                let after = all.partition_point(|piece| piece.from <= row[lane]);
+                let piece = after.max(1) - 1;
+                if piece != before {
+                    others.push((place, lane, &all[piece]));
+                    before = piece;
+                }
+            }
+        }
+        if !any {
+            return;
+        }
+        others.sort_by_key(|(place, ..)| *place);
+        if are_rolled {
+            for (lane, span) in spans.iter().enumerate() {
+                let own = &paths[span.path as usize];
+                let stretch = span.stretch as usize;
+                let Some((_, added)) = own.carried(stretch) else {
+                    continue;
+                };
+                let interval = own.stretches[stretch].interval;
+                for (roll, place) in rolls.iter_mut().zip(&*places) {
+                    let length = match added.are_spread() {
+                        true => own.route.lengths.at(interval, place[lane]),
+                        false => 0.0,
+                    };
+                    roll[lane] = added.at(length);
+                }
+            }
+        }
+        in_lanes(&mut Carried {
+            count: spans.len(),
+            pieces,
+            others: &others,
+            places,
+            ways,
+            rolls: are_rolled.then_some(&*rolls),
+            body: self.body,
+            rotations: values,
+        });
+    }
+}
+
+/// The times at which spans start and end, those of their intervals' keys, and the parameters between
+/// which their stretches lie.
+struct Times([Row; 6]);
+
+impl Times {
+    const NONE: Self = Self([[0.0; MOST]; 6]);
+}
+
+/// The places of spans on paths that are as their keys say.
+struct ByKeys<'a> {
+    times: &'a Times,
+    places: &'a mut [Row; PLACES],
+}
+
+impl InLanes for ByKeys<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (zero, one) = (L::Doubles::all(0.0), L::Doubles::all(1.0));
+        for lane in (0..MOST).step_by(L::COUNT) {
+            let [from, to, first, last, start, end] = lanes::load::<L, 6>(&self.times.0, lane);
+            let width = to - from;
+            for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
+                let time = match place {
+                    END => to,
+                    _ => from + width * L::Doubles::all(part),
+                };
+                let t = ((time - first) / (last - first)).larger(zero).smaller(one);
+                t.larger(start).smaller(end).store(&mut row[lane..]);
+            }
+        }
+    }
+}
