@@ -134,15 +134,29 @@ impl Origin<'_> {
 #[inline(always)]
 pub(crate) fn quiet_unit(key: DQuat) -> Quat {
     let near = rounded(key);
-    let exact = near.as_dquat();
-    // |n² - 1| is about twice |n - 1|.
-    if (dot(exact, exact) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE {
+    if is_unit(near.as_dquat()) {
         return near;
     }
     match (dot(key, key).sqrt() - 1.0).abs() <= QUIET_NORM {
         true => nearest_unit(key),
         false => Quat::NAN,
     }
+}
+
+/// The same of a key in f32.
+#[inline(always)]
+pub(crate) fn quiet_unit_f32(key: Quat) -> Quat {
+    let exact = key.as_dquat();
+    match is_unit(exact) {
+        true => key,
+        false => quiet_unit(exact),
+    }
+}
+
+/// Whether a key counts as unit for certain: |n² - 1| is about twice |n - 1|.
+#[inline(always)]
+fn is_unit(key: DQuat) -> bool {
+    (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
 }
 
 /// The entries of a list whose keys stay.
@@ -214,6 +228,10 @@ mod tests {
                 }
                 _ => assert!(quiet.w.is_nan(), "{norm}"),
             }
+            let single = rounded(key);
+            let bits = |q: Quat| q.to_array().map(f32::to_bits);
+            let (quiet, double) = (quiet_unit_f32(single), quiet_unit(single.as_dquat()));
+            assert_eq!(bits(quiet), bits(double), "{norm}");
         }
     }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use arrow_schema::DataType;
+use bytemuck::Pod;
 use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReaderBuilder};
@@ -14,7 +15,8 @@ use parquet::schema::types::SchemaDescriptor;
 use rayon::prelude::*;
 
 use crate::diagnostic::Diagnostic;
-use crate::parquet::damaged;
+use crate::parquet::pages::chunk;
+use crate::parquet::{damaged, plain};
 use crate::table::arrays::{Gather, chosen};
 use crate::table::columns::{Column, Numbers, Table, Values};
 use crate::table::plan::Wanted;
@@ -133,7 +135,11 @@ impl File<'_> {
         }
     }
 
-    fn values<T: parquet::data_type::DataType>(&self, leaf: usize) -> Option<Vec<T::T>> {
+    fn values<T>(&self, leaf: usize) -> Option<Vec<T::T>>
+    where
+        T: parquet::data_type::DataType,
+        T::T: Pod,
+    {
         let bytes = Arc::new(self.bytes.clone());
         let metadata = self.metadata.metadata();
         let descriptor = self.metadata.parquet_schema().column(leaf);
@@ -141,9 +147,16 @@ impl File<'_> {
         let mut levels = Vec::new();
         for group in metadata.row_groups() {
             let (column, rows) = (group.column(leaf), usize::try_from(group.num_rows()).ok()?);
+            values.reserve(rows.min(BATCH));
+            let (packing, before) = (column.compression(), values.len());
+            let own = &bytes[chunk(column, bytes.len())?];
+            let may_have_nulls = descriptor.max_def_level() > 0;
+            if plain::append(own, packing, may_have_nulls, &mut values).is_some() {
+                continue;
+            }
+            values.truncate(before);
             let pages = SerializedPageReader::new(Arc::clone(&bytes), column, rows, None).ok()?;
             let mut reader = ColumnReaderImpl::<T>::new(Arc::clone(&descriptor), Box::new(pages));
-            values.reserve(rows.min(BATCH));
             loop {
                 levels.clear();
                 // A page's count is its word: not more is made room for than a batch takes.

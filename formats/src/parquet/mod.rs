@@ -2,6 +2,7 @@
 
 mod columns;
 mod pages;
+mod plain;
 mod write;
 
 use std::fmt::Display;

@@ -4,7 +4,7 @@ use glam::{DQuat, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::keys::{Origin, quiet_unit, select};
+use crate::keys::{Origin, quiet_unit, quiet_unit_f32, select};
 use crate::table::clips::{Clip, Shared, Track};
 use crate::table::columns::{Cells, Reader, Values};
 use crate::table::plan::{Cell, Parts};
@@ -92,16 +92,16 @@ impl Clip<'_> {
     fn quiet_keys(&self, parts: &Parts, places: &[u32]) -> Option<Keys> {
         let rows = places.iter().map(|&place| self.row(place as usize));
         let rotations = match Cells::of(self.columns(&parts.rotation).ok()?) {
-            Cells::F32([x, y, z, w]) => units(rows.map(|row| {
-                let [x, y, z, w] = [x[row], y[row], z[row], w[row]].map(f64::from);
-                DQuat::from_xyzw(x, y, z, w)
-            })),
+            Cells::F32([x, y, z, w]) => units(
+                rows.map(|row| quiet_unit_f32(Quat::from_xyzw(x[row], y[row], z[row], w[row]))),
+            ),
             Cells::F64([x, y, z, w]) => {
-                units(rows.map(|row| DQuat::from_xyzw(x[row], y[row], z[row], w[row])))
+                units(rows.map(|row| quiet_unit(DQuat::from_xyzw(x[row], y[row], z[row], w[row]))))
             }
-            Cells::Other([x, y, z, w]) => {
-                units(rows.map(|row| DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row))))
-            }
+            Cells::Other([x, y, z, w]) => units(rows.map(|row| {
+                let key = DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row));
+                quiet_unit(key)
+            })),
         };
         Some(Keys {
             rotations: rotations?,
@@ -215,22 +215,18 @@ impl Clip<'_> {
     }
 }
 
-/// Unit quaternions; nothing if there is anything to be said about one of them.
-fn units(keys: impl Iterator<Item = DQuat>) -> Option<Vec<Quat>> {
-    let mut are_quiet = true;
-    let keys = keys.map(|key| {
-        let key = quiet_unit(key);
-        are_quiet &= !key.w.is_nan();
-        key
-    });
+/// Keys as [`quiet_unit`] makes them; nothing if there is anything to be said about one of them.
+fn units(keys: impl Iterator<Item = Quat>) -> Option<Vec<Quat>> {
     let keys: Vec<Quat> = keys.collect();
-    are_quiet.then_some(keys)
+    let is_marked = |any: bool, key: &Quat| any | key.w.is_nan();
+    (!keys.iter().fold(false, is_marked)).then_some(keys)
 }
 
 /// The vectors; nothing if one of them is not finite.
 fn finite(vectors: impl Iterator<Item = Vec3>) -> Option<Vec<Vec3>> {
-    let mut are_finite = true;
-    let vectors = vectors.inspect(|vector| are_finite &= vector.is_finite());
     let vectors: Vec<Vec3> = vectors.collect();
-    are_finite.then_some(vectors)
+    let numbers: &[f32] = bytemuck::cast_slice(&vectors);
+    // To the end in any case, so that it is compiled to vectors.
+    let are_finite = |all: bool, number: &f32| all & number.is_finite();
+    numbers.iter().fold(true, are_finite).then_some(vectors)
 }
