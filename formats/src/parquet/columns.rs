@@ -24,6 +24,9 @@ use crate::table::plan::Wanted;
 /// Rows that are decoded at once.
 const BATCH: usize = 1 << 16;
 
+/// Fewer numbers than this are unpacked before another thread has woken up.
+const FEW: usize = 1 << 16;
+
 /// A file whose pages have been checked.
 pub(super) struct File<'a> {
     pub(super) name: &'a str,
@@ -69,7 +72,8 @@ impl File<'_> {
     }
 
     /// Reads columns of plain numbers each by itself, straight into the list that it becomes, and the
-    /// others together, on all threads; nothing where there is anything wrong or missing.
+    /// others together, on all threads if there are many; nothing where there is anything wrong or
+    /// missing.
     pub(super) fn read_apart(&self, wanted: &[Typed<'_>]) -> Option<Table> {
         let schema = self.metadata.parquet_schema();
         // The first leaf of each column.
@@ -89,19 +93,24 @@ impl File<'_> {
             .filter(|(_, leaf)| leaf.is_none());
         let others: Vec<Typed<'_>> = others.map(|(wanted, _)| *wanted).collect();
         let plain: Vec<usize> = leaves.iter().copied().flatten().collect();
-        let (others, numbers) = rayon::join(
-            || {
-                let gather = Gather::new(self.name, others.iter().copied()).ok()?;
-                match &*others {
-                    [] => Some(Vec::new()),
-                    others => Some(self.read_together(others, gather).ok()?.columns),
-                }
-            },
-            || {
-                let numbers = plain.par_iter().map(|&leaf| self.numbers(leaf));
-                numbers.collect::<Option<Vec<Numbers>>>()
-            },
-        );
+        let read_others = || {
+            let gather = Gather::new(self.name, others.iter().copied()).ok()?;
+            match &*others {
+                [] => Some(Vec::new()),
+                others => Some(self.read_together(others, gather).ok()?.columns),
+            }
+        };
+        let rows = self.metadata.metadata().file_metadata().num_rows();
+        let are_few = usize::try_from(rows).ok()?.saturating_mul(wanted.len()) < FEW;
+        let (others, numbers): (_, Option<Vec<Numbers>>) = match are_few {
+            true => (
+                read_others(),
+                plain.iter().map(|&leaf| self.numbers(leaf)).collect(),
+            ),
+            false => rayon::join(read_others, || {
+                plain.par_iter().map(|&leaf| self.numbers(leaf)).collect()
+            }),
+        };
         let (mut others, mut numbers) = (others?.into_iter(), numbers?.into_iter());
         let columns = wanted.iter().zip(&leaves).map(|((wanted, _), leaf)| {
             if leaf.is_none() {
@@ -199,15 +208,18 @@ mod tests {
 
     /// A file of several groups of rows and several pages each: `time`, `track`, `x` and `count`,
     /// the last two of which may be null, `x` in row `null` is.
-    fn file(properties: WriterPropertiesBuilder, null: Option<usize>) -> File<'static> {
-        const ROWS: usize = 1000;
+    fn file(
+        rows: usize,
+        properties: WriterPropertiesBuilder,
+        null: Option<usize>,
+    ) -> File<'static> {
         let number = |row: usize| (Some(row) != null).then_some((row as f32).sin());
-        let tracks = (0..ROWS).map(|row| ["hip", "knee"][row % 2]);
+        let tracks = (0..rows).map(|row| ["hip", "knee"][row % 2]);
         let columns: [(&str, ArrayRef, bool); 4] = [
             (
                 "time",
                 Arc::new(Float64Array::from_iter_values(
-                    (0..ROWS).map(|row| row as f64),
+                    (0..rows).map(|row| row as f64),
                 )),
                 false,
             ),
@@ -218,20 +230,20 @@ mod tests {
             ),
             (
                 "x",
-                Arc::new((0..ROWS).map(number).collect::<Float32Array>()),
+                Arc::new((0..rows).map(number).collect::<Float32Array>()),
                 true,
             ),
             (
                 "count",
                 Arc::new(Int64Array::from_iter_values(
-                    (0..ROWS as i64).map(|row| row % 7),
+                    (0..rows as i64).map(|row| row % 7),
                 )),
                 true,
             ),
         ];
         let batch = RecordBatch::try_from_iter_with_nullable(columns).unwrap();
         let properties = properties
-            .set_max_row_group_row_count(Some(400))
+            .set_max_row_group_row_count(Some(rows * 2 / 5))
             .set_data_page_row_count_limit(150)
             .set_write_batch_size(50);
         let mut bytes = Vec::new();
@@ -293,17 +305,19 @@ mod tests {
             .clone()
             .set_column_encoding("count".into(), Encoding::DELTA_BINARY_PACKED);
         let second = delta.clone().set_writer_version(WriterVersion::PARQUET_2_0);
-        for properties in [
-            WriterProperties::builder(),
-            plain.clone(),
-            plain.set_compression(zstd),
-            split.set_compression(Compression::SNAPPY),
-            delta,
-            second.set_compression(Compression::LZ4_RAW),
+        for (rows, properties) in [
+            (1000, WriterProperties::builder()),
+            (1000, plain.clone()),
+            (1000, plain.clone().set_compression(zstd)),
+            (1000, split.set_compression(Compression::SNAPPY)),
+            (1000, delta),
+            (1000, second.set_compression(Compression::LZ4_RAW)),
+            // Enough for several threads.
+            (FEW, plain.set_compression(zstd)),
         ] {
-            let (apart, together) = read(&file(properties, None));
+            let (apart, together) = read(&file(rows, properties, None));
             let apart = apart.expect("nothing is wrong");
-            assert_eq!((apart.rows, together.rows), (1000, 1000));
+            assert_eq!((apart.rows, together.rows), (rows, rows));
             assert_eq!(numbers(&apart), numbers(&together));
             let places = |table: &Table| -> Vec<(String, usize)> {
                 let columns = table.columns.iter();
@@ -318,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_row_without_a_number_is_left_to_be_found() {
-        let (apart, together) = read(&file(WriterProperties::builder(), Some(777)));
+        let (apart, together) = read(&file(1000, WriterProperties::builder(), Some(777)));
         assert!(apart.is_none());
         assert_eq!(together.columns[0].null, Some(777));
     }
