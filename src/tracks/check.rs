@@ -127,10 +127,17 @@ mod tests {
                 each.each_ref().map(bits)
             );
         }
-        for (off, place) in [(0.5, 1), (f32::NAN, 1)] {
+        for off in [0.5, f32::NAN] {
             let mut all = vec![Quat::IDENTITY];
             let error = append_keys(&mut all, 3, &[turned, turned * off, turned]).unwrap_err();
-            assert!(matches!(error, TrackError::NotUnit { track: 3, key, .. } if key == place));
+            assert!(matches!(
+                error,
+                TrackError::NotUnit {
+                    track: 3,
+                    key: 1,
+                    ..
+                }
+            ));
             assert_eq!(all, [Quat::IDENTITY]);
         }
     }
