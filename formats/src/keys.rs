@@ -1,9 +1,10 @@
 //! Keys as files have them, made into keys as sets take them: unit quaternions at increasing times.
 
 use glam::{DQuat, Quat};
+use tumble::UNIT_TOLERANCE;
 
 use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::quaternion::{dot, nearest_unit};
+use crate::quaternion::{dot, nearest_unit, rounded};
 use crate::warnings::Warnings;
 
 /// What becomes of two keys at one time whose values differ.
@@ -128,6 +129,36 @@ impl Origin<'_> {
     }
 }
 
+/// The key that [`Origin::unit`] makes of it without a word, or NaN where there is something to be
+/// said: whoever has many keys looks for that first, and for where it is only then.
+#[inline(always)]
+pub(crate) fn quiet_unit(key: DQuat) -> Quat {
+    let near = rounded(key);
+    if is_unit(near.as_dquat()) {
+        return near;
+    }
+    match (dot(key, key).sqrt() - 1.0).abs() <= QUIET_NORM {
+        true => nearest_unit(key),
+        false => Quat::NAN,
+    }
+}
+
+/// The same of a key in f32.
+#[inline(always)]
+pub(crate) fn quiet_unit_f32(key: Quat) -> Quat {
+    let exact = key.as_dquat();
+    match is_unit(exact) {
+        true => key,
+        false => quiet_unit(exact),
+    }
+}
+
+/// Whether a key counts as unit for certain: |n² - 1| is about twice |n - 1|.
+#[inline(always)]
+fn is_unit(key: DQuat) -> bool {
+    (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
+}
+
 /// The entries of a list whose keys stay.
 pub(crate) fn select<T: Copy>(list: &mut Vec<T>, kept: Option<&[usize]>) {
     if let Some(kept) = kept {
@@ -168,6 +199,39 @@ mod tests {
                 (error.code, error.to_string().contains("key 1")),
                 (code, true)
             );
+        }
+    }
+
+    #[test]
+    fn quiet_keys_are_the_same_and_others_are_marked() {
+        let turned = DQuat::from_rotation_y(0.7);
+        for norm in [
+            1.0,
+            1.0 + 3.9e-7,
+            1.0 + 4.1e-7,
+            0.9999,
+            1.0077,
+            1.0078,
+            0.9,
+            1e-7,
+            1e200,
+            f64::NAN,
+        ] {
+            let key = turned * norm;
+            let mut warnings = Warnings::new("t");
+            let unit = origin(Duplicates::Refuse).unit([key], &mut warnings);
+            let quiet = quiet_unit(key);
+            match unit {
+                Ok(unit) if warnings.into_list().is_empty() => {
+                    let bits = |q: Quat| q.to_array().map(f32::to_bits);
+                    assert_eq!(bits(quiet), bits(unit[0]), "{norm}");
+                }
+                _ => assert!(quiet.w.is_nan(), "{norm}"),
+            }
+            let single = rounded(key);
+            let bits = |q: Quat| q.to_array().map(f32::to_bits);
+            let (quiet, double) = (quiet_unit_f32(single), quiet_unit(single.as_dquat()));
+            assert_eq!(bits(quiet), bits(double), "{norm}");
         }
     }
 

@@ -4,11 +4,13 @@ use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
 
 /// The inner product in R⁴.
+#[inline(always)]
 pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w
 }
 
 /// Each component rounded to f32.
+#[inline(always)]
 pub(crate) fn rounded(q: DQuat) -> Quat {
     Quat::from_array(q.to_array().map(|component| component as f32))
 }

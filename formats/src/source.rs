@@ -86,10 +86,13 @@ impl Source {
             return Err(too_long());
         }
         let mut bytes = Vec::new();
-        let read = bytes
-            .try_reserve_exact(known as usize)
-            .map_err(io::Error::from)
-            .and_then(|()| self.reader.by_ref().take(most + 1).read_to_end(&mut bytes));
+        let reserved = bytes.try_reserve_exact(known as usize);
+        let read = reserved.map_err(io::Error::from).and_then(|()| {
+            // What the buffer holds already, then all else past it: it would be copied once more.
+            bytes.extend_from_slice(self.reader.buffer());
+            let rest = (most + 1).saturating_sub(bytes.len() as u64);
+            self.reader.get_mut().take(rest).read_to_end(&mut bytes)
+        });
         read.map_err(|error| refuse(Code::Open, format!("cannot be read: {error}")))?;
         if bytes.len() as u64 > most {
             return Err(too_long());

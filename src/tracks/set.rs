@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Quat};
 
-use crate::tracks::check::{check_times, unit_key};
+use crate::tracks::check::{append_keys, check_times, unit_key};
 use crate::tracks::error::TrackError;
 use crate::tracks::key_data::{KeyData, Tcb};
 use crate::tracks::rotation::Rotation;
@@ -83,6 +83,14 @@ impl TrackSet {
         Self::default()
     }
 
+    /// Makes room for so many more tracks with so many keys together, if there is as much memory, so
+    /// that the set does not grow step by step while they are pushed.
+    pub fn reserve(&mut self, tracks: usize, keys: usize) {
+        // What there is no memory for fails when it is pushed.
+        let _ = self.tracks.try_reserve(tracks);
+        let _ = self.keys.try_reserve(keys);
+    }
+
     /// Appends a track. `times` are seconds, strictly increasing; `keys` are
     /// rotations, [`Quat`] or `[f32; 4]` (`x y z w`), one for each time. Keys that are unit to within f32 rounding are
     /// kept bit for bit, others (norm within 0.1 of 1) are normalised.
@@ -98,15 +106,7 @@ impl TrackSet {
         let track = self.tracks.len();
         check_times(track, times, keys.len())?;
         let first_key = self.keys.len();
-        for (key, rotation) in keys.iter().enumerate() {
-            match unit_key(track, key, rotation.quat()) {
-                Ok(unit) => self.keys.push(unit),
-                Err(error) => {
-                    self.keys.truncate(first_key);
-                    return Err(error);
-                }
-            }
-        }
+        append_keys(&mut self.keys, track, keys)?;
         let own = bytemuck::cast_slice(&self.keys[first_key..]);
         self.signs.push_track(first_key, own);
         let first_time = self.share_or_append(times);

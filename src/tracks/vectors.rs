@@ -165,7 +165,13 @@ impl TrackSet {
                 given: tangents.len(),
             });
         }
-        let bad_key = keys.iter().position(|key| !key.is_finite());
+        // The first loop goes to the end in any case, so that it is compiled to vectors.
+        let numbers: &[f32] = bytemuck::cast_slice(&keys);
+        let are_finite = numbers.iter().fold(true, |all, n| all & n.is_finite());
+        let bad_key = match are_finite {
+            true => None,
+            false => keys.iter().position(|key| !key.is_finite()),
+        };
         let is_bad = |both: &[Vec3; 2]| !both[0].is_finite() || !both[1].is_finite();
         if let Some(key) = bad_key.or(tangents.iter().position(is_bad)) {
             return Err(not_finite(key));

@@ -88,8 +88,8 @@ fn read_table(
     let types = plan
         .wanted
         .iter()
-        .map(|wanted| schema.field(wanted.index).data_type().clone());
-    let mut gather = Gather::new(name, &plan.wanted, &types.collect::<Vec<_>>())?;
+        .map(|wanted| (wanted, schema.field(wanted.index).data_type()));
+    let mut gather = Gather::new(name, types)?;
     // Only columns that are wanted are decoded, and only their dictionaries: their types are known
     // to be simple.
     let mut projection: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();

@@ -67,6 +67,9 @@ impl<const N: usize> Make<N> for AsStored {
 /// Tracks that are read side by side: of rows of many tracks each cache line is then used whole.
 pub(crate) const TOGETHER: usize = 8;
 
+/// Fewer keys than this are read before another thread has woken up.
+pub(crate) const FEW: usize = 1 << 14;
+
 /// Frames whose rows, some cache lines each, stay in the second cache from the first of those tracks
 /// to the last.
 const IN_CACHE: usize = 512;
@@ -77,7 +80,7 @@ impl Array<'_> {
     }
 
     /// For each track, `finish` of the list of what `M` makes of the numbers of every frame, on all
-    /// threads. Numbers must lie within the array, which must be of floats.
+    /// threads where there are many. Numbers must lie within the array, which must be of floats.
     pub(crate) fn tracks<M: Make<N>, const N: usize, U: Send>(
         &self,
         at: Strides,
@@ -129,7 +132,9 @@ impl Array<'_> {
             }
             lists.into_iter().map(&finish).collect::<Vec<U>>()
         };
-        starts.par_iter().flat_map_iter(block).collect()
+        let at_least = FEW.div_ceil(TOGETHER * frames.max(1));
+        let blocks = starts.par_iter().with_min_len(at_least);
+        blocks.flat_map_iter(block).collect()
     }
 
     /// Every number in C order; `None` for what are no numbers.

@@ -3,18 +3,18 @@
 use std::ops::Range;
 
 use glam::{DQuat, Quat, Vec3};
-use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
+use tumble::{TrackError, TrackSet};
 
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
-use crate::keys::{Duplicates, Origin, QUIET_NORM, select};
+use crate::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::{Joint, Motion};
 use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
-use crate::npz::array::{Array, AsStored, Make, TOGETHER};
+use crate::npz::array::{Array, AsStored, FEW, Make, TOGETHER};
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::rotation_vector;
-use crate::quaternion::{dot, nearest_unit, rounded};
+use crate::quaternion::rounded;
 use crate::warnings::Warnings;
 
 /// Reads the clip. The plan then knows its rate.
@@ -42,6 +42,7 @@ pub(crate) fn read(
         ..Motion::default()
     };
     let set = &mut motion.set;
+    set.reserve(plan.tracks, plan.tracks.saturating_mul(times.len()));
     let refuse = |error: TrackError| {
         Diagnostic::new(
             &archive.file,
@@ -70,16 +71,18 @@ pub(crate) fn read(
             set_keys(set, track, &times, &keys, &[]).map_err(refuse)
         }
     };
+    let are_few = plan.tracks.saturating_mul(plan.frames) < FEW;
     let mut pending = Vec::new();
     for (part, array, tracks) in jobs {
-        let (pushed, read) = rayon::join(
-            || {
-                pending
-                    .drain(..)
-                    .try_for_each(|(track, values, keys)| push(track, values, keys))
-            },
-            || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings),
-        );
+        let mut push_pending = || {
+            let mut pending = pending.drain(..);
+            pending.try_for_each(|(track, values, keys)| push(track, values, keys))
+        };
+        let mut read = || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings);
+        let (pushed, read) = match are_few {
+            true => (push_pending(), read()),
+            false => rayon::join(push_pending, read),
+        };
         pushed?;
         pending = tracks
             .zip(read?)
@@ -222,21 +225,6 @@ impl Make<3> for InF32 {
     #[inline(always)]
     fn make(numbers: [f64; 3]) -> Vec3 {
         Vec3::from_array(numbers.map(|number| number as f32))
-    }
-}
-
-/// The nearest unit quaternion, or NaN where something is to be said about it.
-#[inline(always)]
-fn quiet_unit(key: DQuat) -> Quat {
-    let near = rounded(key);
-    let exact = near.as_dquat();
-    // |n² - 1| is about twice |n - 1|.
-    if (dot(exact, exact) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE {
-        return near;
-    }
-    match (dot(key, key).sqrt() - 1.0).abs() <= QUIET_NORM {
-        true => nearest_unit(key),
-        false => Quat::NAN,
     }
 }
 

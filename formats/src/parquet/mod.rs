@@ -1,30 +1,31 @@
 //! Parquet: tables in columns, compressed page by page.
 
+mod columns;
 mod pages;
+mod plain;
 mod write;
 
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
 use arrow_schema::{DataType, Field, Schema};
 use bytes::Bytes;
-use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
-};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
 use crate::npy::ComponentOrder;
+use crate::parquet::columns::File;
 use crate::parquet::pages::check_pages;
 use crate::parquet::write::ParquetSink;
 use crate::source::Source;
-use crate::table::arrays::{Gather, chosen};
+use crate::table::arrays::Gather;
 use crate::table::clips::clips;
 use crate::table::columns::Table;
 use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
-use crate::table::plan::{Need, Plan};
+use crate::table::plan::{Need, Plan, Wanted};
 
 /// Parquet files.
 pub static FORMAT: Format = Format {
@@ -54,9 +55,6 @@ const MAGIC: &[u8] = b"PAR1";
 
 /// The length of the metadata and the magic number, at the end.
 const TAIL: usize = 8;
-
-/// Rows that are decoded at once.
-const BATCH: usize = 1 << 16;
 
 /// Reads a file; `-` is standard input.
 ///
@@ -108,15 +106,18 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     Ok(())
 }
 
+/// The refusal of what cannot be decoded.
+fn damaged(name: &str, error: &dyn Display) -> Diagnostic {
+    let message = format!("{error}; the file is damaged, or written in a way that is not read");
+    Diagnostic::new(name, Code::TableDamaged, message)
+}
+
 fn read_table(
     name: &str,
     bytes: Bytes,
     options: &ReadOptions,
 ) -> Result<(Table, Plan), Diagnostic> {
-    let damaged = |error: &dyn std::fmt::Display| {
-        let message = format!("{error}; the file is damaged, or written in a way that is not read");
-        Diagnostic::new(name, Code::TableDamaged, message)
-    };
+    let damaged = |error: &dyn Display| damaged(name, error);
     // The types that Parquet itself has tell enough; a schema that a writer left beside them is one
     // more thing that may be wrong.
     let own = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
@@ -143,29 +144,24 @@ fn read_table(
         _ => Arc::clone(field),
     };
     let fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
-    let wanted_types = plan
-        .wanted
-        .iter()
-        .map(|wanted| fields[wanted.index].data_type().clone());
-    let mut gather = Gather::new(name, &plan.wanted, &wanted_types.collect::<Vec<_>>())?;
-    let own = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    let wanted = plan.wanted.iter();
+    let wanted: Vec<(&Wanted, &DataType)> = wanted
+        .map(|wanted| (wanted, fields[wanted.index].data_type()))
+        .collect();
+    // Refuses types before anything is decoded.
+    let gather = Gather::new(name, wanted.iter().copied())?;
+    let own = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.clone())));
     let metadata = ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), own)
         .map_err(|error| damaged(&error))?;
-    let mask = ProjectionMask::roots(metadata.parquet_schema(), roots.iter().copied());
-    let batches = ParquetRecordBatchReaderBuilder::new_with_metadata(bytes, metadata)
-        .with_projection(mask)
-        .with_batch_size(BATCH)
-        .build()
-        .map_err(|error| damaged(&error))?;
-    let places = plan
-        .wanted
-        .iter()
-        .map(|wanted| roots.partition_point(|&root| root < wanted.index));
-    let places: Vec<usize> = places.collect();
-    for batch in batches {
-        let batch = batch.map_err(|error| damaged(&error))?;
-        let columns = chosen(&batch, &places).ok_or_else(|| damaged(&"a column is not there"))?;
-        gather.push(&columns, batch.num_rows())?;
-    }
-    Ok((gather.finish()?, plan))
+    let file = File {
+        bytes,
+        metadata,
+        name,
+    };
+    // What is wrong with a file is found by reading its columns side by side.
+    let table = match file.read_apart(&wanted) {
+        Some(table) => table,
+        None => file.read_together(&wanted, gather)?,
+    };
+    Ok((table, plan))
 }

@@ -104,7 +104,7 @@ fn check_compression(name: &str, path: &str, found: Compression) -> Result<(), D
 }
 
 /// Where the pages of a column are.
-fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range<usize>> {
+pub(super) fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range<usize>> {
     let start = column
         .dictionary_page_offset()
         .unwrap_or(column.data_page_offset());
@@ -114,30 +114,37 @@ fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range<usize>> {
 }
 
 /// What the header of a page says.
-struct Page {
+pub(super) struct Page {
     /// Bytes of the header, and of the page behind it.
-    header: usize,
-    compressed: usize,
-    uncompressed: u64,
-    values: u64,
+    pub(super) header: usize,
+    pub(super) compressed: usize,
+    pub(super) uncompressed: u64,
+    pub(super) values: u64,
+    /// Whether it is a data page (version 1) of values that are not encoded.
+    pub(super) is_plain: bool,
 }
 
-/// Reads a page's header. Its fields (parquet.thrift, `PageHeader`): 2 is the uncompressed and 3 the
-/// compressed length; 5, 7 and 8 are the headers of data pages and dictionaries, whose field 1 is
-/// the number of values.
-fn page(bytes: &[u8]) -> Option<Page> {
+/// Reads a page's header. Its fields (parquet.thrift, `PageHeader`): 1 is the type, 0 for a data page;
+/// 2 is the uncompressed and 3 the compressed length; 5, 7 and 8 are the headers of data pages,
+/// dictionaries and data pages of version 2, whose field 1 is the number of values. Fields 2 and 3 of
+/// the first are the encodings of its values, 0 for none, and of its definition levels, 3 for runs.
+pub(super) fn page(bytes: &[u8]) -> Option<Page> {
     let mut input = Compact { bytes, at: 0 };
     let (mut uncompressed, mut compressed, mut values) = (None, None, 0);
+    let (mut page_type, mut encodings) = (None, [None; 2]);
     let mut id = 0;
     while let Some(kind) = input.field(&mut id)? {
         match (id, kind) {
+            (1, INTEGER) => page_type = Some(input.integer()?),
             (2, INTEGER) => uncompressed = Some(input.integer()?),
             (3, INTEGER) => compressed = Some(input.integer()?),
-            (5 | 7 | 8, STRUCT) => {
+            (header @ (5 | 7 | 8), STRUCT) => {
                 let mut id = 0;
                 while let Some(kind) = input.field(&mut id)? {
                     match (id, kind) {
                         (1, INTEGER) => values = input.integer()?,
+                        (2, INTEGER) if header == 5 => encodings[0] = Some(input.integer()?),
+                        (3, INTEGER) if header == 5 => encodings[1] = Some(input.integer()?),
                         _ => input.skip(kind, 0)?,
                     }
                 }
@@ -150,6 +157,7 @@ fn page(bytes: &[u8]) -> Option<Page> {
         compressed: usize::try_from(compressed?).ok()?,
         uncompressed: u64::try_from(uncompressed?).ok()?,
         values: u64::try_from(values).ok()?,
+        is_plain: page_type == Some(0) && encodings == [Some(0), Some(3)],
     })
 }
 
@@ -256,7 +264,8 @@ impl Compact<'_> {
 mod tests {
     use super::*;
 
-    /// Type 0, lengths 300 and 20, a data page of 70 values with statistics to skip.
+    /// Type 0, lengths 300 and 20, a data page of 70 values with statistics to skip, whose encodings
+    /// it does not say.
     const HEADER: [u8; 20] = [
         0x15, 0x00, 0x15, 0xd8, 0x04, 0x15, 0x28, 0x2c, 0x15, 0x8c, 0x01, 0x1c, 0x18, 0x01, b'a',
         0x00, 0x00, 0x00, 0xaa, 0xbb,
@@ -267,6 +276,7 @@ mod tests {
         let page = page(&HEADER).unwrap();
         assert_eq!((page.header, page.compressed), (18, 20));
         assert_eq!((page.uncompressed, page.values), (300, 70));
+        assert!(!page.is_plain);
     }
 
     #[test]

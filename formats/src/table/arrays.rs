@@ -33,14 +33,13 @@ struct Known {
 }
 
 impl Gather {
-    /// For columns of these types, one for each that is wanted.
+    /// For columns that are wanted, each with its type.
     ///
     /// # Errors
     /// When a type is not what its column needs.
-    pub(crate) fn new(
+    pub(crate) fn new<'a>(
         file: &str,
-        wanted: &[Wanted],
-        types: &[DataType],
+        wanted: impl IntoIterator<Item = (&'a Wanted, &'a DataType)>,
     ) -> Result<Self, Diagnostic> {
         let column = |(wanted, data_type): (&Wanted, &DataType)| {
             let Some(values) = values(data_type, wanted.need) else {
@@ -54,7 +53,7 @@ impl Gather {
                 null: None,
             })
         };
-        let columns: Result<Vec<_>, _> = wanted.iter().zip(types).map(column).collect();
+        let columns: Result<Vec<_>, _> = wanted.into_iter().map(column).collect();
         let columns = columns?;
         Ok(Self {
             known: columns.iter().map(|_| Known::default()).collect(),

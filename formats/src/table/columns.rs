@@ -69,7 +69,7 @@ impl Numbers {
 }
 
 /// What finds the line and the column of a cell again.
-pub(crate) type Text = Box<dyn Fn(usize, usize) -> Place>;
+pub(crate) type Text = Box<dyn Fn(usize, usize) -> Place + Sync>;
 
 impl Table {
     pub(crate) fn refuse(&self, code: Code, message: impl Into<String>) -> Diagnostic {
@@ -150,6 +150,44 @@ impl Reader<'_> {
             Some(ends) => self.numbers.at(ends[row - 1] + self.place),
         }
     }
+}
+
+/// Numbers of each row from several columns, as slices where they are all of one type.
+pub(crate) enum Cells<'a, const N: usize> {
+    F32([&'a [f32]; N]),
+    F64([&'a [f64]; N]),
+    Other([Reader<'a>; N]),
+}
+
+impl<'a, const N: usize> Cells<'a, N> {
+    pub(crate) fn of(readers: [Reader<'a>; N]) -> Self {
+        let f32s = |numbers: &'a Numbers| match numbers {
+            Numbers::F32(list) => Some(&**list),
+            _ => None,
+        };
+        let f64s = |numbers: &'a Numbers| match numbers {
+            Numbers::F64(list) => Some(&**list),
+            _ => None,
+        };
+        if let Some(lists) = slices(&readers, f32s) {
+            return Self::F32(lists);
+        }
+        match slices(&readers, f64s) {
+            Some(lists) => Self::F64(lists),
+            None => Self::Other(readers),
+        }
+    }
+}
+
+fn slices<'a, T, const N: usize>(
+    readers: &[Reader<'a>; N],
+    list: impl Fn(&'a Numbers) -> Option<&'a [T]>,
+) -> Option<[&'a [T]; N]> {
+    let mut lists = [&[][..]; N];
+    for (slot, reader) in lists.iter_mut().zip(readers) {
+        *slot = list(reader.numbers).filter(|_| reader.ends.is_none())?;
+    }
+    Some(lists)
 }
 
 /// The refusal of a column whose type does not serve.

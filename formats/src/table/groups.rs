@@ -34,29 +34,38 @@ pub(crate) fn numbered<T: Copy + Eq + Hash>(
     place: impl Fn(T) -> usize,
 ) -> (Vec<u32>, Vec<T>) {
     const SMALL: usize = 1 << 16;
-    let mut small: Vec<Option<u32>> = Vec::new();
+    /// There are fewer rows than this.
+    const NONE: u32 = u32::MAX;
+    let mut small: Vec<u32> = Vec::new();
     let mut large: HashMap<T, u32> = HashMap::new();
     let mut own = Vec::new();
     let codes = values.map(|value| {
-        let mut next = || {
-            own.push(value);
-            own.len() as u32 - 1
-        };
-        match place(value) {
-            place if place < SMALL => {
-                if place >= small.len() {
-                    small.resize(place + 1, None);
-                }
-                *small[place].get_or_insert_with(next)
-            }
-            _ => *large.entry(value).or_insert_with(&mut next),
+        let place = place(value);
+        if let Some(&code) = small.get(place)
+            && code != NONE
+        {
+            return code;
         }
+        let next = own.len() as u32;
+        let code = if place < SMALL {
+            if place >= small.len() {
+                small.resize(place + 1, NONE);
+            }
+            small[place] = next;
+            next
+        } else {
+            *large.entry(value).or_insert(next)
+        };
+        if code == next {
+            own.push(value);
+        }
+        code
     });
     (codes.collect(), own)
 }
 
-/// Sorts by code, keeping the order of equal ones: where each entry goes, and the range of each
-/// code.
+/// The places of a list's entries sorted by code, those of equal ones in their order, and the range
+/// of each code among them.
 pub(crate) fn share_out(codes: &[u32], count: usize) -> (Vec<u32>, Vec<Range<usize>>) {
     let mut next = vec![0usize; count];
     for &code in codes {
@@ -71,22 +80,11 @@ pub(crate) fn share_out(codes: &[u32], count: usize) -> (Vec<u32>, Vec<Range<usi
             range
         })
         .collect();
-    let order = codes.iter().map(|&code| {
-        let place = next[code as usize];
-        next[code as usize] += 1;
-        place as u32
-    });
-    (order.collect(), ranges)
-}
-
-/// Puts each value where `order` says.
-pub(crate) fn scatter<T: Copy>(values: &[T], order: &[u32]) -> Vec<T> {
-    let Some(&first) = values.first() else {
-        return Vec::new();
-    };
-    let mut sorted = vec![first; values.len()];
-    for (&value, &place) in values.iter().zip(order) {
-        sorted[place as usize] = value;
+    let mut order = vec![0; codes.len()];
+    for (place, &code) in (0..).zip(codes) {
+        let next = &mut next[code as usize];
+        order[*next] = place;
+        *next += 1;
     }
-    sorted
+    (order, ranges)
 }

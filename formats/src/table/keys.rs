@@ -1,0 +1,232 @@
+//! The keys of a clip's tracks, from the columns of its table.
+
+use glam::{DQuat, Quat, Vec3};
+use rayon::prelude::*;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::keys::{Origin, quiet_unit, quiet_unit_f32, select};
+use crate::table::clips::{Clip, Shared, Track};
+use crate::table::columns::{Cells, Reader, Values};
+use crate::table::plan::{Cell, Parts};
+use crate::warnings::Warnings;
+
+/// Fewer rows than this are no work for another thread.
+const FEW: usize = 1 << 14;
+
+/// The keys of one track.
+pub(crate) struct Keys {
+    pub(crate) rotations: Vec<Quat>,
+    pub(crate) translations: Vec<Vec3>,
+    pub(crate) scales: Vec<Vec3>,
+}
+
+impl Keys {
+    /// Keeps some keys, in this order.
+    pub(crate) fn select(&mut self, kept: &[usize]) {
+        select(&mut self.rotations, Some(kept));
+        for list in [&mut self.translations, &mut self.scales] {
+            if !list.is_empty() {
+                select(list, Some(kept));
+            }
+        }
+    }
+
+    pub(crate) fn are_equal(&self, i: usize, j: usize) -> bool {
+        let same = |list: &[Vec3]| list.is_empty() || list[i] == list[j];
+        self.rotations[i] == self.rotations[j] && same(&self.translations) && same(&self.scales)
+    }
+
+    /// Those at some places.
+    fn at(&self, places: &[u32]) -> Self {
+        let vectors = |list: &[Vec3]| match list {
+            [] => Vec::new(),
+            list => places.iter().map(|&place| list[place as usize]).collect(),
+        };
+        let rotations = places.iter().map(|&place| self.rotations[place as usize]);
+        Self {
+            rotations: rotations.collect(),
+            translations: vectors(&self.translations),
+            scales: vectors(&self.scales),
+        }
+    }
+}
+
+impl Clip<'_> {
+    /// The keys of all tracks.
+    ///
+    /// # Errors
+    /// The first fault, row by row.
+    pub(crate) fn keys(
+        &self,
+        shared: &Shared<'_>,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<Keys>, Diagnostic> {
+        let quiet = |track: &Track<'_>| self.quiet_keys(track.parts, shared.places(track));
+        let rows = shared
+            .tracks
+            .first()
+            .map_or(0, |track| shared.places(track).len());
+        let quiet: Vec<Option<Keys>> = (shared.tracks.par_iter())
+            .with_min_len(FEW.div_ceil(rows.max(1)))
+            .map(quiet)
+            .collect();
+        // Where there is something to be said it is said in the order of the rows: tracks that share
+        // columns are read together.
+        let mut known: Option<(&Parts, Keys)> = None;
+        let keys = shared.tracks.iter().zip(quiet).map(|(track, quiet)| {
+            if let Some(keys) = quiet {
+                return Ok(keys);
+            }
+            let all = match known.take() {
+                Some((parts, all)) if std::ptr::eq(parts, track.parts) => all,
+                _ => self.all_keys(track.parts, warnings)?,
+            };
+            let keys = all.at(shared.places(track));
+            known = Some((track.parts, all));
+            Ok(keys)
+        });
+        keys.collect()
+    }
+
+    /// The keys at some places; nothing if there is anything to be said about them.
+    fn quiet_keys(&self, parts: &Parts, places: &[u32]) -> Option<Keys> {
+        let rows = places.iter().map(|&place| self.row(place as usize));
+        let rotations = match Cells::of(self.columns(&parts.rotation).ok()?) {
+            Cells::F32([x, y, z, w]) => units(
+                rows.map(|row| quiet_unit_f32(Quat::from_xyzw(x[row], y[row], z[row], w[row]))),
+            ),
+            Cells::F64([x, y, z, w]) => {
+                units(rows.map(|row| quiet_unit(DQuat::from_xyzw(x[row], y[row], z[row], w[row]))))
+            }
+            Cells::Other([x, y, z, w]) => units(rows.map(|row| {
+                let key = DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row));
+                quiet_unit(key)
+            })),
+        };
+        Some(Keys {
+            rotations: rotations?,
+            translations: self.quiet_vectors(parts.translation.as_ref(), places)?,
+            scales: self.quiet_vectors(parts.scale.as_ref(), places)?,
+        })
+    }
+
+    fn quiet_vectors(&self, cells: Option<&[Cell; 3]>, places: &[u32]) -> Option<Vec<Vec3>> {
+        let Some(cells) = cells else {
+            return Some(Vec::new());
+        };
+        let rows = places.iter().map(|&place| self.row(place as usize));
+        match Cells::of(self.columns(cells).ok()?) {
+            Cells::F32([x, y, z]) => finite(rows.map(|row| Vec3::new(x[row], y[row], z[row]))),
+            Cells::F64([x, y, z]) => {
+                finite(rows.map(|row| Vec3::new(x[row] as f32, y[row] as f32, z[row] as f32)))
+            }
+            Cells::Other(columns) => finite(rows.map(|row| {
+                let [x, y, z] = columns.map(|column| column.at(row) as f32);
+                Vec3::new(x, y, z)
+            })),
+        }
+    }
+
+    /// The keys of all rows, one after another.
+    fn all_keys(&self, parts: &Parts, warnings: &mut Warnings) -> Result<Keys, Diagnostic> {
+        let column = parts.rotation[0].column;
+        let place = |key: usize| self.table.place(column, self.row(key));
+        let origin = Origin {
+            file: &self.table.file,
+            place: &place,
+            duplicates: self.options.duplicates,
+        };
+        let [x, y, z, w] = self.columns(&parts.rotation)?;
+        let quats = (0..self.len()).map(|place| {
+            let row = self.row(place);
+            DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row))
+        });
+        Ok(Keys {
+            rotations: origin.unit(quats, warnings)?,
+            translations: self.all_vectors(parts.translation.as_ref())?,
+            scales: self.all_vectors(parts.scale.as_ref())?,
+        })
+    }
+
+    fn all_vectors(&self, cells: Option<&[Cell; 3]>) -> Result<Vec<Vec3>, Diagnostic> {
+        let Some(cells) = cells else {
+            return Ok(Vec::new());
+        };
+        let columns = self.columns(cells)?;
+        let vector = |place| {
+            let row = self.row(place);
+            let numbers = [0, 1, 2].map(|i: usize| columns[i].at(row) as f32);
+            if let Some(i) = numbers.iter().position(|number| !number.is_finite()) {
+                let message = format!("{} is not finite in f32; repair it", columns[i].at(row));
+                let column = cells[i].column;
+                return Err(self.table.refuse_at(column, row, Code::NotFinite, message));
+            }
+            Ok(Vec3::from_array(numbers))
+        };
+        (0..self.len()).map(vector).collect()
+    }
+
+    /// What reads the numbers of some cells.
+    fn columns<const N: usize>(&self, cells: &[Cell; N]) -> Result<[Reader<'_>; N], Diagnostic> {
+        let mut readers = [Reader::NONE; N];
+        for (reader, cell) in readers.iter_mut().zip(cells) {
+            *reader = self.reader(*cell)?;
+        }
+        Ok(readers)
+    }
+
+    fn reader(&self, cell: Cell) -> Result<Reader<'_>, Diagnostic> {
+        let column = &self.table.columns[cell.column];
+        match (&column.values, cell.place) {
+            (Values::Numbers(numbers), None) => Ok(Reader {
+                numbers,
+                ends: None,
+                place: 0,
+            }),
+            (Values::Lists { ends, numbers }, Some(place)) => {
+                let short = (0..self.len()).map(|at| self.row(at)).find(|&row| {
+                    let start = if row == 0 { 0 } else { ends[row - 1] };
+                    ends[row] - start <= place
+                });
+                if let Some(row) = short {
+                    let start = if row == 0 { 0 } else { ends[row - 1] };
+                    let message = format!(
+                        "the list `{}` has {} numbers; number {place} of it is wanted, from 0",
+                        column.name,
+                        ends[row] - start
+                    );
+                    return Err(self
+                        .table
+                        .refuse_at(cell.column, row, Code::ListLength, message));
+                }
+                Ok(Reader {
+                    numbers,
+                    ends: Some(ends),
+                    place,
+                })
+            }
+            _ => {
+                let message = format!("column `{}` holds no such numbers", column.name);
+                Err(self
+                    .table
+                    .refuse_at(cell.column, 0, Code::ColumnType, message))
+            }
+        }
+    }
+}
+
+/// Keys as [`quiet_unit`] makes them; nothing if there is anything to be said about one of them.
+fn units(keys: impl Iterator<Item = Quat>) -> Option<Vec<Quat>> {
+    let keys: Vec<Quat> = keys.collect();
+    let is_marked = |any: bool, key: &Quat| any | key.w.is_nan();
+    (!keys.iter().fold(false, is_marked)).then_some(keys)
+}
+
+/// The vectors; nothing if one of them is not finite.
+fn finite(vectors: impl Iterator<Item = Vec3>) -> Option<Vec<Vec3>> {
+    let vectors: Vec<Vec3> = vectors.collect();
+    let numbers: &[f32] = bytemuck::cast_slice(&vectors);
+    // To the end in any case, so that it is compiled to vectors.
+    let are_finite = |all: bool, number: &f32| all & number.is_finite();
+    numbers.iter().fold(true, are_finite).then_some(vectors)
+}
