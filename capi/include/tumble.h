@@ -553,6 +553,15 @@ typedef struct TumbleVulkan {
    1: the feature `shaderInt64` is enabled.
    */
   uint32_t shader_int64;
+  /*
+   Another `VkQueue` of the device, which copies results to the host while the first one computes, or
+   null. The device must have the feature `timelineSemaphore` enabled then.
+   */
+  void *copy_queue;
+  /*
+   The family of that queue.
+   */
+  uint32_t copy_queue_family;
 } TumbleVulkan;
 
 /*

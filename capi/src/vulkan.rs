@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_void};
 
 use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
-use tumble::{Engine, VulkanBuffer, VulkanHandles};
+use tumble::{Engine, VulkanBuffer, VulkanHandles, VulkanQueue};
 
 use crate::arguments::{Out, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};
@@ -39,6 +39,11 @@ pub struct TumbleVulkan {
     pub shader_float_controls: u32,
     /// 1: the feature `shaderInt64` is enabled.
     pub shader_int64: u32,
+    /// Another `VkQueue` of the device, which copies results to the host while the first one computes, or
+    /// null. The device must have the feature `timelineSemaphore` enabled then.
+    pub copy_queue: *mut c_void,
+    /// The family of that queue.
+    pub copy_queue_family: u32,
 }
 
 fn refused(message: String) -> Failure {
@@ -59,6 +64,13 @@ impl TumbleVulkan {
         let physical_device = vulkan(self.physical_device, "vulkan->physical_device")?;
         let device = vulkan(self.device, "vulkan->device")?;
         let queue = vulkan(self.queue, "vulkan->queue")?;
+        let copy_queue = match self.copy_queue.is_null() {
+            true => None,
+            false => Some(VulkanQueue {
+                queue: vulkan(self.copy_queue, "vulkan->copy_queue")?,
+                family: self.copy_queue_family,
+            }),
+        };
         let shader_float_controls =
             flag(self.shader_float_controls, "vulkan->shader_float_controls")?;
         let shader_int64 = flag(self.shader_int64, "vulkan->shader_int64")?;
@@ -108,6 +120,7 @@ impl TumbleVulkan {
             shader_int64,
             queue,
             queue_family: self.queue_family,
+            copy_queue,
         })
     }
 
@@ -140,7 +153,14 @@ impl TumbleVulkan {
             Some(own) if !own.queue_flags.contains(vk::QueueFlags::COMPUTE) => Err(refused(
                 format!("`vulkan->queue_family` is {family}, whose queues cannot compute"),
             )),
-            Some(_) => Ok(()),
+            Some(_) => match families.get(self.copy_queue_family as usize) {
+                None if !self.copy_queue.is_null() => Err(refused(format!(
+                    "`vulkan->copy_queue_family` is {}; the device has {} families",
+                    self.copy_queue_family,
+                    families.len()
+                ))),
+                _ => Ok(()),
+            },
         }
     }
 }

@@ -57,6 +57,8 @@ fn handles(application: &Application) -> TumbleVulkan {
         api_version: vk::API_VERSION_1_1,
         shader_float_controls: 0,
         shader_int64: application.shader_int64.into(),
+        copy_queue: (application.copy_queue).map_or(null_mut(), |own| pointer(own.queue)),
+        copy_queue_family: application.copy_queue.map_or(0, |own| own.family),
     }
 }
 
@@ -410,6 +412,11 @@ fn handles_that_do_not_belong_together_are_refused() {
         queue_family: 99,
         ..good
     };
+    let copies = TumbleVulkan {
+        copy_queue: good.queue,
+        copy_queue_family: 98,
+        ..good
+    };
     let device = TumbleVulkan {
         physical_device: std::ptr::without_provenance_mut(16),
         ..good
@@ -436,6 +443,7 @@ fn handles_that_do_not_belong_together_are_refused() {
             argument,
             "`vulkan->queue_family` is 99; the device has",
         ),
+        (copies, argument, "`vulkan->copy_queue_family` is 98"),
         (device, argument, "is none of the"),
         (
             version,

@@ -321,6 +321,8 @@ fn handles_of_vulkan_are_looked_at() {
         api_version: 0,
         shader_float_controls: 0,
         shader_int64: 0,
+        copy_queue: null_mut(),
+        copy_queue_family: 0,
     };
     let mut engine = null_mut();
     // SAFETY: a structure and a place for the handle; what is null or wrong is refused.
