@@ -169,7 +169,9 @@ impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
     #[inline(always)]
     fn constant(&mut self, sample: usize, count: usize, constant: u32) {
         let constant = self.row.part.prepared.constants[constant as usize];
-        self.row.samples_of(sample, count, self.output).fill(constant);
+        self.row
+            .samples_of(sample, count, self.output)
+            .fill(constant);
     }
 
     #[inline(always)]
