@@ -49,7 +49,7 @@ impl Crowd {
         self.advance_ticks(ticks as u64)
     }
 
-    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`].
+    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).
     ///
     /// # Errors
     /// When it is no number, or out of reach.
