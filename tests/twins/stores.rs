@@ -102,13 +102,14 @@ pub(super) fn stores() -> Vec<Twin> {
 
 pub(super) fn readers() -> Vec<Twin> {
     let mut all = Vec::new();
-    for [arcs, polynomials, times, samples, keys] in [
+    for [arcs, polynomials, times, samples, keys, crowd] in [
         [
             "arc_frames_f32",
             "polynomial_frames_f32",
             "arc_times_f32",
             "arc_samples_f32",
             "from_keys_cubics",
+            "crowd_rotations",
         ],
         [
             "arc_frames_f32_texels",
@@ -116,6 +117,7 @@ pub(super) fn readers() -> Vec<Twin> {
             "arc_times_f32_texels",
             "arc_samples_f32_texels",
             "from_keys_cubics_texels",
+            "crowd_rotations_texels",
         ],
     ] {
         all.extend([
@@ -128,6 +130,10 @@ pub(super) fn readers() -> Vec<Twin> {
             reader(keys, "key_at", "keys", 4),
             reader(keys, "sample_at", "samples", 2),
             reader(keys, "weights_at", "weights", 4),
+            reader(crowd, "entry_at", "entries", 4),
+            reader(crowd, "channel_at", "channels", 4),
+            reader(crowd, "cell_at", "cells", 4),
+            reader(crowd, "place_at", "places", 2),
         ]);
     }
     all.push(with_globals(
