@@ -244,6 +244,21 @@ impl LogicalDevice {
         }
     }
 
+    /// Waits until the driver is done with copies that have ended. If the wait fails, they have ended all
+    /// the same.
+    pub(crate) fn settle(&self) {
+        if self.owned {
+            let _queues = self.all_queues();
+            // SAFETY: as in `wait_until_idle`.
+            let _ = unsafe { self.raw.device_wait_idle() };
+        } else {
+            let queue = self.queue(Lane::Copies);
+            // SAFETY: the device is alive, and this queue of the application's is locked; its other
+            // queues are not the engine's to wait for.
+            let _ = unsafe { self.raw.queue_wait_idle(*queue) };
+        }
+    }
+
     /// Waits until the device is idle, and again if the wait fails for lack of memory.
     pub(crate) fn wait_in_any_case(&self) {
         let _queues = self.all_queues();

@@ -51,6 +51,9 @@ impl Semaphore {
 impl Drop for Semaphore {
     fn drop(&mut self) {
         if self.device.may_destroy() {
+            // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
+            // semaphores let go of them a moment after they signal the fence.
+            self.device.settle();
             // SAFETY: created from this device; whoever submits with it waits for that before.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
         }

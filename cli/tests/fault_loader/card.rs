@@ -211,6 +211,16 @@ unsafe extern "system" fn vkGetFenceStatus(device: Word, fence: Word) -> i32 {
     unsafe { crate::vkGetFenceStatus(device, fence) }
 }
 
+unsafe extern "system" fn vkQueueWaitIdle(_: Word) -> i32 {
+    release();
+    let queue = queues().real;
+    // SAFETY: the real function, and the one queue there is.
+    unsafe {
+        let wait = real!(c"vkQueueWaitIdle" as fn(Word) -> i32);
+        wait(queue)
+    }
+}
+
 unsafe extern "system" fn vkDeviceWaitIdle(device: Word) -> i32 {
     release();
     // SAFETY: as above.
@@ -389,6 +399,7 @@ pub(crate) fn own(name: &CStr) -> Option<Pointer> {
         "vkQueueSubmit" => vkQueueSubmit as *const (),
         "vkWaitForFences" => vkWaitForFences as *const (),
         "vkGetFenceStatus" => vkGetFenceStatus as *const (),
+        "vkQueueWaitIdle" => vkQueueWaitIdle as *const (),
         "vkDeviceWaitIdle" => vkDeviceWaitIdle as *const (),
         "vkGetPhysicalDeviceProperties" => vkGetPhysicalDeviceProperties as *const (),
         "vkGetPhysicalDeviceQueueFamilyProperties" => {
