@@ -247,14 +247,14 @@ impl LogicalDevice {
     /// Waits until the driver is done with copies that have ended. If the wait fails, they have ended all
     /// the same.
     pub(crate) fn settle(&self) {
-        if self.owned {
-            let _queues = self.all_queues();
-            // SAFETY: as in `wait_until_idle`.
-            let _ = unsafe { self.raw.device_wait_idle() };
-        } else {
-            let queue = self.queue(Lane::Copies);
-            // SAFETY: the device is alive, and this queue of the application's is locked; its other
-            // queues are not the engine's to wait for.
+        // The queue that computes on an application's device is not the engine's to wait for.
+        let lanes = match self.owned {
+            true => &[Lane::Kernels, Lane::Copies][..],
+            false => &[Lane::Copies],
+        };
+        for &lane in lanes {
+            let queue = self.queue(lane);
+            // SAFETY: the device is alive, and the queue is locked.
             let _ = unsafe { self.raw.queue_wait_idle(*queue) };
         }
     }

@@ -214,11 +214,8 @@ unsafe extern "system" fn vkGetFenceStatus(device: Word, fence: Word) -> i32 {
 unsafe extern "system" fn vkQueueWaitIdle(_: Word) -> i32 {
     release();
     let queue = queues().real;
-    // SAFETY: the real function, and the one queue there is.
-    unsafe {
-        let wait = real!(c"vkQueueWaitIdle" as fn(Word) -> i32);
-        wait(queue)
-    }
+    // SAFETY: the one queue there is.
+    unsafe { crate::vkQueueWaitIdle(queue) }
 }
 
 unsafe extern "system" fn vkDeviceWaitIdle(device: Word) -> i32 {

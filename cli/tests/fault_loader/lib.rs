@@ -191,6 +191,7 @@ fallible! {
     vkResetFences(device, count, fences) asks;
     vkGetFenceStatus(device, fence) asks;
     vkWaitForFences(device, count, fences, all, timeout) wait;
+    vkQueueWaitIdle(queue) wait;
     vkDeviceWaitIdle(device) wait;
     vkQueueSubmit(queue, count, infos, fence) asks;
     vkCreateQueryPool(device, info, allocator, out) creates;
