@@ -171,8 +171,9 @@ fn slerp_is_within_its_bounds_the_long_way_too() {
 #[test]
 fn accuracy_does_not_decay_by_hour_24() {
     let set = smooth_set(2, 86_400.0, 1.6);
-    for method in METHODS {
-        for fps in RATES {
+    for (i, method) in METHODS.into_iter().enumerate() {
+        let rates = RATES.into_iter().enumerate();
+        for (_, fps) in rates.filter(|(j, _)| is_turn(i, *j, 2)) {
             assert_within_bounds(&set, method.into(), &Frames::rate(rate(fps)), "24 h");
         }
     }
@@ -183,7 +184,9 @@ fn accuracy_does_not_decay_by_hour_24() {
 fn accuracy_does_not_decay_along_a_day() {
     let mut random = Random(6);
     let mut set = TrackSet::new();
-    let times: Vec<f64> = (0..=86_400).map(f64::from).collect();
+    // A key a second at the end, where it is sampled, and every ten before.
+    let far = (0..8600).map(|i| 10.0 * f64::from(i));
+    let times: Vec<f64> = far.chain((86_000..=86_400).map(f64::from)).collect();
     let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
     set.push("", &times, &keys).unwrap();
     for (i, method) in METHODS.into_iter().enumerate() {

@@ -2,8 +2,8 @@
 //! frames, however the work is cut.
 
 use crate::support::{
-    Random, WAYS, first_difference, give_key_data, hostile_set, is_turn, stage, vulkan_devices,
-    vulkan_engines,
+    Random, WAYS, first_difference, give_key_data, hostile_set, in_turn, is_turn, stage,
+    vulkan_devices, vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
@@ -54,13 +54,13 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
         let set = hostile_set(seed, 1024);
         let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
         let frames = Frames::rate(rate.parse().unwrap()).between(-1.0, 20.0);
-        for method in METHODS {
+        for (place, method) in METHODS.into_iter().enumerate() {
             let interpolation = Interpolation {
                 ends: random.pick(&ENDS),
                 ..Interpolation::from(method)
             };
             let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
-            for vulkan in &engines {
+            for vulkan in in_turn(&engines, seed as usize + place) {
                 let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
                 let name = vulkan.device_name();
                 let what = format!("{name}, {interpolation:?}, {rate} fps, seed {seed}");
@@ -72,7 +72,7 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
             break;
         }
     }
-    println!("{compared} rotations of each device, read in either way, 0 differ");
+    println!("{compared} rotations of each device, its ways of reading in turn, 0 differ");
 }
 
 /// Catches an instruction set whose code fuses or reorders.
@@ -216,11 +216,8 @@ fn arbitrary_times_have_the_same_bits() {
                 stage(options, 1);
             }
         });
-        for (place, vulkan) in engines.iter().enumerate() {
-            for (round, (method, expected)) in METHODS.into_iter().zip(&expected).enumerate() {
-                if !is_turn(round, place, WAYS.len()) {
-                    continue;
-                }
+        for (round, (method, expected)) in METHODS.into_iter().zip(&expected).enumerate() {
+            for vulkan in in_turn(&engines, round) {
                 for (frames, expected) in requests.iter().zip(expected) {
                     let found = vulkan.evaluate(&set, method, frames).unwrap();
                     let what = format!("{method}, {memory:?} bytes");
@@ -244,14 +241,14 @@ fn the_path_as_authored_has_the_same_bits() {
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(60);
-    for vulkan in vulkan_engines(|_| {}) {
-        for method in METHODS {
-            let path = Path::AsAuthored;
-            let interpolation = Interpolation {
-                path,
-                ..Interpolation::from(method)
-            };
-            let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
+    let engines = vulkan_engines(|_| {});
+    for (round, method) in METHODS.into_iter().enumerate() {
+        let interpolation = Interpolation {
+            path: Path::AsAuthored,
+            ..Interpolation::from(method)
+        };
+        let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
+        for vulkan in in_turn(&engines, round) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
         }
@@ -271,13 +268,14 @@ fn closed_loops_have_the_same_bits() {
         set.push("", &times, &keys).unwrap();
     }
     let frames = Frames::fps(120);
-    for vulkan in vulkan_engines(|_| {}) {
-        for method in METHODS {
-            let interpolation = Interpolation {
-                ends: Ends::Loop,
-                ..Interpolation::from(method)
-            };
-            let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
+    let engines = vulkan_engines(|_| {});
+    for (round, method) in METHODS.into_iter().enumerate() {
+        let interpolation = Interpolation {
+            ends: Ends::Loop,
+            ..Interpolation::from(method)
+        };
+        let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
+        for vulkan in in_turn(&engines, round) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
         }
@@ -644,18 +642,22 @@ fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
         let times: Vec<f64> = (0..count).map(uneven).collect();
         let mut set = TrackSet::new();
         set.push("", &times, &keys).unwrap();
-        for method in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER] {
+        for (place, method) in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER]
+            .into_iter()
+            .enumerate()
+        {
             let clip = cpu().upload(&set, method).unwrap();
-            for frames in [
+            let requests = [
                 Frames::fps(53),
                 Frames::fps(60).between(100.0, 400.0),
                 Frames::at(times.iter().map(|time| time + 0.001).step_by(13).collect()),
-            ] {
-                let expected = clip.evaluate(&frames).unwrap();
+            ];
+            for (round, frames) in requests.iter().enumerate() {
+                let expected = clip.evaluate(frames).unwrap();
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
-                assert_everywhere(&engines, &expected, &set, method.into(), &frames);
-                for engine in &small {
-                    let found = engine.evaluate(&set, method, &frames).unwrap();
+                assert_everywhere(&engines, &expected, &set, method.into(), frames);
+                for engine in in_turn(&small, round + place) {
+                    let found = engine.evaluate(&set, method, frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
                 }
             }
@@ -681,20 +683,21 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     let memory = [None, Some(1 << 20)].into_iter();
     let of_memory = |memory| vulkan_engines(|options| options.memory = memory);
     let engines: Vec<Engine> = memory.flat_map(of_memory).collect();
-    for frames in [
+    let requests = [
         Frames::fps(7),
         Frames::fps(15).between(100.0, 900.0),
         Frames::rate("1/1000".parse().unwrap()),
         Frames::at(times.iter().copied().step_by(13).collect()),
-    ] {
-        let expected = clip.evaluate(&frames).unwrap();
-        let found = cpu().evaluate(&set, slerp, &frames).unwrap();
+    ];
+    for (round, frames) in requests.iter().enumerate() {
+        let expected = clip.evaluate(frames).unwrap();
+        let found = cpu().evaluate(&set, slerp, frames).unwrap();
         let what = format!("{frames:?}").chars().take(60).collect::<String>();
         assert_same_bits(expected.as_quats(), found.as_quats(), &what);
         // A device with little memory gets the track in stretches, and those with many
         // samples in pieces.
-        for engine in &engines {
-            let found = engine.evaluate(&set, slerp, &frames).unwrap();
+        for engine in in_turn(&engines, round) {
+            let found = engine.evaluate(&set, slerp, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), &what);
         }
     }
@@ -730,16 +733,13 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             ends,
             ..method.into()
         };
+        let clip = cpu().upload(&set, interpolation).unwrap();
         for (turn, frames) in requests.iter().enumerate() {
-            let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             // A device that has not the memory for the whole track.
-            for (place, engine) in small.iter().enumerate() {
-                if !is_turn(round + turn, place, WAYS.len()) {
-                    continue;
-                }
+            for engine in in_turn(&small, round + turn) {
                 let found = engine.evaluate(&set, interpolation, frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -803,8 +803,9 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
         set.push("", &[0.0, 1e6, 2e6, 3e6], &keys).unwrap();
     }
     let limit = (3e7 - 16_777_216.0) / 60.0; // of the first segment
-    let vulkan = vulkan_engines(|_| {});
-    for start in [10.0, limit - 3.0, 1e6 - limit - 3.0, 5e5] {
+    let engines = vulkan_engines(|_| {});
+    let starts = [10.0, limit - 3.0, 1e6 - limit - 3.0, 5e5].into_iter();
+    for (round, start) in starts.enumerate() {
         let frames = Frames::fps(60).between(start, start + 6.0);
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
             let expected = cpu().evaluate(&set, method, &frames).unwrap();
@@ -813,7 +814,7 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
                 let found = narrow.evaluate(&set, method, &frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), "a width");
             }
-            for vulkan in &vulkan {
+            for vulkan in in_turn(&engines, round) {
                 let found = vulkan.evaluate(&set, method, &frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -920,23 +921,23 @@ fn few_times_of_each_track_have_the_bits_of_many() {
     let mut others = vulkan_engines(small);
     others.extend(vulkan_engines(staged));
     for (round, method) in METHODS.into_iter().enumerate() {
+        let many = cpu().upload(&set, method).unwrap();
         for count in 1..=3 {
             let some = |copies: usize| -> Vec<f64> {
                 let of = |times: &Vec<f64>| times[..count].repeat(copies);
                 asked.iter().flat_map(of).collect()
             };
-            let many = cpu().upload(&set, method).unwrap();
             let many = many.evaluate(&Frames::at_each(some(4))).unwrap();
             let of_track = |row: &[Quat]| row[..count].to_vec();
             let rows = many.as_quats().chunks(4 * count);
             let expected: Vec<Quat> = rows.flat_map(of_track).collect();
             let others = others.iter().filter(|_| count == 2);
+            let frames = Frames::at_each(some(1));
             for (place, engine) in engines.iter().chain(others).enumerate() {
                 if !is_turn(round + count, place, WAYS.len()) {
                     continue;
                 }
                 let clip = engine.upload(&set, method).unwrap();
-                let frames = Frames::at_each(some(1));
                 let found = clip.evaluate(&frames).unwrap();
                 assert_same_bits(&expected, found.as_quats(), method.name);
                 let found = clip.evaluate_as(&frames, Layout::FrameMajor).unwrap();
@@ -994,23 +995,20 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
             after: outside,
             ..method.into()
         };
-        let expected = cpu().upload(&set, interpolation).unwrap();
-        for (place, engine) in engines.iter().enumerate() {
-            if !is_turn(round, place, WAYS.len()) {
-                continue;
-            }
-            let clip = engine.upload(&set, interpolation).unwrap();
-            for frames in &requests {
-                let device = engine.device_name();
-                let what = format!("{method}, {outside:?}, {frames:?}, {device}");
-                let found = clip.evaluate(frames).unwrap();
-                let expected_rotations = expected.evaluate(frames).unwrap();
-                assert!(found.as_quats().len() < set.key_count(), "few samples");
-                assert_same_bits(expected_rotations.as_quats(), found.as_quats(), &what);
-                for encoding in Encoding::KINDS {
-                    let layout = Layout::TrackMajor;
+        let kept = cpu().upload(&set, interpolation).unwrap();
+        let clips: Vec<_> = in_turn(&engines, round)
+            .map(|engine| (engine, engine.upload(&set, interpolation).unwrap()))
+            .collect();
+        for frames in &requests {
+            let samples = kept.evaluate(frames).unwrap().as_quats().len();
+            assert!(samples < set.key_count(), "few samples");
+            for encoding in Encoding::KINDS {
+                let layout = Layout::TrackMajor;
+                let expected = kept.evaluate_encoded(frames, layout, encoding).unwrap();
+                for (engine, clip) in &clips {
                     let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
-                    let expected = expected.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let device = engine.device_name();
+                    let what = format!("{method}, {outside:?}, {frames:?}, {device}");
                     assert!(expected == found, "{encoding:?}, {what}");
                 }
             }
@@ -1034,13 +1032,17 @@ fn dense_sets_go_piece_by_piece() {
     }
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
     let frames = Frames::fps(7).between(1.0 / 240.0, 16.0);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+    let mut engines = vulkan_engines(|_| {});
+    engines.extend(vulkan_engines(|options| options.memory = Some(2 << 20)));
+    for (round, method) in [method::SLERP, method::BESSEL_OVERHAUSER]
+        .into_iter()
+        .enumerate()
+    {
         let expected = cpu().upload(&set, method).unwrap();
         let expected = expected.evaluate(&frames).unwrap();
         let on_cpu = cpu().evaluate(&set, method, &frames).unwrap();
         assert_same_bits(expected.as_quats(), on_cpu.as_quats(), method.name);
-        let small = vulkan_engines(|options| options.memory = Some(2 << 20));
-        for engine in vulkan_engines(|_| {}).into_iter().chain(small) {
+        for engine in in_turn(&engines, round) {
             let found = engine.evaluate(&set, method, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             let layout = Layout::FrameMajor;
@@ -1054,7 +1056,7 @@ fn dense_sets_go_piece_by_piece() {
         path: Path::AsAuthored,
         ..method::BESSEL_OVERHAUSER.into()
     };
-    for engine in vulkan_engines(|_| {}).into_iter().chain([cpu()]) {
+    for engine in in_turn(&engines, 2).chain([&cpu()]) {
         let refused = engine.evaluate(&set, as_authored, &frames);
         let words = refused.unwrap_err().to_string();
         assert!(words.contains("track 990: keys 4 and 5"), "{words}");

@@ -8,7 +8,7 @@ use tumble::{
 
 #[test]
 fn every_device_encodes_like_the_host() {
-    let set = hostile_set(12, 48);
+    let set = hostile_set(12, 24);
     let explicit = (0..500)
         .map(|i| 0.013 * f64::from((i * 29) % 500))
         .collect();

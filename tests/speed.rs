@@ -160,7 +160,7 @@ fn the_same_bits_on_every_device() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let devices = vulkan_devices().into_iter().map(Engine::new);
     let devices: Vec<Engine> = devices.collect::<Result<_, _>>().unwrap();
-    let set = hostile_set(3, 12);
+    let set = hostile_set(3, 6);
     let frames = Frames::fps(30).between(-1.0, 30.0);
     for (round, method) in METHODS.into_iter().enumerate() {
         let interpolation = constant(method);

@@ -1,6 +1,6 @@
 //! Results in chunks: the same bits as in one piece, in order, and nothing left out.
 
-use crate::support::{first_difference, hostile_set, vulkan_devices};
+use crate::support::{first_difference, hostile_set, is_turn, vulkan_devices};
 use glam::Quat;
 use tumble::{
     Device, Encoding, Engine, Error, Frames, Interpolation, Layout, METHODS, WrapMode, method,
@@ -36,14 +36,18 @@ fn chunks_are_the_whole_in_order() {
     let set = hostile_set(5, 24);
     let explicit = (0..700).map(|i| 0.01 * f64::from((i * 37) % 700)).collect();
     let requests = [Frames::fps(60).between(-1.0, 20.0), Frames::at(explicit)];
+    let mut round = 0;
     for device in devices() {
         let engine = Engine::new(device).unwrap();
         for method in METHODS {
+            round += 1;
             let clip = engine.upload(&set, method).unwrap();
             for frames in &requests {
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                     let whole = clip.evaluate_as(frames, layout).unwrap();
-                    for limit in [100, 1000, 5000, usize::MAX] {
+                    round += 1;
+                    let limits = [100, 5000, 1000, usize::MAX].into_iter().enumerate();
+                    for (_, limit) in limits.filter(|(place, _)| is_turn(round, *place, 2)) {
                         let what = format!("{method}, {layout:?}, {limit}");
                         let mut of_clip = Collected::default();
                         clip.stream(frames, layout, limit, |chunk| {

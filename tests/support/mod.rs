@@ -57,6 +57,13 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     vulkan_devices().into_iter().flat_map(every).collect()
 }
 
+/// Of [`vulkan_engines`], called once or more often, those whose turn it is in this round: each device in
+/// one of [`WAYS`], in the next round in the next.
+pub fn in_turn(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
+    let is_next = move |(place, _): &(usize, &Engine)| is_turn(round, *place, WAYS.len());
+    (engines.iter().enumerate().filter(is_next)).map(|(_, engine)| engine)
+}
+
 /// Whether the case at a place is tried in this round: the rounds of a test share its cases out, so that
 /// all are tried once in so many rounds. With `SOAK` set every round tries all.
 pub fn is_turn(round: usize, place: usize, rounds: usize) -> bool {

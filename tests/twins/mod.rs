@@ -30,8 +30,11 @@ use naga::{BinaryOperator, Expression, Literal, Module};
 use program::Checked;
 use trial::Twin;
 
-/// Samples of each function.
-const SAMPLES: usize = 200_000;
+/// Samples of each function; `SOAK` asks for more.
+const SAMPLES: usize = 50_000;
+const SOAKED: usize = 200_000;
+/// Samples of a function with a mistake, of which the first that differs is enough.
+const SAMPLES_OF_MISTAKES: usize = 20_000;
 
 fn twins() -> Vec<Twin> {
     let mut all = functions::math();
@@ -92,8 +95,12 @@ fn every_shader_function_has_the_bits_of_its_twin() {
     let programs: BTreeMap<_, _> = (kernels(&twins).iter())
         .map(|(&name, checked)| (name, checked.program()))
         .collect();
+    let samples = match std::env::var_os("SOAK") {
+        Some(_) => SOAKED,
+        None => SAMPLES,
+    };
     for twin in &twins {
-        if let Err(why) = twin.compare(&programs[twin.kernel], SAMPLES) {
+        if let Err(why) = twin.compare(&programs[twin.kernel], samples) {
             panic!("{why}");
         }
     }
@@ -210,7 +217,7 @@ fn a_mistake_anywhere_is_found() {
             let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
             let own = span.to_range().map_or("", |own| &text[own]).to_owned();
             *mistakes.entry((line, own)).or_insert(false) |=
-                twin.compare(&program, SAMPLES / 10).is_err();
+                twin.compare(&program, SAMPLES_OF_MISTAKES).is_err();
         }
     }
     assert!(mistakes.len() > 850, "only {} were tried", mistakes.len());

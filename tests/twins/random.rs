@@ -42,7 +42,8 @@ impl Random {
 
     /// Of a magnitude between two powers of 2, each as often as the others.
     fn scaled(&mut self, powers: std::ops::Range<i32>) -> f32 {
-        let magnitude = (1.0 + self.0.f64()) * 2.0f64.powi(self.0.i32(powers));
+        let exponent = (1023 + self.0.i32(powers)) as u64;
+        let magnitude = (1.0 + self.0.f64()) * f64::from_bits(exponent << 52);
         self.signed(magnitude as f32)
     }
 

@@ -30,10 +30,16 @@ fn code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// Starts the waiting thread. Without it (a system that refuses, or has no such
-/// signals) they end the program in their default way.
+/// Starts the waiting thread, once for the process. Without it (a system that refuses, or has no
+/// such signals) they end the program in their default way.
 #[cfg(unix)]
 pub(crate) fn stop_on_signals() {
+    static STARTED: std::sync::Once = std::sync::Once::new();
+    STARTED.call_once(wait_for_signals);
+}
+
+#[cfg(unix)]
+fn wait_for_signals() {
     use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
