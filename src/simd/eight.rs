@@ -10,12 +10,11 @@ use std::arch::x86_64::{
     _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
     _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
 };
-use std::cell::Cell;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
-use crate::shader::{POWERS, PolynomialSegment, TINY_BITS};
+use crate::shader::TINY_BITS;
 use crate::simd::doubles::doubles;
 use crate::simd::lanes::{Lanes, Number};
 
@@ -224,21 +223,6 @@ impl Lanes for Eight {
     #[inline(always)]
     fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
         bytemuck::cast([a.0, b.0, c.0, d.0])
-    }
-
-    #[inline(always)]
-    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
-        let places: [usize; 8] = *places.first_chunk().expect("eight places");
-        let segments: &mut [[[f32; 4]; POWERS]] = bytemuck::cast_slice_mut(segments);
-        let segments = Cell::from_mut(segments).as_slice_of_cells();
-        // Each segment is looked up once, not for every power.
-        let own = places.map(|place| segments[place].as_array_of_cells());
-        for (power, &components) in powers.iter().enumerate() {
-            let rotations = Self::rotations(components);
-            for (segment, rotation) in own.iter().zip(rotations) {
-                segment[power].set(rotation);
-            }
-        }
     }
 
     #[inline(always)]
