@@ -8,7 +8,7 @@ use std::arch::x86_64::{
     _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
     _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
     _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
-    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
+    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 
 use bytemuck::{Pod, Zeroable};
@@ -41,15 +41,7 @@ operators! {
     Add add => Self(avx2!(_mm256_add_ps(a.0, b.0)));
     Sub sub => Self(avx2!(_mm256_sub_ps(a.0, b.0)));
     Mul mul => Self(avx2!(_mm256_mul_ps(a.0, b.0)));
-}
-
-impl std::ops::Neg for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(avx2!(_mm256_xor_ps(self.0, Self::all(-0.0).0)))
-    }
+    - => Self(avx2!(_mm256_xor_ps(a.0, Self::all(-0.0).0)));
 }
 
 impl Number for Eight {
@@ -82,14 +74,8 @@ impl Eight {
 
 doubles!(
     EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
-    _mm256_mul_pd, _mm256_div_pd, negated, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to,
-    are_at_most
+    _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to, are_at_most
 );
-
-#[inline(always)]
-fn negated(numbers: __m256d) -> __m256d {
-    avx2!(_mm256_xor_pd(numbers, _mm256_set1_pd(-0.0)))
-}
 
 #[inline(always)]
 fn up_to(numbers: __m256d, limit: __m256d, then: __m256d, otherwise: __m256d) -> __m256d {

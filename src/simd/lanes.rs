@@ -8,7 +8,7 @@ use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
 use crate::math::quaternion::{Arithmetic, Real};
 use crate::shader::{PolynomialSegment, TINY_BITS};
-use crate::simd::doubles::Four;
+use crate::simd::doubles::{Four, pair};
 
 /// The number of one sample, or a vector with the numbers of several samples. An operation rounds
 /// alike for either.
@@ -201,12 +201,12 @@ impl Lanes for Vec4 {
 
     #[inline(always)]
     fn rounded(numbers: Four) -> Self {
-        numbers.rounded()
+        pair::rounded(numbers.0)
     }
 
     #[inline(always)]
     fn widened(self) -> Four {
-        Four::of(self)
+        Four(pair::widened(self))
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use std::arch::x86_64::{
     _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
     _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
     _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
-    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
+    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_ps,
 };
 
 use crate::math::operators::operators;
@@ -37,15 +37,7 @@ operators! {
     Add add => Self(avx512!(_mm512_add_ps(a.0, b.0)));
     Sub sub => Self(avx512!(_mm512_sub_ps(a.0, b.0)));
     Mul mul => Self(avx512!(_mm512_mul_ps(a.0, b.0)));
-}
-
-impl std::ops::Neg for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(avx512!(_mm512_xor_ps(self.0, Self::all(-0.0).0)))
-    }
+    - => Self(avx512!(_mm512_xor_ps(a.0, Self::all(-0.0).0)));
 }
 
 impl Number for Sixteen {
@@ -110,14 +102,8 @@ impl Sixteen {
 
 doubles!(
     SixteenDoubles: __m512d, 8, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
-    _mm512_mul_pd, _mm512_div_pd, negated, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to,
-    are_at_most
+    _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to, are_at_most
 );
-
-#[inline(always)]
-fn negated(numbers: __m512d) -> __m512d {
-    avx512!(_mm512_xor_pd(numbers, _mm512_set1_pd(-0.0)))
-}
 
 #[inline(always)]
 fn up_to(numbers: __m512d, limit: __m512d, then: __m512d, otherwise: __m512d) -> __m512d {
