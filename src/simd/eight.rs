@@ -28,7 +28,8 @@ macro_rules! avx2 {
 
 /// Eight samples: 0 2 4 6 in one half and 1 3 5 7 in the other. After a transposition of each half
 /// two neighbouring rotations lie side by side, without an exchange between the halves.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(transparent)]
 pub(crate) struct Eight(__m256);
 
 /// Two rotations, half of a cache line.
@@ -141,12 +142,6 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        let rotations: [[f32; 4]; 2] = *rotations.first_chunk().expect("two rotations");
-        Self(bytemuck::cast(rotations))
-    }
-
-    #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let [a, b, c, d, e, f, g, h]: [u32; 8] = *places.first_chunk().expect("eight places");
         // Written out: closures are not always inlined.
@@ -183,11 +178,6 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 2]>(self.0));
-    }
-
-    #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
         let rows = avx2! {
@@ -204,16 +194,6 @@ impl Lanes for Eight {
         };
         let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
         [Self(e), Self(f), Self(g), Self(h)]
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        bytemuck::cast([a.0, b.0, c.0, d.0])
-    }
-
-    #[inline(always)]
-    fn of_block(half: &HalfLine) -> Self {
-        Self(bytemuck::cast(*half))
     }
 
     #[inline(always)]

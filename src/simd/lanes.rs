@@ -1,11 +1,12 @@
 //! The numbers that the twins compute with: an f32 for one sample, or a vector for several.
 
-use crate::math::canonical;
 use std::ops::Neg;
+use std::slice;
 
 use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
+use crate::math::canonical;
 use crate::math::quaternion::{Arithmetic, Real};
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::{Four, pair};
@@ -40,7 +41,7 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 
 /// A vector with the numbers of several consecutive samples. Each width has an order of lanes of
 /// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
-pub(crate) trait Lanes: Number {
+pub(crate) trait Lanes: Number + Pod {
     /// Number of samples.
     const COUNT: usize;
 
@@ -48,7 +49,7 @@ pub(crate) trait Lanes: Number {
     type Narrow: Lanes;
 
     /// An array of [`Lanes::COUNT`] rotations.
-    type Rotations: AsRef<[[f32; 4]]>;
+    type Rotations: AsRef<[[f32; 4]]> + Pod;
 
     /// The numbers of [`Lanes::COUNT`] samples in f64.
     type Doubles: Doubles;
@@ -100,7 +101,10 @@ pub(crate) trait Lanes: Number {
     }
 
     /// Loads the first of some rotations, a quarter of [`Lanes::COUNT`]: `x y z w x y z w …`.
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self;
+    #[inline(always)]
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&rotations[..Self::COUNT / 4]))
+    }
 
     /// One rotation, repeated: `x y z w x y z w …`.
     fn repeated(rotation: [f32; 4]) -> Self;
@@ -113,19 +117,19 @@ pub(crate) trait Lanes: Number {
     fn fourfold_of(samples: &[f32]) -> Self;
 
     /// Stores a vector of rotations, `x y z w x y z w …`, to a quarter of [`Lanes::COUNT`] places.
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]);
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
 
     /// From a vector for each of `x y z w` to vectors of whole rotations: the first has those of
     /// the first quarter of the samples, and so on.
     fn transposed(components: [Self; 4]) -> [Self; 4];
 
-    /// The rotations of all samples, from the vectors of whole rotations of each quarter.
-    fn joined(quarters: [Self; 4]) -> Self::Rotations;
-
     /// The rotations of all samples, from a vector for each of `x y z w`.
     #[inline(always)]
     fn rotations(components: [Self; 4]) -> Self::Rotations {
-        Self::joined(Self::transposed(components))
+        bytemuck::cast(Self::transposed(components))
     }
 
     /// Stores the rotations of all samples, from a vector for each of `x y z w`.
@@ -146,7 +150,10 @@ pub(crate) trait Lanes: Number {
         }
     }
 
-    fn of_block(block: &Self::Block) -> Self;
+    #[inline(always)]
+    fn of_block(block: &Self::Block) -> Self {
+        bytemuck::cast(*block)
+    }
 
     /// This vector of whole rotations, the first `count` of them replaced by those of a block.
     fn behind(self, block: &Self::Block, count: usize) -> Self;
@@ -220,11 +227,6 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        Self::from_array(rotations[0])
-    }
-
-    #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let [a, b, c, d]: [u32; 4] = *places.first_chunk().expect("four places");
         let columns = [
@@ -252,16 +254,6 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&[self.to_array()]);
-    }
-
-    #[inline(always)]
-    fn of_block(block: &[f32; 4]) -> Self {
-        Self::from_array(*block)
-    }
-
-    #[inline(always)]
     fn behind(self, block: &[f32; 4], count: usize) -> Self {
         if count > 0 {
             Self::of_block(block)
@@ -278,11 +270,6 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn transposed([x, y, z, w]: [Self; 4]) -> [Self; 4] {
         rows(Mat4::from_cols(x, y, z, w))
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        [a.to_array(), b.to_array(), c.to_array(), d.to_array()]
     }
 
     #[inline(always)]

@@ -12,6 +12,8 @@ use std::arch::x86_64::{
     _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_ps,
 };
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::math::operators::operators;
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::doubles;
@@ -29,7 +31,8 @@ macro_rules! avx512 {
 
 /// Sixteen samples: 0 4 8 12 in the first quarter, 1 5 9 13 in the next, and so on. After a
 /// transposition of each quarter four neighbouring rotations lie side by side.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(transparent)]
 pub(crate) struct Sixteen(__m512);
 
 operators! {
@@ -154,12 +157,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        let rotations: [[f32; 4]; 4] = *rotations.first_chunk().expect("four rotations");
-        Self(bytemuck::cast(rotations))
-    }
-
-    #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let places: &[u32; 16] = places.first_chunk().expect("sixteen places");
         // Written out: closures are not always inlined.
@@ -206,11 +203,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 4]>(self.0));
-    }
-
-    #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
         avx512! {
@@ -225,11 +217,6 @@ impl Lanes for Sixteen {
                 Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
             ]
         }
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 
     #[inline(always)]
@@ -252,11 +239,6 @@ impl Lanes for Sixteen {
                 }
             }
         }
-    }
-
-    #[inline(always)]
-    fn of_block(line: &Line) -> Self {
-        Self(bytemuck::cast(*line))
     }
 
     #[inline(always)]
