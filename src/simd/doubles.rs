@@ -7,13 +7,14 @@ use glam::Vec4;
 
 use pair::Pair;
 
-/// Defines a pair of vectors of `$count` f64 each, with the given functions of one vector, which
-/// the macro `$run` calls.
+/// Defines a pair of vectors of f64, with the given functions of one vector, which the macro `$run`
+/// calls.
 macro_rules! doubles {
-    ($name:ident: $vector:ident, $count:literal, $run:ident, $all:path, $add:path, $sub:path,
+    ($name:ident: $vector:ident, $run:ident, $all:path, $add:path, $sub:path,
      $mul:path, $div:path, $root:path, $min:path, $max:path, $up_to:path, $are_at_most:path) => {
         /// As many f64 as the vector of f32 has lanes.
-        #[derive(Clone, Copy)]
+        #[derive(Clone, Copy, bytemuck::Zeroable, bytemuck::Pod)]
+        #[repr(transparent)]
         pub(crate) struct $name(pub(crate) [$vector; 2]);
 
         $crate::math::operators::operators! {
@@ -60,18 +61,6 @@ macro_rules! doubles {
 
         impl $crate::simd::lanes::Doubles for $name {
             #[inline(always)]
-            fn load(numbers: &[f64]) -> Self {
-                let own: [f64; 2 * $count] = *numbers.first_chunk().expect("enough numbers");
-                Self(bytemuck::cast(own))
-            }
-
-            #[inline(always)]
-            fn store(self, numbers: &mut [f64]) {
-                let own: [f64; 2 * $count] = bytemuck::cast(self.0);
-                numbers[..2 * $count].copy_from_slice(&own);
-            }
-
-            #[inline(always)]
             fn are_at_most(self, limit: f64) -> bool {
                 let Self([a, b]) = self;
                 let limit = $run!($all(limit));
@@ -100,12 +89,12 @@ macro_rules! baseline {
 
 #[cfg(target_arch = "x86_64")]
 doubles!(
-    Four: Pair, 2, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div, pair::root,
+    Four: Pair, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div, pair::root,
     pair::smaller, pair::larger, pair::up_to, pair::are_at_most
 );
 #[cfg(not(target_arch = "x86_64"))]
 doubles!(
-    Four: Pair, 2, baseline, Pair::splat, Add::add, Sub::sub, Mul::mul, Div::div, pair::root,
+    Four: Pair, baseline, Pair::splat, Add::add, Sub::sub, Mul::mul, Div::div, pair::root,
     pair::smaller, pair::larger, pair::up_to, pair::are_at_most
 );
 

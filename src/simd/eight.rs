@@ -74,7 +74,7 @@ impl Eight {
 }
 
 doubles!(
-    EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
+    EightDoubles: __m256d, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
     _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to, are_at_most
 );
 
@@ -95,8 +95,6 @@ fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
 }
 
 impl Lanes for Eight {
-    const COUNT: usize = 8;
-
     type Narrow = Self;
     type Rotations = [[f32; 4]; 8];
     type Doubles = EightDoubles;

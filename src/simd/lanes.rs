@@ -43,7 +43,7 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 /// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
 pub(crate) trait Lanes: Number + Pod {
     /// Number of samples.
-    const COUNT: usize;
+    const COUNT: usize = size_of::<Self>() / size_of::<f32>();
 
     /// The vectors that evaluate short runs: these, or vectors half as wide.
     type Narrow: Lanes;
@@ -175,12 +175,21 @@ pub(crate) trait Lanes: Number + Pod {
 }
 
 /// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
-pub(crate) trait Doubles: Real {
+pub(crate) trait Doubles: Real + Pod {
+    /// Number of samples.
+    const COUNT: usize = size_of::<Self>() / size_of::<f64>();
+
     /// Loads as many numbers as there are lanes.
-    fn load(numbers: &[f64]) -> Self;
+    #[inline(always)]
+    fn load(numbers: &[f64]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
+    }
 
     /// Stores to the first numbers, one for each lane.
-    fn store(self, numbers: &mut [f64]);
+    #[inline(always)]
+    fn store(self, numbers: &mut [f64]) {
+        numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
 
     /// Whether every number is at most `limit`, and none is NaN.
     fn are_at_most(self, limit: f64) -> bool;
@@ -200,7 +209,6 @@ impl Number for Vec4 {
 }
 
 impl Lanes for Vec4 {
-    const COUNT: usize = 4;
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];
     type Doubles = Four;

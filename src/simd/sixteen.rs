@@ -104,7 +104,7 @@ impl Sixteen {
 }
 
 doubles!(
-    SixteenDoubles: __m512d, 8, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
+    SixteenDoubles: __m512d, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
     _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to, are_at_most
 );
 
@@ -122,8 +122,6 @@ fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
 }
 
 impl Lanes for Sixteen {
-    const COUNT: usize = 16;
-
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
     type Doubles = SixteenDoubles;
