@@ -309,8 +309,6 @@ fn rows(columns: Mat4) -> [Vec4; 4] {
 
 #[cfg(test)]
 mod tests {
-    use bytemuck::Zeroable as _;
-
     use super::*;
     use crate::cpu::evaluate::tests::runs_are_samples;
     use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
@@ -318,31 +316,6 @@ mod tests {
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
-    }
-
-    /// Seven powers, as small-angle cubics have: they may be stored as four, and four more of which
-    /// one is stored already.
-    fn powers_come_to_their_places<L: Lanes>() {
-        let number = |power: usize, lane: usize, c: usize| (100 * power + 10 * lane + c) as f32;
-        let component = |power: usize, c: usize| {
-            let own: Vec<f32> = (0..L::COUNT).map(|lane| number(power, lane, c)).collect();
-            L::load(&own)
-        };
-        let powers: Vec<[L; 4]> = (0..7)
-            .map(|power| [0, 1, 2, 3].map(|c| component(power, c)))
-            .collect();
-        let mut segments = vec![PolynomialSegment::zeroed(); L::COUNT];
-        let backward: Vec<usize> = (0..L::COUNT).rev().collect();
-        L::store_powers(&powers, &mut segments, &backward);
-        for (lane, &place) in backward.iter().enumerate() {
-            for (power, found) in segments[place].coefficients.iter().enumerate() {
-                let expected = match power {
-                    ..7 => [0, 1, 2, 3].map(|c| number(power, lane, c)),
-                    _ => [0.0; 4],
-                };
-                assert_eq!(*found, expected);
-            }
-        }
     }
 
     /// Catches lanes that are stored in another order than they were loaded in, and a comparison
@@ -371,7 +344,6 @@ mod tests {
         L::store_rotations(gathered, &mut again);
         again.reverse();
         assert_eq!(bits(again.as_flattened()), bits(found.as_flattened()));
-        powers_come_to_their_places::<L>();
         let (numbers, ones) = (
             vec![[1.0, 20.0, 300.0, 4000.0]; L::COUNT],
             vec![[1.0; 4]; L::COUNT],
