@@ -178,7 +178,7 @@ impl Lanes for Eight {
     #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
-        let rows = avx2! {
+        bytemuck::cast(avx2! {
             let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
@@ -189,9 +189,7 @@ impl Lanes for Eight {
                 _mm256_unpacklo_pd(ab_high, cd_high),
                 _mm256_unpackhi_pd(ab_high, cd_high),
             ]
-        };
-        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
-        [Self(e), Self(f), Self(g), Self(h)]
+        })
     }
 
     #[inline(always)]

@@ -237,13 +237,12 @@ impl Lanes for Vec4 {
     #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let [a, b, c, d]: [u32; 4] = *places.first_chunk().expect("four places");
-        let columns = [
-            rotations[a as usize],
-            rotations[b as usize],
-            rotations[c as usize],
-            rotations[d as usize],
-        ];
-        rows(Mat4::from_cols_array_2d(&columns))
+        Self::transposed([
+            Self::from_array(rotations[a as usize]),
+            Self::from_array(rotations[b as usize]),
+            Self::from_array(rotations[c as usize]),
+            Self::from_array(rotations[d as usize]),
+        ])
     }
 
     #[inline(always)]
@@ -277,7 +276,8 @@ impl Lanes for Vec4 {
 
     #[inline(always)]
     fn transposed([x, y, z, w]: [Self; 4]) -> [Self; 4] {
-        rows(Mat4::from_cols(x, y, z, w))
+        let rows = Mat4::from_cols(x, y, z, w).transpose();
+        [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
     }
 
     #[inline(always)]
@@ -299,12 +299,6 @@ impl Lanes for Vec4 {
     fn any_at_most(self, limit: f32) -> bool {
         self.cmple(Self::splat(limit)).any()
     }
-}
-
-#[inline(always)]
-fn rows(columns: Mat4) -> [Vec4; 4] {
-    let rows = columns.transpose();
-    [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
 }
 
 #[cfg(test)]
