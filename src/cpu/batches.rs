@@ -89,9 +89,8 @@ pub(crate) fn tasks<'b, 'o>(
     let with_place = |batches: &'b [Batch]| {
         let rotations = (batches.iter())
             .map(|batch| batch.tracks().len() * batch.samples(set, timeline, part).len());
-        let (own, others) = std::mem::take(&mut output).split_at_mut(rotations.sum());
-        output = others;
-        (batches, own)
+        let own = output.split_off_mut(..rotations.sum());
+        (batches, own.unwrap_or_default())
     };
     batches.chunks(each).map(with_place).collect()
 }

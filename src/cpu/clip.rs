@@ -237,9 +237,8 @@ fn tasks<'a, T>(
     mut output: &'a mut [T],
 ) -> Vec<(Window, &'a mut [T])> {
     let with_output = |window: Window| {
-        let (own, others) = std::mem::take(&mut output).split_at_mut(window.len() * each);
-        output = others;
-        (window, own)
+        let own = output.split_off_mut(..window.len() * each);
+        (window, own.unwrap_or_default())
     };
     let limit = match window.layout {
         Layout::TrackMajor => TASK,

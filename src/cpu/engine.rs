@@ -30,9 +30,8 @@ impl CpuEngine {
             .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
             .transpose()?;
         Ok(Self {
-            width,
             pool,
-            scratch_pool: ScratchPool::default(),
+            ..Self::on_shared_threads(width)
         })
     }
 

@@ -1,22 +1,20 @@
 //! Filling memory by streaming stores: the rate that evaluation is compared with.
 
-use std::slice;
-
 use glam::Quat;
 
 use crate::simd::dispatch::{InLanesInto, VectorWidth, fence, in_lanes_into};
 use crate::simd::lanes::Lanes;
-use crate::simd::line::{EACH, Line};
+use crate::simd::line::Line;
 
 /// Stores one rotation everywhere.
-struct Fill(Line);
+struct Fill([f32; 4]);
 
 impl InLanesInto<[Line]> for Fill {
     type Outcome = ();
 
     #[inline(always)]
     fn run<L: Lanes>(&self, lines: &mut [Line]) {
-        let value = L::of_block(&bytemuck::cast_slice(slice::from_ref(&self.0))[0]);
+        let value = L::repeated(self.0);
         for block in bytemuck::cast_slice_mut::<Line, L::Block>(lines) {
             value.store_past_caches(block);
         }
@@ -30,9 +28,10 @@ impl VectorWidth {
     pub fn fill_past_caches(self, output: &mut [Quat], value: Quat) {
         let rotations: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);
-        before.fill(value.to_array());
-        in_lanes_into(self, &Fill(Line([value.to_array(); EACH])), lines);
-        after.fill(value.to_array());
+        let value = value.to_array();
+        before.fill(value);
+        in_lanes_into(self, &Fill(value), lines);
+        after.fill(value);
     }
 }
 

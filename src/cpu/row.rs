@@ -106,9 +106,8 @@ impl<S: Evaluate> Row<'_, S> {
                     }
                     Source::Exact(index) => {
                         let parameter = block.parameter::<FrameClock>(j);
-                        let source = RunSource::Exact { index, parameter };
-                        let run = Run::new(last - count, count, source);
-                        self.exact(&run, &mut output.samples()[start..][..count]);
+                        let own = &mut output.samples()[start..][..count];
+                        self.exact(last - count, index, parameter, own);
                         output.made(start..start + count);
                     }
                 }
@@ -176,9 +175,8 @@ impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
 
     #[inline(always)]
     fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
-        let run = Run::new(sample, count, RunSource::Exact { index, parameter });
         let output = self.row.samples_of(sample, count, self.output);
-        self.row.exact(&run, output);
+        self.row.exact(sample, index, parameter, output);
     }
 }
 
@@ -205,12 +203,12 @@ impl<S: Evaluate> Row<'_, S> {
                     distances::<L, S>(segment, affine, &from_middle, count, output);
                 }
             }
-            RunSource::Exact { .. } => self.exact(run, output),
+            RunSource::Exact { index, parameter } => {
+                self.exact(run.sample, index, parameter, output);
+            }
         }
     }
-}
 
-impl<S> Row<'_, S> {
     /// Where samples of the track go; `output` starts at the first sample of the track copy.
     #[inline(always)]
     fn samples_of<'o>(
@@ -222,15 +220,12 @@ impl<S> Row<'_, S> {
         &mut output[sample - self.copy.samples.start..][..count]
     }
 
-    /// Evaluates a run in f64.
+    /// Evaluates samples from `first` on in f64.
     #[inline(never)]
-    fn exact(&self, run: &Run, output: &mut [[f32; 4]]) {
-        let RunSource::Exact { index, parameter } = run.source else {
-            return;
-        };
+    fn exact(&self, first: usize, index: u32, parameter: Parameter, output: &mut [[f32; 4]]) {
         let PartRef { prepared, part } = self.part;
-        for (sample, rotation) in (run.sample..).zip(output) {
-            let track = part.track as usize;
+        let track = part.track as usize;
+        for (sample, rotation) in (first..).zip(output) {
             *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
         }
     }

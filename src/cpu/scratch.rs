@@ -55,8 +55,6 @@ impl ScratchPool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Device;
-    use crate::engine::Engine;
     use crate::method;
     use crate::time::frames::Frames;
     use crate::tracks::set::swinging;
@@ -66,10 +64,9 @@ mod tests {
     #[test]
     fn each_way_to_interpolate_finds_its_memory_again() {
         let set = swinging(4, 26, false);
-        let clip = (Engine::new(Device::Cpu).unwrap())
-            .upload(&set, method::SLERP)
+        let timeline = Frames::fps(60)
+            .resolve(set.track_count(), set.time_span())
             .unwrap();
-        let timeline = clip.timeline(&Frames::fps(60)).unwrap();
         let scratch_pool = ScratchPool::default();
         let from = |pool: &ScratchPool, own| {
             let interpolation = Interpolation::from(own);

@@ -95,7 +95,8 @@ impl Sink for Places<'_> {
     ) {
         let rotations = L::COUNT / 4;
         let of_turn = S::samples::<L>() / rotations;
-        let (begun, there) = (blocks::<L>(&self.begun.0), self.begun.1);
+        let (begun, there) = self.begun;
+        let begun: &[L::Block] = bytemuck::cast_slice(slice::from_ref(&begun));
         let whole: &mut [L::Block] = bytemuck::cast_slice_mut(self.whole);
         let rest = bytemuck::cast_slice_mut(slice::from_mut(self.rest));
         // From here on samples are counted in vectors.
@@ -129,11 +130,6 @@ impl Sink for Places<'_> {
             }
         }
     }
-}
-
-#[inline(always)]
-fn blocks<L: Lanes>(line: &Line) -> &[L::Block] {
-    bytemuck::cast_slice(slice::from_ref(line))
 }
 
 /// Stores the `i`th vector: into a whole line, or into the rest after the whole lines.

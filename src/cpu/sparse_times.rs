@@ -5,10 +5,10 @@ use crate::cpu::evaluate::one;
 use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PartRef};
-use crate::shader::{ArcSegment, Form, PolynomialSegment};
+use crate::shader::{ArcSegment, Form};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
-use crate::time::runs::{Affine, Distance, RunSource};
+use crate::time::runs::{Distance, RunSource};
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Samples that are evaluated together.
@@ -23,8 +23,8 @@ pub(crate) struct FewTimes<'a> {
     pub(crate) window: &'a Window,
     /// `[track][sample]`.
     pub(crate) output: &'a mut [[f32; 4]],
-    /// Tracks with a sample that takes more than a lookup, as places in the window: the caller
-    /// evaluates their rows.
+    /// Tracks with a sample that takes more than a lookup, outside the keys or on a curve that is
+    /// evaluated in f64, as places in the window: the caller evaluates their rows.
     pub(crate) others: Vec<usize>,
 }
 
@@ -36,13 +36,6 @@ struct Block {
     /// Where each sample is stored in the output.
     places: [usize; LANES],
     count: usize,
-}
-
-/// What one sample is evaluated from.
-enum One<'a> {
-    Constant([f32; 4]),
-    Arc(&'a ArcSegment, f32),
-    Polynomial(&'a PolynomialSegment, Affine, f32),
 }
 
 impl InLanes for FewTimes<'_> {
@@ -57,31 +50,38 @@ impl InLanes for FewTimes<'_> {
             count: 0,
         };
         for (i, track) in self.window.tracks.clone().enumerate() {
-            let Some(part) = self.clip.only_part(track) else {
+            let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
                 self.others.push(i);
                 continue;
             };
             let times = &self.times[track * self.stride..][samples.clone()];
             for (k, &time) in times.iter().enumerate() {
                 let place = i * samples.len() + k;
-                match part.at_time(time) {
-                    Some(One::Constant(rotation)) => self.output[place] = rotation,
-                    Some(One::Polynomial(segment, affine, distance)) => {
-                        self.output[place] = one(segment, affine, distance);
+                let (index, middle, affine) = match prepared.spans.source_at(part, time) {
+                    Some(RunSource::Constant(index)) => {
+                        self.output[place] = prepared.constants[index as usize];
+                        continue;
                     }
-                    Some(One::Arc(segment, parameter)) => {
-                        block.middles[block.count] = segment.middle;
-                        block.tangents[block.count] = segment.tangent;
-                        block.parameters[block.count] = parameter;
-                        block.places[block.count] = place;
-                        block.count += 1;
+                    Some(RunSource::Segment(index, Distance::Seconds { middle }, affine)) => {
+                        (index as usize, middle, affine)
+                    }
+                    _ => {
+                        self.others.push(i);
+                        break;
+                    }
+                };
+                let (segments, distance) = (&prepared.segments, round_f32(time - middle));
+                match segments.form {
+                    Form::Arc => {
+                        let parameter = distance * affine.scale + affine.offset;
+                        block.push(&segments.arcs[index], parameter, place);
                         if block.count == LANES {
                             block.flush::<L>(self.output);
                         }
                     }
-                    None => {
-                        self.others.push(i);
-                        break;
+                    Form::Polynomial => {
+                        let segment = &segments.polynomials[index];
+                        self.output[place] = one(segment, affine, distance);
                     }
                 }
             }
@@ -91,6 +91,15 @@ impl InLanes for FewTimes<'_> {
 }
 
 impl Block {
+    #[inline(always)]
+    fn push(&mut self, segment: &ArcSegment, parameter: f32, place: usize) {
+        self.middles[self.count] = segment.middle;
+        self.tangents[self.count] = segment.tangent;
+        self.parameters[self.count] = parameter;
+        self.places[self.count] = place;
+        self.count += 1;
+    }
+
     #[inline(always)]
     fn flush<L: Lanes>(&mut self, output: &mut [[f32; 4]]) {
         let mut rotations = [[0.0; 4]; LANES];
@@ -105,35 +114,5 @@ impl Block {
             output[place] = rotation;
         }
         self.count = 0;
-    }
-}
-
-impl<'a> PartRef<'a> {
-    /// What the rotation at a time is evaluated from; `None` where that takes more than a lookup:
-    /// outside the keys, and on curves that are evaluated in f64.
-    #[inline(always)]
-    fn at_time(self, time: f64) -> Option<One<'a>> {
-        let PartRef { prepared, part } = self;
-        let (index, middle, affine) = match prepared.spans.source_at(part, time)? {
-            RunSource::Constant(index) => {
-                return Some(One::Constant(prepared.constants[index as usize]));
-            }
-            RunSource::Segment(index, Distance::Seconds { middle }, affine) => {
-                (index as usize, middle, affine)
-            }
-            _ => return None,
-        };
-        let distance = round_f32(time - middle);
-        let segments = &prepared.segments;
-        match segments.form {
-            Form::Arc => {
-                let parameter = distance * affine.scale + affine.offset;
-                Some(One::Arc(&segments.arcs[index], parameter))
-            }
-            Form::Polynomial => {
-                let segment = &segments.polynomials[index];
-                Some(One::Polynomial(segment, affine, distance))
-            }
-        }
     }
 }

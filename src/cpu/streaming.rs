@@ -6,7 +6,9 @@ use std::ops::Range;
 
 use crate::cpu::evaluate::{FEW, frames, frames_past_caches};
 use crate::cpu::sink::Places;
-use crate::simd::dispatch::{InLanes, VectorWidth, fence, in_lanes_of, streaming_stores_from};
+use crate::simd::dispatch::{
+    InLanesInto, VectorWidth, fence, in_lanes_into, streaming_stores_from,
+};
 use crate::simd::lanes::Lanes;
 use crate::simd::line::{EACH, Line};
 use crate::time::runs::Affine;
@@ -29,7 +31,7 @@ pub(crate) struct Stage<'o> {
     place: Place<'o>,
     /// The staging lines; `None` where rows are written directly.
     lines: Option<Box<[Line; LINES]>>,
-    /// Rotations that are staged, counted from the start of the first staging line.
+    /// Rotations that are staged, if any are, counted from the start of the first staging line.
     filled: usize,
 }
 
@@ -73,21 +75,16 @@ impl<'o> Stage<'o> {
             true => bytemuck::pod_align_to_mut(output),
             false => (output, &mut [][..], &mut [][..]),
         };
-        let filled = match is_staged {
-            true => before.len().wrapping_neg() % EACH,
-            false => 0,
-        };
-        let place = Place {
-            before,
-            lines,
-            after,
-            stored: 0,
-        };
         Self {
             width,
-            place,
             lines: is_staged.then(bytemuck::zeroed_box),
-            filled,
+            filled: before.len().wrapping_neg() % EACH,
+            place: Place {
+                before,
+                lines,
+                after,
+                stored: 0,
+            },
         }
     }
 
@@ -103,9 +100,7 @@ impl<'o> Stage<'o> {
                 self.clear();
             }
             let Some(lines) = &mut self.lines else {
-                let all = std::mem::take(&mut self.place.before);
-                let (row, others) = all.split_at_mut(count);
-                self.place.before = others;
+                let row = self.place.before.split_off_mut(..count).unwrap_or_default();
                 return make(0..count, &mut Output::Here(row));
             };
             let some = (count - first).min(EACH * LINES - self.filled);
@@ -138,11 +133,7 @@ impl<'o> Stage<'o> {
             return;
         };
         let whole = self.filled / EACH;
-        let mut store = Store {
-            lines: &lines[..whole],
-            place: &mut self.place,
-        };
-        in_lanes_of(self.width, &mut store);
+        in_lanes_into(self.width, &WholeLines(&lines[..whole]), &mut self.place);
         if whole < LINES {
             lines[0] = lines[whole];
         }
@@ -189,15 +180,15 @@ impl<'o> Place<'o> {
     }
 }
 
-struct Store<'s, 'o> {
-    lines: &'s [Line],
-    place: &'s mut Place<'o>,
-}
+/// Staging lines to be stored.
+struct WholeLines<'s>(&'s [Line]);
 
-impl InLanes for Store<'_, '_> {
+impl<'o> InLanesInto<Place<'o>> for WholeLines<'_> {
+    type Outcome = ();
+
     #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        self.place.store::<L>(self.lines);
+    fn run<L: Lanes>(&self, place: &mut Place<'o>) {
+        place.store::<L>(self.0);
     }
 }
 

@@ -16,7 +16,7 @@ pub(crate) fn canonical(value: f32) -> f32 {
 }
 
 /// Neighbouring f64 numbers are 1 apart here, so that adding this rounds the fraction away.
-const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+pub(super) const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
 
 /// The whole number nearest to `x`, for |x| < 2^51. A call of `round` would take longer than the
 /// rest of a loop that uses it.

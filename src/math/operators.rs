@@ -1,7 +1,8 @@
 //! Arithmetic operators for types that wrap numbers.
 
-/// Implements binary operators of a type, generic over what stands in brackets: each operator's
-/// result is an expression of the operands, which the caller names.
+/// Implements operators of a type, generic over what stands in brackets: each operator's result is
+/// an expression of the operands, which the caller names. The last, if any, is that of a sign, for
+/// types that are not generic.
 macro_rules! operators {
     (@one [$($generics:tt)*] $name:ty, $a:ident, $b:ident, $operator:ident, $apply:ident, $result:expr) => {
         impl<$($generics)*> std::ops::$operator for $name {
@@ -14,8 +15,18 @@ macro_rules! operators {
             }
         }
     };
-    ($generics:tt $name:ty, $a:ident, $b:ident: $($operator:ident $apply:ident => $result:expr;)+) => {
+    ($generics:tt $name:ty, $a:ident, $b:ident: $($operator:ident $apply:ident => $result:expr;)+
+     $(- => $negated:expr;)?) => {
         $(crate::math::operators::operators!(@one $generics $name, $a, $b, $operator, $apply, $result);)+
+        $(impl std::ops::Neg for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let $a = self;
+                $negated
+            }
+        })?
     };
 }
 pub(crate) use operators;

@@ -9,7 +9,7 @@
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::math::canonical::nearest_whole;
+use crate::math::canonical::{SHIFT, nearest_whole};
 
 /// A number, or a vector of numbers, that can be added, subtracted and multiplied.
 pub(crate) trait Arithmetic:
@@ -207,7 +207,6 @@ const HALF_PI: [f64; 4] = [
 #[inline(always)]
 pub(crate) fn sine_cosine(x: f64) -> (f64, f64) {
     // The whole number nearest to x / (pi/2); its last bits are the quadrant.
-    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
     let shifted = x * FRAC_2_PI + SHIFT;
     let whole = shifted - SHIFT;
     let quadrant = shifted.to_bits();

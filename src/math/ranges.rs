@@ -129,8 +129,8 @@ pub(crate) const MEDIUM_SQUARE: f64 = 1.25;
 /// The largest square of an angle that [`long_waves`] takes.
 pub(crate) const LONG_SQUARE: f64 = FRAC_PI_2 * FRAC_PI_2;
 
-/// Coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), 0 <= u <= 1;
-/// from Chebyshev nodes, within 2e-13.
+/// Coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), 0 <= u <= 1: an angle from
+/// its sine without an arc function. From Chebyshev nodes, within 2e-13.
 const ANGLE_BY_SINE: [f64; 16] = [
     0.33333333333323145,
     0.13333333338545655,
@@ -184,13 +184,6 @@ fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
         sum = sum * fourth + (high * square + low);
     }
     sum * x + R::all(1.0)
-}
-
-/// `x / sin(x)` for `u = 1 - cos(x)`, 0 <= x <= pi/2: an angle from its sine without
-/// an arc function.
-#[inline(always)]
-fn angle_by_sine<R: Real>(u: R) -> R {
-    one_plus(&ANGLE_BY_SINE, u)
 }
 
 /// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`LONG_SQUARE`]; within 1e-14.
@@ -264,7 +257,7 @@ impl<R: Real> Algebra for PrincipalRange<R> {
     fn log(&mut self, q: [R; 4]) -> [R; 3] {
         let u = R::all(1.0) - q[3];
         self.check(u, 1.0);
-        scaled([q[0], q[1], q[2]], angle_by_sine(u))
+        scaled([q[0], q[1], q[2]], one_plus(&ANGLE_BY_SINE, u))
     }
 
     #[inline(always)]

@@ -1,11 +1,11 @@
 //! The cumulative B-spline, with the key times as knots.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
 use crate::reference::given::with_frozen_ends;
-use crate::reference::quaternion::{exponential, invert, logarithm, multiply, vector};
+use crate::reference::quaternion::{exponential, logarithm, multiply, turned};
 use crate::reference::segment::{Basis, Segment};
 use crate::reference::track::Track;
 
@@ -16,7 +16,7 @@ pub(crate) const B_SPLINE: Definition =
 fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
-    let basis = Basis::Knots(knots(track, ends, i));
+    let basis = Basis::Knots(knots(&track.times, ends, i));
     let before = if i > 0 {
         step(i - 1)
     } else {
@@ -59,15 +59,14 @@ fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
 
 /// The six knots about interval `i`. Beyond the ends they go on in steps of the outermost interval
 /// or, for a loop, across the seam.
-fn knots(track: &Track, ends: Ends, i: usize) -> [f64; 6] {
-    let last = track.last() as isize - 1;
+pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
+    let count = times.len() as isize - 1;
     let step = |j: isize| {
-        let j = if ends == Ends::Loop {
-            j.rem_euclid(last + 1)
-        } else {
-            j.clamp(0, last)
-        };
-        track.step(j as usize)
+        let j = match ends {
+            Ends::Loop => j.rem_euclid(count),
+            _ => j.clamp(0, count - 1),
+        } as usize;
+        times[j + 1] - times[j]
     };
     let i = i as isize;
     let mut knots = [0.0; 6];
@@ -103,7 +102,7 @@ fn bends(basis: Basis, t: f64) -> [f64; 3] {
 /// `w₁` such that the curve starts with `turn = exp(-w₂ B₂) w₁ B₁' exp(w₂ B₂) + w₂ B₂'`.
 fn first(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
     let (values, slopes) = (basis.values(0.0), basis.derivatives(0.0));
-    turned(turn - own * slopes[1], own * values[1]) / slopes[0]
+    turned(turn - own * slopes[1], exponential(own * values[1])) / slopes[0]
 }
 
 /// `w₃` such that the curve ends with `turn = exp(-w₃ B₃) w₂ B₂' exp(w₃ B₃) + w₃ B₃'`.
@@ -111,16 +110,7 @@ fn third(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
     let (values, slopes) = (basis.values(1.0), basis.derivatives(1.0));
     let mut w = own;
     for _ in 0..200 {
-        w = (turn - turned(own * slopes[1], -w * values[2])) / slopes[2];
+        w = (turn - turned(own * slopes[1], exponential(-w * values[2]))) / slopes[2];
     }
     w
-}
-
-/// `exp(by) v exp(-by)`.
-fn turned(v: DVec3, by: DVec3) -> DVec3 {
-    let v = DQuat::from_xyzw(v.x, v.y, v.z, 0.0);
-    vector(multiply(
-        multiply(exponential(by), v),
-        invert(exponential(by)),
-    ))
 }

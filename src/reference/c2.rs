@@ -31,18 +31,11 @@ fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
 fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
     let secant = |i: usize| 2.0 * logarithm(track.difference(i)) / track.step(i);
-    let mut velocities: Vec<DVec3> = (0..=last)
-        .map(|key| {
-            if last == 0 {
-                DVec3::ZERO
-            } else {
-                secant(key.min(last - 1))
-            }
-        })
-        .collect();
     if last < 2 {
-        return velocities;
+        // Two keys are joined by an arc, and one has no curve.
+        return vec![DVec3::ZERO; last + 1];
     }
+    let mut velocities: Vec<DVec3> = (0..=last).map(|key| secant(key.min(last - 1))).collect();
     let parabola = |end: usize, next: usize| {
         let (h, next_h) = (track.step(end), track.step(next));
         let inner = (secant(next) * h + secant(end) * next_h) / (h + next_h);

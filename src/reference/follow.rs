@@ -5,7 +5,8 @@ use std::fmt;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::reference::vector::VectorCurve;
+use crate::reference::pace::{bisected, gauss};
+use crate::reference::vector::{VectorCurve, hermite};
 
 /// Steps of an interval: the error of Runge and Kutta's method of fourth order is below 1e-11 where
 /// the direction turns by a few radians.
@@ -160,8 +161,7 @@ impl Followed<'_> {
         let up = match self.own.frame {
             Frame::Fixed => across(self.own.up, forward),
             Frame::Minimal => {
-                let step = ((t * STEPS as f64) as usize).min(STEPS - 1);
-                let from = step as f64 / STEPS as f64;
+                let (step, from) = step_at(t);
                 let up = self.carried(i, from, t, self.ups[i * STEPS + step]);
                 DQuat::from_axis_angle(forward, self.roll(self.length_at(i, t))) * up
             }
@@ -195,22 +195,13 @@ impl Followed<'_> {
         let step = (after - 1).min(self.lengths.len() - 2);
         let i = step / STEPS;
         let from = (step % STEPS) as f64 / STEPS as f64;
-        let (mut low, mut high) = (from, from + 1.0 / STEPS as f64);
-        for _ in 0..60 {
-            let middle = (low + high) / 2.0;
-            if self.length_at(i, middle) < length {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        (i, (low + high) / 2.0)
+        let is_before = |t: f64| self.length_at(i, t) < length;
+        (i, bisected(from, from + 1.0 / STEPS as f64, is_before))
     }
 
     /// The length up to a place.
     fn length_at(&self, i: usize, t: f64) -> f64 {
-        let step = ((t * STEPS as f64) as usize).min(STEPS - 1);
-        let from = step as f64 / STEPS as f64;
+        let (step, from) = step_at(t);
         self.lengths[i * STEPS + step] + gauss(|t| self.speed(i, t), from, t)
     }
 
@@ -279,17 +270,14 @@ impl Followed<'_> {
     }
 
     fn roll(&self, length: f64) -> f64 {
-        let [.., _] = self.rolls[..] else { return 0.0 };
         let after = self.rolls.partition_point(|key| key[0] <= length).max(1);
         let [a, p, m] = self.rolls[after - 1];
         let Some(&[b, q, n]) = self.rolls.get(after) else {
             return p;
         };
-        let (h, t) = (b - a, (length - a) / (b - a));
-        let (t2, t3) = (t * t, t * t * t);
-        p * (2.0 * t3 - 3.0 * t2 + 1.0)
-            + q * (3.0 * t2 - 2.0 * t3)
-            + h * (m * (t3 - 2.0 * t2 + t) + n * (t3 - t2))
+        let h = b - a;
+        let [from, out, to, incoming] = hermite((length - a) / h);
+        p * from + q * to + h * (m * out + n * incoming)
     }
 
     /// `w × u` with `u = P' × P'' / |…|`, with the sign that continues that of the start.
@@ -302,10 +290,9 @@ impl Followed<'_> {
                 .normalize_or_zero()
         };
         let steps = |i: usize, t: f64| {
-            let count = (t * STEPS as f64) as usize;
             // A little inside, as the second derivative jumps at keys and vanishes at inflections.
             let at = move |step: usize| (step as f64 + 1e-6) / STEPS as f64;
-            (0..=count.min(STEPS - 1)).map(move |step| (i, at(step)))
+            (0..=step_at(t).0).map(move |step| (i, at(step)))
         };
         let before = (0..i).flat_map(|i| steps(i, 1.0).chain([(i, 1.0 - 1e-9)]));
         let mut last = raw(0, 1e-9);
@@ -315,6 +302,12 @@ impl Followed<'_> {
         }
         last
     }
+}
+
+/// The step of an interval with a parameter, and where it starts.
+fn step_at(t: f64) -> (usize, f64) {
+    let step = ((t * STEPS as f64) as usize).min(STEPS - 1);
+    (step, step as f64 / STEPS as f64)
 }
 
 /// Smoothstep speed up over the part `a` of the time, constant, and down over the part `b`.
@@ -368,11 +361,4 @@ fn slopes(points: &[(f64, f64)]) -> Vec<[f64; 3]> {
     };
     let row = |(i, &(place, value)): (usize, &(f64, f64))| [place, value, slope(i)];
     points.iter().enumerate().map(row).collect()
-}
-
-/// Gauss' quadrature with three points.
-fn gauss(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
-    let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
-    let far = 0.6f64.sqrt();
-    half * (5.0 * f(middle - half * far) + 8.0 * f(middle) + 5.0 * f(middle + half * far)) / 9.0
 }

@@ -13,53 +13,90 @@ use crate::reference::segment::{Basis, Segment};
 use crate::reference::track::Track;
 use crate::tracks::key_data::Tcb;
 
-/// A cumulative cubic with tangents from the neighbouring keys.
-pub(crate) const CATMULL_ROM: Definition = Definition::new(segments::<CatmullRom>);
-/// A cumulative cubic with tangents of the parabola through three keys.
-pub(crate) const BESSEL_OVERHAUSER: Definition = Definition::new(segments::<BesselOverhauser>);
-/// Bézier curves with the mean of the logarithms of the slopes.
-pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = Definition::new(segments::<Mean>);
-/// Bézier curves with tension, continuity and bias.
-pub(crate) const KOCHANEK_BARTELS: Definition = Definition::new(segments::<KochanekBartels>);
-/// Spherical quadrangles.
-pub(crate) const SQUAD: Definition = Definition::new(segments::<Squad>);
-/// Bézier curves, their control rotations the bisectors.
-pub(crate) const SHOEMAKE: Definition = Definition::new(segments::<Shoemake>);
-/// Bézier curves, their control rotations half way to the bisectors.
-pub(crate) const SHOEMAKE_2: Definition = Definition::new(segments::<Shoemake2>);
-/// Bézier curves, their control rotations a third of the way to the bisectors.
-pub(crate) const SHOEMAKE_1985: Definition = Definition::new(segments::<Shoemake1985>);
-
 /// What one method says of handles.
-trait Handles {
+#[derive(Clone, Copy)]
+pub(crate) struct Handles {
     /// The incoming and the outgoing handle of the key between two intervals.
-    fn inner(track: &Track, key: usize, sides: &Sides) -> (DVec3, DVec3);
-
+    inner: fn(&Sides) -> (DVec3, DVec3),
     /// The handle of an end of the track whose interval turns by `whole`, where `other` is the
     /// handle at the other end of the interval.
-    fn parabolic(whole: DVec3, other: DVec3) -> DVec3 {
-        2.0 / 3.0 * whole - other
+    parabolic: fn(DVec3, DVec3) -> DVec3,
+    /// The same for ends without angular acceleration, of what is left of the interval without the
+    /// other handle, and this.
+    natural: fn(DVec3, DVec3) -> DVec3,
+    /// The same for an end that turns as if by the first vector in the whole interval, which turns
+    /// by the second.
+    turning: fn(DVec3, DVec3) -> DVec3,
+    /// The curve of an interval with an outgoing and an incoming handle.
+    segment: fn(&Track, usize, DVec3, DVec3) -> Segment,
+}
+
+impl Handles {
+    /// Those of Bézier curves.
+    const fn bezier(inner: fn(&Sides) -> (DVec3, DVec3)) -> Self {
+        Self {
+            inner,
+            parabolic: |whole, other| 2.0 / 3.0 * whole - other,
+            natural: |rest, _| rest / 2.0,
+            turning: |turn, _| turn / 3.0,
+            segment: |track, i, out, incoming| Segment::Bezier(controls(track, i, out, incoming)),
+        }
     }
 
-    /// The same for ends without angular acceleration; `rest` is what is left of the interval
-    /// without the other handle.
-    fn natural(rest: DVec3, _other: DVec3) -> DVec3 {
-        rest / 2.0
+    /// Those of cumulative cubics.
+    const fn cumulative(inner: fn(&Sides) -> (DVec3, DVec3)) -> Self {
+        Self {
+            segment: cumulative,
+            ..Self::bezier(inner)
+        }
     }
 
-    /// The same for an end that turns as if by `turn` in the whole interval.
-    fn turning(turn: DVec3, _whole: DVec3) -> DVec3 {
-        turn / 3.0
+    /// The curves of a track.
+    pub(crate) fn segments(&self, track: &Track, ends: Ends) -> Vec<Segment> {
+        smooth(track, ends, |i| {
+            let [out, incoming] = self.of_interval(track, ends, i);
+            (self.segment)(track, i, out, incoming)
+        })
     }
 
-    /// The curve of an interval with these handles.
-    fn segment(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
-        Segment::Bezier(controls(track, i, out, incoming))
+    /// The handles of an interval: outgoing from its first key, incoming to its second.
+    fn of_interval(&self, track: &Track, ends: Ends, i: usize) -> [DVec3; 2] {
+        let last = track.last() - 1;
+        let closed = ends == Ends::Loop;
+        let handles = |key: usize| (self.inner)(&Sides::new(track, key));
+        let out = (closed || i > 0).then(|| handles(i).1);
+        let incoming = (closed || i < last).then(|| handles(i + 1).0);
+        let (q, r) = (track.keys[i], track.keys[i + 1]);
+        let whole = logarithm(track.difference(i));
+        let at_end = |other: DVec3, clamped: Option<DVec3>, rest: DQuat| match (ends, clamped) {
+            (Ends::Secant, _) => (self.turning)(whole, whole),
+            // Half of the angle that the end turns by in the whole interval.
+            (_, Some(velocity)) => (self.turning)(velocity / 2.0 * track.step(i), whole),
+            (Ends::Natural, None) => (self.natural)(logarithm(rest), other),
+            _ => (self.parabolic)(whole, other),
+        };
+        let (start, end) = match ends {
+            Ends::Clamped { start, end } => (Some(start), Some(end)),
+            _ => (None, None),
+        };
+        match (out, incoming) {
+            (None, Some(incoming)) => {
+                let rest = multiply(invert(q), multiply(r, exponential(-incoming)));
+                [at_end(incoming, start, rest), incoming]
+            }
+            (Some(out), None) => {
+                let rest = multiply(invert(multiply(q, exponential(out))), r);
+                [out, at_end(out, end, rest)]
+            }
+            (out, incoming) => [out.unwrap_or_default(), incoming.unwrap_or_default()],
+        }
     }
 }
 
-/// The intervals before and after a key: what they turn by, its logarithms and their times.
-struct Sides {
+/// A key between two intervals: what these turn by, its logarithms and their times.
+pub(crate) struct Sides {
+    key: DQuat,
+    tcb: Tcb,
     before: DQuat,
     after: DQuat,
     l: DVec3,
@@ -74,6 +111,8 @@ impl Sides {
         let (before, h_before) = track.side(key, true);
         let (after, h_after) = track.side(key, false);
         Self {
+            key: track.keys[key],
+            tcb: track.tcb[key],
             before,
             after,
             l: logarithm(before),
@@ -85,176 +124,83 @@ impl Sides {
     }
 }
 
-struct CatmullRom;
+/// A cumulative cubic with tangents from the neighbouring keys.
+pub(crate) const CATMULL_ROM: Definition = Definition::by(Handles::cumulative(|sides| {
+    let sum = sides.l + sides.r;
+    let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
+    (sixth, sixth)
+}));
 
-impl Handles for CatmullRom {
-    fn inner(_: &Track, _: usize, sides: &Sides) -> (DVec3, DVec3) {
-        let sum = sides.l + sides.r;
-        let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
-        (sixth, sixth)
-    }
+/// A cumulative cubic with tangents of the parabola through three keys.
+pub(crate) const BESSEL_OVERHAUSER: Definition = Definition::by(Handles::cumulative(|sides| {
+    let (before, after) = (sides.h_before, sides.h_after);
+    let (left, right) = (sides.l * (after / before), sides.r * (before / after));
+    let product = multiply(exponential(left), exponential(right));
+    let tangent = nearest_branch(product, left + right) / sides.both;
+    (tangent * (before / 3.0), tangent * (after / 3.0))
+}));
 
-    fn segment(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
-        cumulative(track, i, out, incoming)
-    }
-}
+/// Bézier curves with the mean of the logarithms of the slopes.
+pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = Definition::by(Handles::bezier(|sides| {
+    let (before, after) = (sides.h_before, sides.h_after);
+    let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
+    (mean * (before / 3.0), mean * (after / 3.0))
+}));
 
-struct BesselOverhauser;
+/// Bézier curves with tension, continuity and bias.
+pub(crate) const KOCHANEK_BARTELS: Definition = Definition::by(Handles::bezier(|sides| {
+    let Tcb {
+        tension,
+        continuity,
+        bias,
+    } = sides.tcb;
+    let (before, after) = (sides.h_before, sides.h_after);
+    let tight = 1.0 - tension;
+    // The names are those of Geier's documentation of `splines`.
+    let a = tight * (1.0 + continuity) * (1.0 + bias);
+    let b = tight * (1.0 - continuity) * (1.0 - bias);
+    let c = tight * (1.0 - continuity) * (1.0 + bias);
+    let d = tight * (1.0 + continuity) * (1.0 - bias);
+    let (rate_in, rate_out) = (sides.l / before, sides.r / after);
+    let mean = |u: f64, v: f64| (u * after * rate_in + v * before * rate_out) / sides.both;
+    (mean(c, d) * before / 3.0, mean(a, b) * after / 3.0)
+}));
 
-impl Handles for BesselOverhauser {
-    fn inner(_: &Track, _: usize, sides: &Sides) -> (DVec3, DVec3) {
-        let (before, after) = (sides.h_before, sides.h_after);
-        let (left, right) = (sides.l * (after / before), sides.r * (before / after));
-        let product = multiply(exponential(left), exponential(right));
-        let tangent = nearest_branch(product, left + right) / sides.both;
-        (tangent * (before / 3.0), tangent * (after / 3.0))
-    }
+/// Spherical quadrangles. One starts with `log(q0⁻¹ q1) + 2 log(q0⁻¹ s0)`.
+pub(crate) const SQUAD: Definition = Definition::by(Handles {
+    inner: |&Sides { l, r, .. }| ((r - l) / 4.0, (l - r) / 4.0),
+    parabolic: |_, other| -other,
+    natural: |_, other| -other / 2.0,
+    turning: |turn, whole| (turn - whole) / 2.0,
+    segment: |track, i, out, incoming| Segment::Squad(controls(track, i, out, incoming)),
+});
 
-    fn segment(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
-        cumulative(track, i, out, incoming)
-    }
-}
+/// Bézier curves, their control rotations the bisectors.
+pub(crate) const SHOEMAKE: Definition = Definition::by(Handles {
+    parabolic: |whole, other| 2.0 * whole - other,
+    ..Handles::bezier(|sides| shoemake(sides, |_, bisector| bisector))
+});
 
-struct Mean;
+/// Bézier curves, their control rotations half way to the bisectors.
+pub(crate) const SHOEMAKE_2: Definition = Definition::by(Handles {
+    parabolic: |whole, other| whole - other,
+    ..Handles::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
+});
 
-impl Handles for Mean {
-    fn inner(_: &Track, _: usize, sides: &Sides) -> (DVec3, DVec3) {
-        let (before, after) = (sides.h_before, sides.h_after);
-        let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
-        (mean * (before / 3.0), mean * (after / 3.0))
-    }
-}
+/// Bézier curves, their control rotations a third of the way to the bisectors.
+pub(crate) const SHOEMAKE_1985: Definition = Definition::by(Handles::bezier(|sides| {
+    shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0))
+}));
 
-struct KochanekBartels;
-
-impl Handles for KochanekBartels {
-    fn inner(track: &Track, key: usize, sides: &Sides) -> (DVec3, DVec3) {
-        let Tcb {
-            tension,
-            continuity,
-            bias,
-        } = track.tcb[key];
-        let (before, after) = (sides.h_before, sides.h_after);
-        let tight = 1.0 - tension;
-        // The names are those of Geier's documentation of `splines`.
-        let a = tight * (1.0 + continuity) * (1.0 + bias);
-        let b = tight * (1.0 - continuity) * (1.0 - bias);
-        let c = tight * (1.0 - continuity) * (1.0 + bias);
-        let d = tight * (1.0 + continuity) * (1.0 - bias);
-        let (rate_in, rate_out) = (sides.l / before, sides.r / after);
-        let mean = |u: f64, v: f64| (u * after * rate_in + v * before * rate_out) / sides.both;
-        (mean(c, d) * before / 3.0, mean(a, b) * after / 3.0)
-    }
-}
-
-struct Squad;
-
-impl Handles for Squad {
-    fn inner(_: &Track, _: usize, &Sides { l, r, .. }: &Sides) -> (DVec3, DVec3) {
-        ((r - l) / 4.0, (l - r) / 4.0)
-    }
-
-    fn parabolic(_: DVec3, other: DVec3) -> DVec3 {
-        -other
-    }
-
-    fn natural(_: DVec3, other: DVec3) -> DVec3 {
-        -other / 2.0
-    }
-
-    /// A squad starts with `log(q0⁻¹ q1) + 2 log(q0⁻¹ s0)`.
-    fn turning(turn: DVec3, whole: DVec3) -> DVec3 {
-        (turn - whole) / 2.0
-    }
-
-    fn segment(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
-        Segment::Squad(controls(track, i, out, incoming))
-    }
-}
-
-struct Shoemake;
-
-impl Handles for Shoemake {
-    fn inner(track: &Track, key: usize, sides: &Sides) -> (DVec3, DVec3) {
-        shoemake(track.keys[key], sides, |_, bisector| bisector)
-    }
-
-    fn parabolic(whole: DVec3, other: DVec3) -> DVec3 {
-        2.0 * whole - other
-    }
-}
-
-struct Shoemake2;
-
-impl Handles for Shoemake2 {
-    fn inner(track: &Track, key: usize, sides: &Sides) -> (DVec3, DVec3) {
-        shoemake(track.keys[key], sides, |q, bisector| bisect(q, bisector, q))
-    }
-
-    fn parabolic(whole: DVec3, other: DVec3) -> DVec3 {
-        whole - other
-    }
-}
-
-struct Shoemake1985;
-
-impl Handles for Shoemake1985 {
-    fn inner(track: &Track, key: usize, sides: &Sides) -> (DVec3, DVec3) {
-        shoemake(track.keys[key], sides, |q, bisector| {
-            slerp(q, bisector, 1.0 / 3.0)
-        })
-    }
-}
-
-/// Handles whose outgoing control rotation `place` finds between the key `q` and the bisector of
-/// its neighbours.
-fn shoemake(q: DQuat, sides: &Sides, place: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3, DVec3) {
+/// Handles whose outgoing control rotation `place` finds between the key and the bisector of its
+/// neighbours.
+fn shoemake(sides: &Sides, place: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3, DVec3) {
+    let q = sides.key;
     let (p, next) = (multiply(q, invert(sides.before)), multiply(q, sides.after));
     let a = place(q, bisect(double(p, q), next, q));
     let b = double(a, q);
     let to = |control: DQuat| logarithm(multiply(invert(q), control));
     (-to(b), to(a))
-}
-
-/// The curves of a track by a method's handles.
-fn segments<H: Handles>(track: &Track, ends: Ends) -> Vec<Segment> {
-    smooth(track, ends, |i| {
-        let [out, incoming] = both_handles::<H>(track, ends, i);
-        H::segment(track, i, out, incoming)
-    })
-}
-
-/// The handles of an interval: outgoing from its first key, incoming to its second.
-fn both_handles<H: Handles>(track: &Track, ends: Ends, i: usize) -> [DVec3; 2] {
-    let last = track.last() - 1;
-    let closed = ends == Ends::Loop;
-    let handles = |key: usize| H::inner(track, key, &Sides::new(track, key));
-    let out = (closed || i > 0).then(|| handles(i).1);
-    let incoming = (closed || i < last).then(|| handles(i + 1).0);
-    let (q, r) = (track.keys[i], track.keys[i + 1]);
-    let whole = logarithm(track.difference(i));
-    let at_end = |other: DVec3, clamped: Option<DVec3>, rest: DQuat| match (ends, clamped) {
-        (Ends::Secant, _) => H::turning(whole, whole),
-        // Half of the angle that the end turns by in the whole interval.
-        (_, Some(velocity)) => H::turning(velocity / 2.0 * track.step(i), whole),
-        (Ends::Natural, None) => H::natural(logarithm(rest), other),
-        _ => H::parabolic(whole, other),
-    };
-    let (start, end) = match ends {
-        Ends::Clamped { start, end } => (Some(start), Some(end)),
-        _ => (None, None),
-    };
-    match (out, incoming) {
-        (None, Some(incoming)) => {
-            let rest = multiply(invert(q), multiply(r, exponential(-incoming)));
-            [at_end(incoming, start, rest), incoming]
-        }
-        (Some(out), None) => {
-            let rest = multiply(invert(multiply(q, exponential(out))), r);
-            [out, at_end(out, end, rest)]
-        }
-        (out, incoming) => [out.unwrap_or_default(), incoming.unwrap_or_default()],
-    }
 }
 
 /// The control rotations `q, q exp(out), r exp(-in), r`.

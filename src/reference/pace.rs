@@ -38,22 +38,34 @@ impl Pace {
         let segment = panel / PANELS;
         let from = (panel % PANELS) as f64 / PANELS as f64;
         let rest = target - self.lengths[panel];
-        let (mut low, mut high) = (from, from + 1.0 / PANELS as f64);
-        for _ in 0..60 {
-            let middle = (low + high) / 2.0;
-            if turned(&segments[segment], from, middle) < rest {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        (segment, (low + high) / 2.0)
+        let is_before = |t: f64| turned(&segments[segment], from, t) < rest;
+        (
+            segment,
+            bisected(from, from + 1.0 / PANELS as f64, is_before),
+        )
     }
 }
 
 fn turned(segment: &Segment, from: f64, to: f64) -> f64 {
+    gauss(|t| segment.velocity(t).length(), from, to)
+}
+
+/// Gauss' quadrature with three points.
+pub(crate) fn gauss(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
     let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
-    let speed = |x: f64| segment.velocity(middle + half * x).length();
     let far = 0.6f64.sqrt();
-    half * (5.0 * speed(-far) + 8.0 * speed(0.0) + 5.0 * speed(far)) / 9.0
+    half * (5.0 * f(middle - half * far) + 8.0 * f(middle) + 5.0 * f(middle + half * far)) / 9.0
+}
+
+/// Where in an interval something is no longer before what is sought.
+pub(crate) fn bisected(mut low: f64, mut high: f64, is_before: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if is_before(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low + high) / 2.0
 }

@@ -22,6 +22,11 @@ pub(crate) fn invert(q: DQuat) -> DQuat {
     from_parts(q.w, -vector(q))
 }
 
+/// `q v q⁻¹` for a unit quaternion.
+pub(crate) fn turned(v: DVec3, q: DQuat) -> DVec3 {
+    vector(multiply(multiply(q, from_parts(0.0, v)), invert(q)))
+}
+
 pub(crate) fn inner(a: DQuat, b: DQuat) -> f64 {
     a.w * b.w + vector(a).dot(vector(b))
 }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::curve::options::Ends;
+use crate::reference::b_spline::knots;
 
 /// Keys of a vector in f64, and which textbook curve joins them.
 #[derive(Debug, Clone)]
@@ -39,8 +40,17 @@ impl VectorCurve {
             return self.interval(0)(0.0)[0];
         }
         let i = self.times.partition_point(|&key| key <= time) - 1;
-        let h = self.times[i + 1] - self.times[i];
-        self.interval(i)((time - self.times[i]) / h)[0]
+        self.interval(i)((time - self.times[i]) / self.step(i))[0]
+    }
+
+    /// Seconds from key `i` to the next.
+    fn step(&self, i: usize) -> f64 {
+        self.times[i + 1] - self.times[i]
+    }
+
+    /// From key `i` to the next.
+    fn rise(&self, i: usize) -> DVec3 {
+        self.keys[i + 1] - self.keys[i]
     }
 
     /// Whether an interval is held at its first key.
@@ -54,21 +64,19 @@ impl VectorCurve {
     /// 0 to 1, per unit of the parameter.
     pub(crate) fn interval(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
         let last = self.keys.len() - 1;
-        let (p0, p1) = (self.keys[i], self.keys[i + 1]);
-        let h = self.times[i + 1] - self.times[i];
+        let (p0, p1, h) = (self.keys[i], self.keys[i + 1], self.step(i));
+        if self.method == "step" || self.is_frozen(i) {
+            return Box::new(move |_| [p0, DVec3::ZERO, DVec3::ZERO]);
+        }
         let (m0, m1) = match self.method {
-            "step" => return Box::new(move |_| [p0, DVec3::ZERO, DVec3::ZERO]),
-            _ if self.is_frozen(i) => return Box::new(move |_| [p0, DVec3::ZERO, DVec3::ZERO]),
             "gltf-cubic" => {
-                let given = |key: usize, side: usize| {
-                    self.tangents
-                        .get(key)
-                        .map_or(DVec3::ZERO, |both| both[side] * h)
+                let given = |key: usize, side: usize| match self.tangents.get(key) {
+                    Some(both) => both[side] * h,
+                    None => DVec3::ZERO,
                 };
                 (given(i, 1), given(i + 1, 0))
             }
-            "linear" => (p1 - p0, p1 - p0),
-            _ if last == 1 => (p1 - p0, p1 - p0),
+            _ if self.method == "linear" || last == 1 => (p1 - p0, p1 - p0),
             "b-spline" => return self.b_spline(i),
             "c2" => {
                 let slopes = self.c2_slopes();
@@ -77,12 +85,10 @@ impl VectorCurve {
             _ => self.tangents_of(i),
         };
         Box::new(move |t| {
-            let (t2, t3) = (t * t, t * t * t);
+            let [from, out, to, incoming] = hermite(t);
+            let t2 = t * t;
             [
-                p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
-                    + m0 * (t3 - 2.0 * t2 + t)
-                    + p1 * (3.0 * t2 - 2.0 * t3)
-                    + m1 * (t3 - t2),
+                p0 * from + m0 * out + p1 * to + m1 * incoming,
                 (p1 - p0) * (6.0 * t - 6.0 * t2)
                     + m0 * (3.0 * t2 - 4.0 * t + 1.0)
                     + m1 * (3.0 * t2 - 2.0 * t),
@@ -96,8 +102,8 @@ impl VectorCurve {
     fn c2_slopes(&self) -> Vec<DVec3> {
         let keys = self.keys.len();
         let last = keys - 1;
-        let h = |i: usize| self.times[i + 1] - self.times[i];
-        let secant = |i: usize| (self.keys[i + 1] - self.keys[i]) / h(i);
+        let h = |i: usize| self.step(i);
+        let secant = |i: usize| self.rise(i) / h(i);
         let mut rows = vec![(vec![0.0; keys], DVec3::ZERO); keys];
         let mut inner = |row: usize, at: [usize; 3], l: usize, r: usize| {
             let (coefficients, side) = &mut rows[row];
@@ -147,117 +153,75 @@ impl VectorCurve {
     }
 
     /// Interval `i` of the cubic B-spline whose control points are the keys, by the recursion of
-    /// Cox and de Boor, with one more control point beyond each end.
+    /// Cox and de Boor, with one more control point beyond each end. It is not asked for at frozen
+    /// ends, nor of two keys.
     fn b_spline(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
-        let last = self.keys.len() - 1;
-        let closed = self.ends == Ends::Loop;
-        let count = last as isize;
-        let step = |j: isize| {
-            let j = if closed {
-                j.rem_euclid(count)
-            } else {
-                j.clamp(0, count - 1)
-            };
-            self.times[j as usize + 1] - self.times[j as usize]
-        };
-        // The knots of interval `i` from three before it to two after its end.
+        let count = self.keys.len() - 1;
+        // The knots from three before the interval to two after its end, in its parameter.
         let knots_of = |i: usize| {
-            let mut knots = [0.0; 6];
-            for j in 1..6 {
-                knots[j] = knots[j - 1] + step(i as isize - 3 + j as isize);
-            }
-            let (own, h) = (knots[2], step(i as isize));
-            knots
-                .iter()
-                .map(|knot| (knot - own) / h)
-                .collect::<Vec<_>>()
-        };
-        let value = move |knots: &[f64], points: [DVec3; 4], t: f64| de_boor(knots, points, t);
-        let key = |j: isize| {
-            let j = if closed { j.rem_euclid(count) } else { j };
-            self.keys[j as usize]
+            let knots = knots(&self.times, self.ends, i);
+            knots.map(|knot| (knot - knots[2]) / self.step(i))
         };
         let beyond = |at_end: bool| -> DVec3 {
-            let (own, inner, next) = match at_end {
-                false => (0isize, 1isize, 2isize),
-                true => (count, count - 1, count - 2),
-            };
-            if closed {
-                return if at_end { key(count + 1) } else { key(-1) };
-            }
-            let (interval, t) = if at_end { (last - 1, 1.0) } else { (0, 0.0) };
+            let [own, inner, next] = [0, 1, 2].map(|j| if at_end { count - j } else { j });
+            let [interval, second] = [0, 1].map(|j| if at_end { count - 1 - j } else { j });
+            let [p, q, r] = [own, inner, next].map(|key| self.keys[key]);
             if self.ends == Ends::Parabolic {
                 // The parabola through the last three keys, as far beyond as the last interval is.
-                let (a, b) = match at_end {
-                    false => (step(0), step(1)),
-                    true => (step(count - 1), step(count - 2)),
-                };
+                let (a, b) = (self.step(interval), self.step(second));
                 let (x, y, z) = (0.0, a, a + b);
                 let at = -a;
-                return key(own) * ((at - y) * (at - z) / ((x - y) * (x - z)))
-                    + key(inner) * ((at - x) * (at - z) / ((y - x) * (y - z)))
-                    + key(next) * ((at - x) * (at - y) / ((z - x) * (z - y)));
+                return p * ((at - y) * (at - z) / ((x - y) * (x - z)))
+                    + q * ((at - x) * (at - z) / ((y - x) * (y - z)))
+                    + r * ((at - x) * (at - y) / ((z - x) * (z - y)));
             }
             // What must vanish is linear in the point beyond.
             let knots = knots_of(interval);
-            let own_step = if at_end {
-                key(own) - key(inner)
-            } else {
-                key(inner) - key(own)
-            };
             let off = |beyond: DVec3| {
-                let points = match at_end {
-                    false => [beyond, key(0), key(1), key(2.min(count))],
-                    true => [key((count - 2).max(0)), key(count - 1), key(count), beyond],
+                let [_, slope, bend] = match at_end {
+                    false => de_boor(&knots, [beyond, p, q, r], 0.0),
+                    true => de_boor(&knots, [r, q, p, beyond], 1.0),
                 };
-                let [_, slope, bend] = value(&knots, points, t);
                 match self.ends {
                     Ends::Natural => bend,
-                    Ends::Secant => slope - own_step,
+                    Ends::Secant => slope - self.rise(interval),
                     _ => slope,
                 }
             };
             let (zero, one) = (off(DVec3::ZERO), off(DVec3::ONE));
             -zero / (one - zero)
         };
-        let point = |j: isize| match j {
-            _ if closed => key(j),
-            -1 if self.ends == Ends::Frozen => key(0) * 2.0 - key(1),
-            j if j > count && self.ends == Ends::Frozen => key(count) * 2.0 - key(count - 1),
-            -1 => beyond(false),
-            j if j > count => beyond(true),
-            j => key(j),
+        // Counted from the key before the first.
+        let point = |j: usize| match j {
+            _ if self.ends == Ends::Loop => self.keys[(j + count - 1) % count],
+            0 => beyond(false),
+            j if j > count + 1 => beyond(true),
+            j => self.keys[j - 1],
         };
-        let i = i as isize;
-        let points = [-1, 0, 1, 2].map(|offset| point(i + offset));
-        let knots = knots_of(i as usize);
-        Box::new(move |t| value(&knots, points, t))
+        let points = [0, 1, 2, 3].map(|offset| point(i + offset));
+        let knots = knots_of(i);
+        Box::new(move |t| de_boor(&knots, points, t))
     }
 
     /// The tangents at both keys of interval `i`, per unit of its parameter.
     fn tangents_of(&self, i: usize) -> (DVec3, DVec3) {
         let last = self.keys.len() - 1;
-        let closed = self.ends == Ends::Loop;
-        let h = self.times[i + 1] - self.times[i];
         let at_key = |key: usize| -> Option<DVec3> {
-            let (before, after) = match key {
-                0 if closed => (last - 1, 0),
-                key if key == last && closed => (last - 1, 0),
-                0 => return None,
-                key if key == last => return None,
+            let (before, after) = match key % last {
+                0 if self.ends != Ends::Loop => return None,
+                0 => (last - 1, 0),
                 key => (key - 1, key),
             };
-            let rise = |i: usize| self.keys[i + 1] - self.keys[i];
-            let step = |i: usize| self.times[i + 1] - self.times[i];
-            let (l, r) = (step(before), step(after));
+            let (left, right) = (self.rise(before), self.rise(after));
+            let (l, r) = (self.step(before), self.step(after));
             Some(if self.method == "catmull-rom" {
-                (rise(before) + rise(after)) / 2.0
+                (left + right) / 2.0
             } else {
                 // The slope of the parabola through three keys.
-                (rise(before) / l * r + rise(after) / r * l) / (l + r) * h
+                (left / l * r + right / r * l) / (l + r) * self.step(i)
             })
         };
-        let whole = self.keys[i + 1] - self.keys[i];
+        let whole = self.rise(i);
         let end = |other: DVec3| match self.ends {
             Ends::Natural => (3.0 * whole - other) / 2.0,
             Ends::Clamped { .. } => DVec3::ZERO,
@@ -271,6 +235,18 @@ impl VectorCurve {
             (None, None) => (whole, whole),
         }
     }
+}
+
+/// What the two values and the two tangents of a cubic count for at a parameter, in the order value,
+/// tangent, value, tangent.
+pub(crate) fn hermite(t: f64) -> [f64; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        2.0 * t3 - 3.0 * t2 + 1.0,
+        t3 - 2.0 * t2 + t,
+        3.0 * t2 - 2.0 * t3,
+        t3 - t2,
+    ]
 }
 
 /// A cubic B-spline between the third and the fourth of six knots: its value and its first and

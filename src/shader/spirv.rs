@@ -38,7 +38,8 @@ mod op {
         207, 208, 209, 215, // DPdx DPdy Fwidth and relatives
     ];
 }
-const DECORATION_NO_CONTRACTION: u32 = 42;
+/// A decoration.
+const NO_CONTRACTION: u32 = 42;
 
 /// Why a module was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -80,6 +81,21 @@ struct Instruction<'a> {
     words: &'a [u32],
 }
 
+impl Instruction<'_> {
+    fn word(&self, place: usize) -> Result<u32, SpirvError> {
+        let word = self.words.get(place).copied();
+        word.ok_or(SpirvError::Truncated { word: self.start })
+    }
+
+    /// The id that it says must not be contracted, if it is such a decoration.
+    fn decorated(&self) -> Option<u32> {
+        match (self.opcode, self.words) {
+            (op::DECORATE, &[_, id, NO_CONTRACTION]) => Some(id),
+            _ => None,
+        }
+    }
+}
+
 fn instructions(module: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
     if module.len() < HEADER_WORDS || module[0] != MAGIC {
         return Err(SpirvError::NotSpirv);
@@ -113,35 +129,25 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
-        let (start, opcode, words) = (instruction.start, instruction.opcode, instruction.words);
-        match opcode {
-            op::TYPE_FLOAT if words.len() > 2 && words[2] != 32 => {
-                return Err(SpirvError::FloatWidth { bits: words[2] });
+        let (word, opcode) = (instruction.start, instruction.opcode);
+        match (opcode, instruction.words) {
+            (op::TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 => {
+                return Err(SpirvError::FloatWidth { bits });
             }
             // Every built-in function of GLSL.std.450 that naga would emit for our
             // shaders is one of those that round freely.
             _ if opcode == op::EXT_INST || op::INEXACT.contains(&opcode) => {
-                let word = start;
                 return Err(SpirvError::Inexact { word, opcode });
             }
             _ if op::EXACT.contains(&opcode) => {
-                results.insert(*words.get(2).ok_or(SpirvError::Truncated { word: start })?);
+                results.insert(instruction.word(2)?);
             }
-            op::DECORATE if words.len() == 3 && words[2] == DECORATION_NO_CONTRACTION => {
-                decorated.insert(words[1]);
-            }
-            _ => {}
+            _ => decorated.extend(instruction.decorated()),
         }
     }
     let additions: Vec<u32> = results
         .difference(&decorated)
-        .flat_map(|&id| {
-            [
-                instruction_word(op::DECORATE, 3),
-                id,
-                DECORATION_NO_CONTRACTION,
-            ]
-        })
+        .flat_map(|&id| [instruction_word(op::DECORATE, 3), id, NO_CONTRACTION])
         .collect();
     // Annotations come after the debug instructions and before the types.
     let place = code
@@ -255,10 +261,7 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
     head.extend(name);
     let mut execution_modes = Vec::new();
     for entry in &entry_points {
-        let id = *entry
-            .words
-            .get(2)
-            .ok_or(SpirvError::Truncated { word: entry.start })?;
+        let id = entry.word(2)?;
         for &(_, mode) in &modes {
             execution_modes.extend([instruction_word(op::EXECUTION_MODE, 4), id, mode, 32]);
         }
@@ -288,21 +291,8 @@ fn string_words(text: &str) -> Vec<u32> {
 /// # Errors
 /// A [`SpirvError`] for words that are no module.
 pub fn without_decorations(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
-    let mut words = module
-        .get(..HEADER_WORDS)
-        .ok_or(SpirvError::NotSpirv)?
-        .to_vec();
-    for Instruction {
-        opcode,
-        words: code,
-        ..
-    } in instructions(module)?
-    {
-        let decoration =
-            opcode == op::DECORATE && code.len() == 3 && code[2] == DECORATION_NO_CONTRACTION;
-        if !decoration {
-            words.extend_from_slice(code);
-        }
-    }
-    Ok(words)
+    let code = instructions(module)?;
+    let kept = code.iter().filter(|i| i.decorated().is_none());
+    let kept = kept.flat_map(|i| i.words);
+    Ok(module[..HEADER_WORDS].iter().chain(kept).copied().collect())
 }

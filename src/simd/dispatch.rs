@@ -231,24 +231,18 @@ pub(crate) mod tests {
         pub(crate) static WIDTH: Cell<Option<VectorWidth>> = const { Cell::new(None) };
     }
 
-    /// What `work` gives on this thread at every width that the processor has.
-    pub(crate) fn at_every_width<R>(work: impl Fn() -> R) -> Vec<(VectorWidth, R)> {
+    /// What `work` gives on this thread, which must be the same at every width that the processor
+    /// has.
+    pub(crate) fn same_at_every_width<R: PartialEq>(work: impl Fn() -> R) -> R {
         let at = |width| {
             WIDTH.set(Some(width));
-            (width, work())
+            work()
         };
-        let results = VectorWidth::available().into_iter().map(at).collect();
-        WIDTH.set(None);
-        results
-    }
-
-    /// What `work` gives on this thread, which must be the same at every width.
-    pub(crate) fn same_at_every_width<R: PartialEq>(work: impl Fn() -> R) -> R {
-        let mut results = at_every_width(work).into_iter();
-        let (_, expected) = results.next().expect("the baseline");
-        for (width, found) in results {
-            assert!(found == expected, "{width:?}");
+        let expected = at(VectorWidth::Baseline);
+        for wider in VectorWidth::available().into_iter().skip(1) {
+            assert!(at(wider) == expected, "{wider:?}");
         }
+        WIDTH.set(None);
         expected
     }
 

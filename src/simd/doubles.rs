@@ -1,20 +1,20 @@
 //! [`Doubles`](crate::simd::lanes::Doubles) as two vectors, each with half of the samples.
 
 #[cfg(not(target_arch = "x86_64"))]
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use glam::Vec4;
 
 use pair::Pair;
 
-/// Defines a pair of vectors of `$count` f64 each, with the given functions of one vector, which
-/// the macro `$run` calls.
+/// Defines a pair of vectors of f64, with the given functions of one vector, which the macro `$run`
+/// calls.
 macro_rules! doubles {
-    ($name:ident: $vector:ident, $count:literal, $run:ident, $all:path, $add:path, $sub:path,
-     $mul:path, $div:path, $negated:path, $root:path, $min:path, $max:path, $up_to:path,
-     $are_at_most:path) => {
+    ($name:ident: $vector:ident, $run:ident, $all:path, $add:path, $sub:path,
+     $mul:path, $div:path, $root:path, $min:path, $max:path, $up_to:path, $are_at_most:path) => {
         /// As many f64 as the vector of f32 has lanes.
-        #[derive(Clone, Copy)]
+        #[derive(Clone, Copy, bytemuck::Zeroable, bytemuck::Pod)]
+        #[repr(transparent)]
         pub(crate) struct $name(pub(crate) [$vector; 2]);
 
         $crate::math::operators::operators! {
@@ -23,16 +23,8 @@ macro_rules! doubles {
             Sub sub => Self($run!([$sub(x.0[0], y.0[0]), $sub(x.0[1], y.0[1])]));
             Mul mul => Self($run!([$mul(x.0[0], y.0[0]), $mul(x.0[1], y.0[1])]));
             Div div => Self($run!([$div(x.0[0], y.0[0]), $div(x.0[1], y.0[1])]));
-        }
-
-        impl std::ops::Neg for $name {
-            type Output = Self;
-
-            #[inline(always)]
-            fn neg(self) -> Self {
-                let Self([a, b]) = self;
-                Self([$negated(a), $negated(b)])
-            }
+            // Compilers make a change of the sign of it; the difference from +0 would not negate 0.
+            - => Self($run!([$sub($all(-0.0), x.0[0]), $sub($all(-0.0), x.0[1])]));
         }
 
         impl $crate::math::quaternion::Real for $name {
@@ -69,18 +61,6 @@ macro_rules! doubles {
 
         impl $crate::simd::lanes::Doubles for $name {
             #[inline(always)]
-            fn load(numbers: &[f64]) -> Self {
-                let own: [f64; 2 * $count] = *numbers.first_chunk().expect("enough numbers");
-                Self(bytemuck::cast(own))
-            }
-
-            #[inline(always)]
-            fn store(self, numbers: &mut [f64]) {
-                let own: [f64; 2 * $count] = bytemuck::cast(self.0);
-                numbers[..2 * $count].copy_from_slice(&own);
-            }
-
-            #[inline(always)]
             fn are_at_most(self, limit: f64) -> bool {
                 let Self([a, b]) = self;
                 let limit = $run!($all(limit));
@@ -109,36 +89,21 @@ macro_rules! baseline {
 
 #[cfg(target_arch = "x86_64")]
 doubles!(
-    Four: Pair, 2, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div,
-    pair::negated, pair::root, pair::smaller, pair::larger, pair::up_to, pair::are_at_most
+    Four: Pair, baseline, pair::all, pair::add, pair::sub, pair::mul, pair::div, pair::root,
+    pair::smaller, pair::larger, pair::up_to, pair::are_at_most
 );
 #[cfg(not(target_arch = "x86_64"))]
 doubles!(
-    Four: Pair, 2, baseline, Pair::splat, Add::add, Sub::sub, Mul::mul, Div::div,
-    Neg::neg, pair::root, pair::smaller, pair::larger, pair::up_to, pair::are_at_most
+    Four: Pair, baseline, Pair::splat, Add::add, Sub::sub, Mul::mul, Div::div, pair::root,
+    pair::smaller, pair::larger, pair::up_to, pair::are_at_most
 );
-
-impl Four {
-    /// Rounded to f32.
-    #[inline(always)]
-    pub(crate) fn rounded(self) -> Vec4 {
-        let Self([a, b]) = self;
-        pair::rounded(a, b)
-    }
-
-    /// The same numbers in f64.
-    #[inline(always)]
-    pub(crate) fn of(numbers: Vec4) -> Self {
-        Self(pair::widened(numbers))
-    }
-}
 
 /// Vectors of two f64, by the instructions of SSE2.
 #[cfg(target_arch = "x86_64")]
-mod pair {
+pub(crate) mod pair {
     use std::arch::x86_64::{
         __m128, _mm_and_pd, _mm_andnot_pd, _mm_cmple_pd, _mm_cvtpd_ps, _mm_cvtps_pd, _mm_movehl_ps,
-        _mm_movelh_ps, _mm_movemask_pd, _mm_or_pd, _mm_set1_pd, _mm_xor_pd,
+        _mm_movelh_ps, _mm_movemask_pd, _mm_or_pd,
     };
     pub(crate) use std::arch::x86_64::{
         __m128d as Pair, _mm_add_pd as add, _mm_div_pd as div, _mm_max_pd as larger,
@@ -147,11 +112,6 @@ mod pair {
     };
 
     use super::Vec4;
-
-    #[inline(always)]
-    pub(crate) fn negated(numbers: Pair) -> Pair {
-        baseline!(_mm_xor_pd(numbers, _mm_set1_pd(-0.0)))
-    }
 
     #[inline(always)]
     pub(crate) fn up_to(numbers: Pair, limit: Pair, then: Pair, otherwise: Pair) -> Pair {
@@ -167,7 +127,7 @@ mod pair {
     }
 
     #[inline(always)]
-    pub(crate) fn rounded(a: Pair, b: Pair) -> Vec4 {
+    pub(crate) fn rounded([a, b]: [Pair; 2]) -> Vec4 {
         Vec4::from(baseline!(_mm_movelh_ps(_mm_cvtpd_ps(a), _mm_cvtpd_ps(b))))
     }
 
@@ -183,7 +143,7 @@ mod pair {
 
 /// Vectors of two f64 on other targets, by glam's portable type.
 #[cfg(not(target_arch = "x86_64"))]
-mod pair {
+pub(crate) mod pair {
     pub(crate) use glam::DVec2 as Pair;
 
     use super::Vec4;
@@ -214,7 +174,7 @@ mod pair {
     }
 
     #[inline(always)]
-    pub(crate) fn rounded(a: Pair, b: Pair) -> Vec4 {
+    pub(crate) fn rounded([a, b]: [Pair; 2]) -> Vec4 {
         Vec4::new(a.x as f32, a.y as f32, b.x as f32, b.y as f32)
     }
 

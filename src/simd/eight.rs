@@ -8,14 +8,13 @@ use std::arch::x86_64::{
     _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
     _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
     _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
-    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_pd, _mm256_xor_ps,
+    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
-use std::cell::Cell;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
-use crate::shader::{POWERS, PolynomialSegment, TINY_BITS};
+use crate::shader::TINY_BITS;
 use crate::simd::doubles::doubles;
 use crate::simd::lanes::{Lanes, Number};
 
@@ -29,7 +28,8 @@ macro_rules! avx2 {
 
 /// Eight samples: 0 2 4 6 in one half and 1 3 5 7 in the other. After a transposition of each half
 /// two neighbouring rotations lie side by side, without an exchange between the halves.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(transparent)]
 pub(crate) struct Eight(__m256);
 
 /// Two rotations, half of a cache line.
@@ -42,15 +42,7 @@ operators! {
     Add add => Self(avx2!(_mm256_add_ps(a.0, b.0)));
     Sub sub => Self(avx2!(_mm256_sub_ps(a.0, b.0)));
     Mul mul => Self(avx2!(_mm256_mul_ps(a.0, b.0)));
-}
-
-impl std::ops::Neg for Eight {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(avx2!(_mm256_xor_ps(self.0, Self::all(-0.0).0)))
-    }
+    - => Self(avx2!(_mm256_xor_ps(a.0, Self::all(-0.0).0)));
 }
 
 impl Number for Eight {
@@ -82,15 +74,9 @@ impl Eight {
 }
 
 doubles!(
-    EightDoubles: __m256d, 4, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
-    _mm256_mul_pd, _mm256_div_pd, negated, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to,
-    are_at_most
+    EightDoubles: __m256d, avx2, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd,
+    _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd, up_to, are_at_most
 );
-
-#[inline(always)]
-fn negated(numbers: __m256d) -> __m256d {
-    avx2!(_mm256_xor_pd(numbers, _mm256_set1_pd(-0.0)))
-}
 
 #[inline(always)]
 fn up_to(numbers: __m256d, limit: __m256d, then: __m256d, otherwise: __m256d) -> __m256d {
@@ -109,8 +95,6 @@ fn are_at_most(numbers: __m256d, limit: __m256d) -> bool {
 }
 
 impl Lanes for Eight {
-    const COUNT: usize = 8;
-
     type Narrow = Self;
     type Rotations = [[f32; 4]; 8];
     type Doubles = EightDoubles;
@@ -156,12 +140,6 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        let rotations: [[f32; 4]; 2] = *rotations.first_chunk().expect("two rotations");
-        Self(bytemuck::cast(rotations))
-    }
-
-    #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let [a, b, c, d, e, f, g, h]: [u32; 8] = *places.first_chunk().expect("eight places");
         // Written out: closures are not always inlined.
@@ -198,14 +176,9 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 2]>(self.0));
-    }
-
-    #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
-        let rows = avx2! {
+        bytemuck::cast(avx2! {
             let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
@@ -216,34 +189,7 @@ impl Lanes for Eight {
                 _mm256_unpacklo_pd(ab_high, cd_high),
                 _mm256_unpackhi_pd(ab_high, cd_high),
             ]
-        };
-        let [e, f, g, h] = bytemuck::cast::<_, [__m256; 4]>(rows);
-        [Self(e), Self(f), Self(g), Self(h)]
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        bytemuck::cast([a.0, b.0, c.0, d.0])
-    }
-
-    #[inline(always)]
-    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
-        let places: [usize; 8] = *places.first_chunk().expect("eight places");
-        let segments: &mut [[[f32; 4]; POWERS]] = bytemuck::cast_slice_mut(segments);
-        let segments = Cell::from_mut(segments).as_slice_of_cells();
-        // Each segment is looked up once, not for every power.
-        let own = places.map(|place| segments[place].as_array_of_cells());
-        for (power, &components) in powers.iter().enumerate() {
-            let rotations = Self::rotations(components);
-            for (segment, rotation) in own.iter().zip(rotations) {
-                segment[power].set(rotation);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn of_block(half: &HalfLine) -> Self {
-        Self(bytemuck::cast(*half))
+        })
     }
 
     #[inline(always)]

@@ -1,14 +1,15 @@
 //! The numbers that the twins compute with: an f32 for one sample, or a vector for several.
 
-use crate::math::canonical;
 use std::ops::Neg;
+use std::slice;
 
 use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
+use crate::math::canonical;
 use crate::math::quaternion::{Arithmetic, Real};
 use crate::shader::{PolynomialSegment, TINY_BITS};
-use crate::simd::doubles::Four;
+use crate::simd::doubles::{Four, pair};
 
 /// The number of one sample, or a vector with the numbers of several samples. An operation rounds
 /// alike for either.
@@ -40,15 +41,15 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 
 /// A vector with the numbers of several consecutive samples. Each width has an order of lanes of
 /// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
-pub(crate) trait Lanes: Number {
+pub(crate) trait Lanes: Number + Pod {
     /// Number of samples.
-    const COUNT: usize;
+    const COUNT: usize = size_of::<Self>() / size_of::<f32>();
 
     /// The vectors that evaluate short runs: these, or vectors half as wide.
     type Narrow: Lanes;
 
     /// An array of [`Lanes::COUNT`] rotations.
-    type Rotations: AsRef<[[f32; 4]]>;
+    type Rotations: AsRef<[[f32; 4]]> + Pod;
 
     /// The numbers of [`Lanes::COUNT`] samples in f64.
     type Doubles: Doubles;
@@ -100,7 +101,10 @@ pub(crate) trait Lanes: Number {
     }
 
     /// Loads the first of some rotations, a quarter of [`Lanes::COUNT`]: `x y z w x y z w …`.
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self;
+    #[inline(always)]
+    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&rotations[..Self::COUNT / 4]))
+    }
 
     /// One rotation, repeated: `x y z w x y z w …`.
     fn repeated(rotation: [f32; 4]) -> Self;
@@ -113,19 +117,19 @@ pub(crate) trait Lanes: Number {
     fn fourfold_of(samples: &[f32]) -> Self;
 
     /// Stores a vector of rotations, `x y z w x y z w …`, to a quarter of [`Lanes::COUNT`] places.
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]);
+    #[inline(always)]
+    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
+        rotations.copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
 
     /// From a vector for each of `x y z w` to vectors of whole rotations: the first has those of
     /// the first quarter of the samples, and so on.
     fn transposed(components: [Self; 4]) -> [Self; 4];
 
-    /// The rotations of all samples, from the vectors of whole rotations of each quarter.
-    fn joined(quarters: [Self; 4]) -> Self::Rotations;
-
     /// The rotations of all samples, from a vector for each of `x y z w`.
     #[inline(always)]
     fn rotations(components: [Self; 4]) -> Self::Rotations {
-        Self::joined(Self::transposed(components))
+        bytemuck::cast(Self::transposed(components))
     }
 
     /// Stores the rotations of all samples, from a vector for each of `x y z w`.
@@ -146,7 +150,10 @@ pub(crate) trait Lanes: Number {
         }
     }
 
-    fn of_block(block: &Self::Block) -> Self;
+    #[inline(always)]
+    fn of_block(block: &Self::Block) -> Self {
+        bytemuck::cast(*block)
+    }
 
     /// This vector of whole rotations, the first `count` of them replaced by those of a block.
     fn behind(self, block: &Self::Block, count: usize) -> Self;
@@ -168,12 +175,21 @@ pub(crate) trait Lanes: Number {
 }
 
 /// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
-pub(crate) trait Doubles: Real {
+pub(crate) trait Doubles: Real + Pod {
+    /// Number of samples.
+    const COUNT: usize = size_of::<Self>() / size_of::<f64>();
+
     /// Loads as many numbers as there are lanes.
-    fn load(numbers: &[f64]) -> Self;
+    #[inline(always)]
+    fn load(numbers: &[f64]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
+    }
 
     /// Stores to the first numbers, one for each lane.
-    fn store(self, numbers: &mut [f64]);
+    #[inline(always)]
+    fn store(self, numbers: &mut [f64]) {
+        numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
 
     /// Whether every number is at most `limit`, and none is NaN.
     fn are_at_most(self, limit: f64) -> bool;
@@ -193,7 +209,6 @@ impl Number for Vec4 {
 }
 
 impl Lanes for Vec4 {
-    const COUNT: usize = 4;
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];
     type Doubles = Four;
@@ -201,12 +216,12 @@ impl Lanes for Vec4 {
 
     #[inline(always)]
     fn rounded(numbers: Four) -> Self {
-        numbers.rounded()
+        pair::rounded(numbers.0)
     }
 
     #[inline(always)]
     fn widened(self) -> Four {
-        Four::of(self)
+        Four(pair::widened(self))
     }
 
     #[inline(always)]
@@ -220,20 +235,14 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        Self::from_array(rotations[0])
-    }
-
-    #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
         let [a, b, c, d]: [u32; 4] = *places.first_chunk().expect("four places");
-        let columns = [
-            rotations[a as usize],
-            rotations[b as usize],
-            rotations[c as usize],
-            rotations[d as usize],
-        ];
-        rows(Mat4::from_cols_array_2d(&columns))
+        Self::transposed([
+            Self::from_array(rotations[a as usize]),
+            Self::from_array(rotations[b as usize]),
+            Self::from_array(rotations[c as usize]),
+            Self::from_array(rotations[d as usize]),
+        ])
     }
 
     #[inline(always)]
@@ -252,16 +261,6 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&[self.to_array()]);
-    }
-
-    #[inline(always)]
-    fn of_block(block: &[f32; 4]) -> Self {
-        Self::from_array(*block)
-    }
-
-    #[inline(always)]
     fn behind(self, block: &[f32; 4], count: usize) -> Self {
         if count > 0 {
             Self::of_block(block)
@@ -277,12 +276,8 @@ impl Lanes for Vec4 {
 
     #[inline(always)]
     fn transposed([x, y, z, w]: [Self; 4]) -> [Self; 4] {
-        rows(Mat4::from_cols(x, y, z, w))
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        [a.to_array(), b.to_array(), c.to_array(), d.to_array()]
+        let rows = Mat4::from_cols(x, y, z, w).transpose();
+        [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
     }
 
     #[inline(always)]
@@ -306,16 +301,8 @@ impl Lanes for Vec4 {
     }
 }
 
-#[inline(always)]
-fn rows(columns: Mat4) -> [Vec4; 4] {
-    let rows = columns.transpose();
-    [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis]
-}
-
 #[cfg(test)]
 mod tests {
-    use bytemuck::Zeroable as _;
-
     use super::*;
     use crate::cpu::evaluate::tests::runs_are_samples;
     use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
@@ -323,31 +310,6 @@ mod tests {
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
-    }
-
-    /// Seven powers, as small-angle cubics have: they may be stored as four, and four more of which
-    /// one is stored already.
-    fn powers_come_to_their_places<L: Lanes>() {
-        let number = |power: usize, lane: usize, c: usize| (100 * power + 10 * lane + c) as f32;
-        let component = |power: usize, c: usize| {
-            let own: Vec<f32> = (0..L::COUNT).map(|lane| number(power, lane, c)).collect();
-            L::load(&own)
-        };
-        let powers: Vec<[L; 4]> = (0..7)
-            .map(|power| [0, 1, 2, 3].map(|c| component(power, c)))
-            .collect();
-        let mut segments = vec![PolynomialSegment::zeroed(); L::COUNT];
-        let backward: Vec<usize> = (0..L::COUNT).rev().collect();
-        L::store_powers(&powers, &mut segments, &backward);
-        for (lane, &place) in backward.iter().enumerate() {
-            for (power, found) in segments[place].coefficients.iter().enumerate() {
-                let expected = match power {
-                    ..7 => [0, 1, 2, 3].map(|c| number(power, lane, c)),
-                    _ => [0.0; 4],
-                };
-                assert_eq!(*found, expected);
-            }
-        }
     }
 
     /// Catches lanes that are stored in another order than they were loaded in, and a comparison
@@ -376,7 +338,6 @@ mod tests {
         L::store_rotations(gathered, &mut again);
         again.reverse();
         assert_eq!(bits(again.as_flattened()), bits(found.as_flattened()));
-        powers_come_to_their_places::<L>();
         let (numbers, ones) = (
             vec![[1.0, 20.0, 300.0, 4000.0]; L::COUNT],
             vec![[1.0; 4]; L::COUNT],

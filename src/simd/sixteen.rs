@@ -9,8 +9,10 @@ use std::arch::x86_64::{
     _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
     _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
     _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
-    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_pd, _mm512_xor_ps,
+    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_ps,
 };
+
+use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
 use crate::shader::{PolynomialSegment, TINY_BITS};
@@ -29,7 +31,8 @@ macro_rules! avx512 {
 
 /// Sixteen samples: 0 4 8 12 in the first quarter, 1 5 9 13 in the next, and so on. After a
 /// transposition of each quarter four neighbouring rotations lie side by side.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(transparent)]
 pub(crate) struct Sixteen(__m512);
 
 operators! {
@@ -37,15 +40,7 @@ operators! {
     Add add => Self(avx512!(_mm512_add_ps(a.0, b.0)));
     Sub sub => Self(avx512!(_mm512_sub_ps(a.0, b.0)));
     Mul mul => Self(avx512!(_mm512_mul_ps(a.0, b.0)));
-}
-
-impl std::ops::Neg for Sixteen {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(avx512!(_mm512_xor_ps(self.0, Self::all(-0.0).0)))
-    }
+    - => Self(avx512!(_mm512_xor_ps(a.0, Self::all(-0.0).0)));
 }
 
 impl Number for Sixteen {
@@ -109,15 +104,9 @@ impl Sixteen {
 }
 
 doubles!(
-    SixteenDoubles: __m512d, 8, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
-    _mm512_mul_pd, _mm512_div_pd, negated, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to,
-    are_at_most
+    SixteenDoubles: __m512d, avx512, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd,
+    _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd, up_to, are_at_most
 );
-
-#[inline(always)]
-fn negated(numbers: __m512d) -> __m512d {
-    avx512!(_mm512_xor_pd(numbers, _mm512_set1_pd(-0.0)))
-}
 
 #[inline(always)]
 fn up_to(numbers: __m512d, limit: __m512d, then: __m512d, otherwise: __m512d) -> __m512d {
@@ -133,8 +122,6 @@ fn are_at_most(numbers: __m512d, limit: __m512d) -> bool {
 }
 
 impl Lanes for Sixteen {
-    const COUNT: usize = 16;
-
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
     type Doubles = SixteenDoubles;
@@ -165,12 +152,6 @@ impl Lanes for Sixteen {
     fn store(self, samples: &mut [f32]) {
         let stored: [f32; 16] = bytemuck::cast(self.reordered().0);
         samples.copy_from_slice(&stored);
-    }
-
-    #[inline(always)]
-    fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
-        let rotations: [[f32; 4]; 4] = *rotations.first_chunk().expect("four rotations");
-        Self(bytemuck::cast(rotations))
     }
 
     #[inline(always)]
@@ -220,11 +201,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
-        rotations.copy_from_slice(&bytemuck::cast::<_, [[f32; 4]; 4]>(self.0));
-    }
-
-    #[inline(always)]
     fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // Written out: closures are not always inlined.
         avx512! {
@@ -239,11 +215,6 @@ impl Lanes for Sixteen {
                 Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
             ]
         }
-    }
-
-    #[inline(always)]
-    fn joined([a, b, c, d]: [Self; 4]) -> Self::Rotations {
-        bytemuck::cast([a.0, b.0, c.0, d.0])
     }
 
     #[inline(always)]
@@ -266,11 +237,6 @@ impl Lanes for Sixteen {
                 }
             }
         }
-    }
-
-    #[inline(always)]
-    fn of_block(line: &Line) -> Self {
-        Self(bytemuck::cast(*line))
     }
 
     #[inline(always)]

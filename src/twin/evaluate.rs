@@ -1,13 +1,16 @@
 //! The trait by which a segment's form is evaluated in vector lanes. The twins of the shaders in
 //! `shaders/forms/` implement it; the loops over a run's samples call it.
 
+use std::slice;
+
+use bytemuck::NoUninit;
 use glam::Vec4;
 
 use crate::simd::lanes::Lanes;
 
-/// The formula of one form. A run is evaluated in turns, each of as many samples as are computed at
-/// once.
-pub(crate) trait Evaluate: Copy {
+/// The formula of one form, for segments of constants `x y z w`, that of the middle first. A run is
+/// evaluated in turns, each of as many samples as are computed at once.
+pub(crate) trait Evaluate: NoUninit {
     /// A number that is the same for all samples of a run.
     #[inline(always)]
     fn constant(&self) -> f32 {
@@ -56,17 +59,23 @@ pub(crate) trait Evaluate: Copy {
     /// segment's middle, `m`. If |m| >= 2^-40, either |r| < |m|/2, and the sum is more than 2^-41;
     /// or both are multiples of 2^-64, and so is the sum, which is +0 if they cancel. If all
     /// constants of the component are +0, it is +0.
-    fn is_canonical(&self) -> bool;
+    #[inline(always)]
+    fn is_canonical(&self) -> bool {
+        let constants: &[[f32; 4]] = bytemuck::cast_slice(slice::from_ref(self));
+        let middle = Vec4::from_array(constants[0]).abs();
+        middle.cmpge(Vec4::splat(COARSE)).all() || are_coarse_or_zero(constants)
+    }
 }
 
 /// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] holds for it.
 pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
-/// Whether no component of a segment's middle is smaller than [`COARSE`].
-#[inline(always)]
-pub(crate) fn is_coarse(middle: [f32; 4]) -> bool {
-    let magnitudes = Vec4::from_array(middle).abs();
-    magnitudes.cmpge(Vec4::splat(COARSE)).all()
+/// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is not
+/// inlined.
+#[inline(never)]
+fn are_coarse_or_zero(constants: &[[f32; 4]]) -> bool {
+    let is_zero = |c: usize| constants.iter().all(|constant| constant[c].to_bits() == 0);
+    (0..4).all(|c| constants[0][c].abs() >= COARSE || is_zero(c))
 }
 
 /// The parameters of a run's samples, a turn at a time. After the last sample it gives more

@@ -5,7 +5,7 @@ use glam::Vec4;
 use crate::math::quaternion::dot;
 use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
+use crate::twin::evaluate::{Evaluate, Parameters};
 use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter};
 
 impl Evaluate for ArcSegment {
@@ -94,21 +94,6 @@ impl Evaluate for ArcSegment {
             sine,
             cosine_minus_one,
         )
-    }
-
-    #[inline(always)]
-    fn is_canonical(&self) -> bool {
-        is_coarse(self.middle) || self.is_coarse_or_zero()
-    }
-}
-
-impl ArcSegment {
-    /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is
-    /// not inlined.
-    #[inline(never)]
-    fn is_coarse_or_zero(&self) -> bool {
-        let is_zero = |c: usize| self.middle[c].to_bits() | self.tangent[c].to_bits() == 0;
-        (0..4).all(|c| self.middle[c].abs() >= COARSE || is_zero(c))
     }
 }
 

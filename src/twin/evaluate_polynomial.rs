@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::evaluate::{COARSE, Evaluate, Parameters, is_coarse};
+use crate::twin::evaluate::{Evaluate, Parameters};
 
 impl Evaluate for PolynomialSegment {
     /// A quarter of the lanes: with all four components of a rotation side by side, the
@@ -53,25 +53,6 @@ impl Evaluate for PolynomialSegment {
     #[inline(always)]
     fn at(&self, s: f32) -> Vec4 {
         polynomial(self.coefficients.map(Vec4::from_array), Vec4::splat(s))
-    }
-
-    #[inline(always)]
-    fn is_canonical(&self) -> bool {
-        is_coarse(self.coefficients[0]) || self.is_coarse_or_zero()
-    }
-}
-
-impl PolynomialSegment {
-    /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is
-    /// not inlined.
-    #[inline(never)]
-    fn is_coarse_or_zero(&self) -> bool {
-        let is_zero = |c: usize| {
-            self.coefficients
-                .iter()
-                .all(|power| power[c].to_bits() == 0)
-        };
-        (0..4).all(|c| self.coefficients[0][c].abs() >= COARSE || is_zero(c))
     }
 }
 

@@ -7,7 +7,7 @@
 pub(crate) mod outputs;
 
 pub use crate::verify::outputs::OutputVerification;
-use glam::{DQuat, Quat};
+use bytemuck::NoUninit;
 use rayon::prelude::*;
 
 use crate::device::Device;
@@ -116,7 +116,7 @@ pub fn verify(
     let (differing, first) = match device {
         Some(_) => {
             let cpu = Engine::new(Device::Cpu)?.evaluate(set, interpolation, frames)?;
-            differences(&found, &cpu)
+            differences(found.as_quats(), cpu.as_quats(), 1)
         }
         None => (0, None),
     };
@@ -166,30 +166,35 @@ fn beyond_rounding(set: &TrackSet) -> f64 {
     (off.fold(0.0, f64::max) - f64::from(f32::EPSILON)).max(0.0)
 }
 
-/// The moments that a sample may stand for: its time, and a key that is within the rounding of that
-/// time (`FrameClock`), to which it counts. There a curve may jump, or its velocity.
-fn moments(keys: &[f64], time: f64) -> [f64; 2] {
-    let (Some(first), Some(last)) = (keys.first(), keys.last()) else {
-        return [time; 2];
-    };
-    let latest = first.abs().max(last.abs()).max(time.abs());
+/// The least error at the moments that a sample may stand for: its time, and a key that is within
+/// the rounding of that time (`FrameClock`), to which it counts. There a curve may jump, or its
+/// velocity.
+fn least_error(keys: &[f64], time: f64, error: impl Fn(f64) -> f64) -> f64 {
+    let ends = [keys.first(), keys.last()].into_iter().flatten();
+    let latest = ends.fold(time.abs(), |latest, key| latest.max(key.abs()));
     let rounding = 8.0 * f64::EPSILON * latest;
     let near = keys.get(keys.partition_point(|&key| key < time - rounding));
     let near = near.filter(|&&key| key <= time + rounding);
-    [time, near.copied().unwrap_or(time)]
+    worse(error(time).min(near.map_or(f64::INFINITY, |&key| error(key))))
 }
 
-/// How many rotations differ in their bits, and the first that does.
-fn differences(a: &Rotations, b: &Rotations) -> (u64, Option<usize>) {
-    let bits = |q: &Quat| q.to_array().map(f32::to_bits);
+/// NaN is as wrong as can be, and must not slip through comparisons.
+fn worse(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
+}
+
+/// How many values of `size` elements each differ in their bits, and the first that does.
+fn differences<T: NoUninit>(a: &[T], b: &[T], size: usize) -> (u64, Option<usize>) {
+    let values = |all| bytemuck::cast_slice::<T, u8>(all).chunks(size * size_of::<T>());
     let mut differing = (0..)
-        .zip(a.as_quats().iter().zip(b.as_quats()))
-        .filter(|(_, (a, b))| bits(a) != bits(b));
+        .zip(values(a).zip(values(b)))
+        .filter(|(_, (a, b))| a != b);
     let first = differing.next().map(|(index, _)| index);
     (u64::from(first.is_some()) + differing.count() as u64, first)
 }
 
 /// One track against the reference.
+#[derive(Default)]
 struct TrackErrors {
     /// Largest angle, radians, and its sample.
     max: f64,
@@ -212,21 +217,13 @@ impl TrackErrors {
         let curve = reference::Curve::of(&interpolation, track);
         let samples = timeline.len();
         let row = &found.as_quats()[index * samples..(index + 1) * samples];
-        let mut errors = Self {
-            max: 0.0,
-            worst: 0,
-            squares: 0.0,
-            norm: 0.0,
-        };
-        for (sample, &quat) in row.iter().enumerate() {
-            let quat: DQuat = quat.as_dquat();
-            let norm = (quat.length() - 1.0).abs();
-            let errors_at = moments(track.times, timeline.time_at(index, sample))
-                .map(|time| angle_between(quat, curve.rotation(time)));
-            let angle = errors_at[0].min(errors_at[1]);
-            // NaN is as wrong as can be, and must not slip through comparisons.
-            let [angle, norm] =
-                [angle, norm].map(|error| if error.is_nan() { f64::INFINITY } else { error });
+        let mut errors = Self::default();
+        for (sample, quat) in row.iter().enumerate() {
+            let quat = quat.as_dquat();
+            let norm = worse((quat.length() - 1.0).abs());
+            let angle = least_error(track.times, timeline.time_at(index, sample), |time| {
+                angle_between(quat, curve.rotation(time))
+            });
             if angle > errors.max {
                 (errors.max, errors.worst) = (angle, sample);
             }
@@ -239,6 +236,8 @@ impl TrackErrors {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
     use crate::method::METHODS;
     use crate::method::slerp::SLERP;
@@ -298,7 +297,8 @@ mod tests {
             quats.copy_from_slice(good.as_quats());
             quats[26 + 7] = wrong;
             let bad = Rotations::new(Box::new(quats), 2, 26, good.layout());
-            assert_eq!(differences(&good, &bad), (1, Some(33)));
+            let found = differences(good.as_quats(), bad.as_quats(), 1);
+            assert_eq!(found, (1, Some(33)));
             let errors = TrackErrors::measure(&set, SLERP.into(), &timeline, &bad, 1);
             assert!(errors.max > 1e-3 && errors.worst == 7, "{}", errors.max);
         }

@@ -1,7 +1,7 @@
 //! Verifies what follows from rotations: velocities, accelerations, poses in the world, and every
 //! encoding.
 
-use glam::{DQuat, Quat, Vec3, Vec4};
+use glam::{DQuat, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity, Speed};
@@ -16,7 +16,7 @@ use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::TrackSet;
-use crate::verify::moments;
+use crate::verify::{differences, least_error, worse};
 
 /// What was found of one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,13 +72,10 @@ pub(crate) fn verify(
         };
         let found = engine.rates(set, interpolation, frames, Layout::TrackMajor)?;
         let expected = cpu.rates(set, interpolation, frames, Layout::TrackMajor)?;
-        let pairs = found.as_slice().iter().zip(expected.as_slice());
-        let bits = |vector: &Vec4| vector.to_array().map(f32::to_bits);
-        let differing = pairs.filter(|(found, expected)| bits(found) != bits(expected));
         outputs.push(OutputVerification {
             output: name.to_owned(),
             values: found.as_slice().len() as u64,
-            differing: differing.count() as u64,
+            differing: differences(found.as_slice(), expected.as_slice(), 1).0,
             max_error: rate_error(set, interpolation, timeline, &found),
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => 1e-6,
@@ -101,7 +98,6 @@ pub(crate) fn verify(
         let bytes = encoding.bytes();
         expected.resize(rotations.len() * bytes, 0);
         encoding.encode_all(rotations, &mut expected);
-        let pairs = found.chunks(bytes).zip(expected.chunks(bytes));
         let error = |(stored, &rotation): (&[u8], &[f32; 4])| {
             let [decoded, rotation] = [encoding.decode_one(stored), rotation].map(exact);
             worse(angle_between(decoded, rotation))
@@ -109,7 +105,7 @@ pub(crate) fn verify(
         outputs.push(OutputVerification {
             output: encoding.to_string(),
             values: rotations.len() as u64,
-            differing: pairs.filter(|(found, expected)| found != expected).count() as u64,
+            differing: differences(&found, &expected, bytes).0,
             max_error: (found.chunks(bytes).zip(rotations))
                 .map(error)
                 .fold(0.0, f64::max),
@@ -130,13 +126,10 @@ fn world(
     let chain = Skeleton::chain(tracks, 1.0)?;
     let found = engine.world(local, &chain)?;
     let expected = cpu.world(local, &chain)?;
-    let pairs = found.as_slice().iter().zip(expected.as_slice());
-    let bits = |values: &[f32; 4]| values.map(f32::to_bits);
-    let differing = pairs.filter(|(found, expected)| bits(found) != bits(expected));
     let mut output = OutputVerification {
         output: "world".to_owned(),
         values: found.as_slice().len() as u64,
-        differing: differing.count() as u64,
+        differing: differences(found.as_slice(), expected.as_slice(), 1).0,
         max_error: 0.0,
         // Each track of the chain adds its own rounding.
         error_bound: 1e-6 + 4e-7 * tracks as f64,
@@ -156,11 +149,6 @@ fn world(
 
 fn exact(rotation: [f32; 4]) -> DQuat {
     Quat::from_array(rotation).as_dquat()
-}
-
-/// NaN is as wrong as can be.
-fn worse(error: f64) -> f64 {
-    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 fn rate_error(
@@ -189,9 +177,8 @@ fn rate_error(
         for sample in (0..samples).step_by(each) {
             let time = timeline.time_at(index, sample);
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
-            let errors_at =
-                moments(track.times, time).map(|time| (found - expected(time)).length());
-            error = error.max(worse(errors_at[0]).min(worse(errors_at[1])));
+            let error_at = |time: f64| (found - expected(time)).length();
+            error = error.max(least_error(track.times, time, error_at));
             // Samples may all lie on keys, where a rate can be 0 and large between them.
             for near in within_interval(track.times, time).into_iter().chain([time]) {
                 largest = largest.max(expected(near).length());
