@@ -3,7 +3,7 @@
 
 use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
 use crate::fit::nodes::FULL_NODES;
-use crate::math::canonical::round_quat;
+use crate::math::canonical::{power_of_two, round_quat};
 use crate::math::quaternion::{Quaternion, Real, dot};
 use crate::path::lanes::{Row, at, load};
 use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
@@ -263,15 +263,6 @@ impl InLanes for InFit<'_> {
 
 /// The cosine of half the largest turn from the middle that one polynomial may fit, and a bit more.
 const FAR: f64 = 0.5f64.next_up();
-
-/// The largest power of two that a magnitude reaches; 1 if that is tiny.
-fn power_of_two(magnitude: f64) -> f64 {
-    if magnitude > 1e-30 {
-        f64::from_bits(magnitude.to_bits() & (0x7ff << 52))
-    } else {
-        1.0
-    }
-}
 
 #[inline(always)]
 fn magnitude<R: Real>(number: R) -> R {
