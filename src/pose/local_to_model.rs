@@ -11,6 +11,7 @@ use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
 use crate::output::pose_error::PoseError;
+use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
@@ -207,7 +208,7 @@ impl ModelMatrices {
     }
 
     fn rows_of(&self, track: usize, sample: usize) -> Option<&Rows> {
-        let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| &self.matrices[sample * self.tracks + track])
+        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(&self.matrices[place])
     }
 }
