@@ -76,7 +76,7 @@ impl Engine {
         let mut walk = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
-                for link in &links {
+                for link in links {
                     local.walk(link, sample, model);
                 }
                 for (matrix, bind) in model.iter_mut().zip(bind.iter().flatten()) {

@@ -155,10 +155,10 @@ impl Engine {
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
-                    None => on_cpu::world(&frame_major, &links, output),
+                    None => on_cpu::world(&frame_major, links, output),
                     Some(device) => device.pass(
                         Kernel::PosesWorld,
-                        &[bytes(&frame_major), bytes(&links)],
+                        &[bytes(&frame_major), bytes(links)],
                         dispatch(count, tracks),
                         bytemuck::cast_slice_mut(output),
                     )?,
