@@ -2,10 +2,11 @@
 //! they do.
 
 use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
+use crate::fit::double::intervals::at;
 use crate::fit::nodes::FULL_NODES;
 use crate::math::canonical::{power_of_two, round_quat};
 use crate::math::quaternion::{Quaternion, Real, dot};
-use crate::path::lanes::{Row, at, load};
+use crate::path::lanes::{Row, load};
 use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
@@ -47,7 +48,7 @@ struct Waiting {
 
 /// Fits spans of paths, and adds their segments and constants to what is prepared.
 pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler<'_>) -> Fitted {
-    let kind = sampler.kind();
+    let kind = sampler.kind;
     let latest = latest_times(spans);
     let mut found = Fitted {
         pieces: Vec::with_capacity(2 * spans.len()),
@@ -156,17 +157,6 @@ impl FittedLanes {
     }
 }
 
-/// The segment of each lane.
-const LANES: [usize; MOST] = {
-    let mut lanes = [0; MOST];
-    let mut lane = 0;
-    while lane < MOST {
-        lanes[lane] = lane;
-        lane += 1;
-    }
-    lanes
-};
-
 /// Fits a block of spans.
 struct InFit<'a> {
     count: usize,
@@ -180,6 +170,8 @@ impl InLanes for InFit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
+        // The segment of each lane.
+        let places: [usize; MOST] = std::array::from_fn(|lane| lane);
         for lane in (0..self.count).step_by(L::COUNT) {
             let middle = load::<L, 4>(&self.samples[MIDDLE], lane);
             let mut values = [[zero; 4]; 2 * PAIRS];
@@ -255,7 +247,7 @@ impl InLanes for InFit<'_> {
                 error = farthest.up_to(zero, off, infinite).larger(error);
             }
             error.store(&mut self.own.errors[lane..]);
-            let places = &LANES[lane..lane + L::COUNT];
+            let places = &places[lane..lane + L::COUNT];
             L::store_powers(&powers, &mut self.own.segments, places);
         }
     }

@@ -2,43 +2,64 @@
 //! time on one, of as many paths as it takes to fill a block; all lanes take their places in turn.
 
 use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::{put, store};
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
 use crate::path::carry::{MIDDLE, NODES, Piece};
-use crate::path::polynomial::Polynomial;
-use crate::path::route::NO_DIRECTION;
-use crate::simd::dispatch::InLanes;
+use crate::path::route::{Heading, NO_DIRECTION, Route, Stretch};
+use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
 
 /// A number for each lane.
 pub(crate) type Row = [f64; MOST];
 
-/// Polynomials: the coefficients of 1, t, t², t³.
-pub(crate) type Polynomials = [[Row; 3]; 4];
-
-/// Sets the polynomial of a lane.
-pub(crate) fn set(polynomials: &mut Polynomials, lane: usize, own: &Polynomial) {
-    for (rows, power) in polynomials.iter_mut().zip(own.0) {
-        for (row, c) in rows.iter_mut().zip(power.to_array()) {
-            row[lane] = c;
+/// Finds the directions at places of stretches, one stretch in each lane, and their derivatives if
+/// they are asked for.
+pub(crate) fn find_directions<'a, const PLACES: usize>(
+    stretches: impl ExactSizeIterator<Item = (&'a Route, &'a Stretch)> + Clone,
+    places: &[Row; PLACES],
+    ways: &mut [[Row; 3]; PLACES],
+    mut changes: Option<&mut [[Row; 3]; PLACES]>,
+) {
+    let mut polynomials = [[[0.0; MOST]; 3]; 4];
+    for (lane, (_, own)) in stretches.clone().enumerate() {
+        if let Heading::Polynomial(way) = &own.heading {
+            for (rows, power) in polynomials.iter_mut().zip(way.0) {
+                put(rows, lane, power.to_array());
+            }
+        }
+    }
+    in_lanes(&mut Directions {
+        count: stretches.len(),
+        polynomials: &polynomials,
+        places,
+        ways,
+        changes: changes.as_deref_mut(),
+    });
+    for (lane, (route, own)) in stretches.enumerate() {
+        if let Heading::Polynomial(_) = own.heading {
+            continue;
+        }
+        for place in 0..PLACES {
+            let [way, change] = own.way(route, places[place][lane]);
+            put(&mut ways[place], lane, way.to_array());
+            if let Some(changes) = &mut changes {
+                put(&mut changes[place], lane, change.to_array());
+            }
         }
     }
 }
 
-/// The vector of a lane.
-pub(crate) fn at<const N: usize>(rows: &[Row; N], lane: usize) -> [f64; N] {
-    rows.map(|row| row[lane])
-}
-
 /// The directions of polynomials at places, and their derivatives if they are asked for.
-pub(crate) struct Directions<'a, const PLACES: usize> {
+struct Directions<'a, const PLACES: usize> {
     /// How many lanes there are.
-    pub(crate) count: usize,
-    pub(crate) polynomials: &'a Polynomials,
-    pub(crate) places: &'a [Row; PLACES],
-    pub(crate) ways: &'a mut [[Row; 3]; PLACES],
-    pub(crate) changes: Option<&'a mut [[Row; 3]; PLACES]>,
+    count: usize,
+    /// The coefficients of 1, t, t², t³.
+    polynomials: &'a [[Row; 3]; 4],
+    places: &'a [Row; PLACES],
+    ways: &'a mut [[Row; 3]; PLACES],
+    changes: Option<&'a mut [[Row; 3]; PLACES]>,
 }
 
 impl<const PLACES: usize> InLanes for Directions<'_, PLACES> {
@@ -99,6 +120,7 @@ pub(crate) struct Rolling<'a, const PLACES: usize> {
 }
 
 /// What is found of each piece.
+#[derive(Default)]
 pub(crate) struct Rolled {
     /// Chebyshev coefficients of the roll.
     pub(crate) roll: [Row; NODES + 1],
@@ -111,16 +133,6 @@ pub(crate) struct Rolled {
     /// The sines and cosines of half the rolls from the start to the middle and from there to the
     /// end.
     pub(crate) halves: [[Row; 2]; 2],
-}
-
-impl Rolled {
-    pub(crate) const NONE: Self = Self {
-        roll: [[0.0; MOST]; NODES + 1],
-        least: [0.0; MOST],
-        rest: [0.0; MOST],
-        turns: [[[0.0; MOST]; 4]; 2],
-        halves: [[[0.0; MOST]; 2]; 2],
-    };
 }
 
 impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
@@ -169,14 +181,14 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
                 }
             }
             roll[0] = -at_middle;
-            store(roll, &mut self.own.roll, lane);
+            store(&mut self.own.roll, lane, roll);
             let width = (to - from).larger(L::Doubles::all(f64::MIN_POSITIVE));
             let x = ((two * to - from - to) / width).larger(-one).smaller(one);
             (-clenshaw(&roll, -one)).store(&mut angles[0][lane..]);
             clenshaw(&roll, x).store(&mut angles[1][lane..]);
             for end in 0..2 {
                 let way = load::<L, 3>(&self.ways[MIDDLE + 1 + end], lane);
-                store(least_turn(middle, way), &mut self.own.turns[end], lane);
+                store(&mut self.own.turns[end], lane, least_turn(middle, way));
             }
         }
         for (angles, halves) in angles.iter().zip(&mut self.own.halves) {
@@ -186,6 +198,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
 }
 
 /// The pieces of some lanes.
+#[derive(Default)]
 pub(crate) struct Pieces {
     from: Row,
     to: Row,
@@ -195,26 +208,12 @@ pub(crate) struct Pieces {
 }
 
 impl Pieces {
-    pub(crate) const NONE: Self = Self {
-        from: [0.0; MOST],
-        to: [0.0; MOST],
-        roll: [[0.0; MOST]; NODES + 1],
-        middle: [[0.0; MOST]; 3],
-        base: [[0.0; MOST]; 4],
-    };
-
     /// Sets the piece of a lane.
     pub(crate) fn set(&mut self, lane: usize, piece: &Piece) {
         (self.from[lane], self.to[lane]) = (piece.from, piece.to);
-        for (row, c) in self.roll.iter_mut().zip(piece.roll) {
-            row[lane] = c;
-        }
-        for (row, c) in self.middle.iter_mut().zip(piece.middle.to_array()) {
-            row[lane] = c;
-        }
-        for (row, c) in self.base.iter_mut().zip(piece.base.to_array()) {
-            row[lane] = c;
-        }
+        put(&mut self.roll, lane, piece.roll);
+        put(&mut self.middle, lane, piece.middle.to_array());
+        put(&mut self.base, lane, piece.base.to_array());
     }
 }
 
@@ -277,7 +276,7 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
                 if let Some(body) = self.body {
                     rotation = product(rotation, all::<L, 4>(body));
                 }
-                store(rotation, &mut self.rotations[place], lane);
+                store(&mut self.rotations[place], lane, rotation);
             }
         }
     }
@@ -340,17 +339,9 @@ pub(crate) fn load<L: Lanes, const N: usize>(rows: &[Row; N], lane: usize) -> [L
     own
 }
 
-/// Stores numbers to lanes from `lane` on.
-#[inline(always)]
-pub(crate) fn store<D: Doubles, const N: usize>(own: [D; N], rows: &mut [Row; N], lane: usize) {
-    for c in 0..N {
-        own[c].store(&mut rows[c][lane..]);
-    }
-}
-
 /// The same numbers in every lane.
 #[inline(always)]
-fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
+pub(crate) fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
     let mut own = [L::Doubles::all(0.0); N];
     for c in 0..N {
         own[c] = L::Doubles::all(numbers[c]);

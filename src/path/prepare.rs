@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
@@ -17,7 +17,8 @@ use crate::path::options::{
     Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
 };
 use crate::path::polynomial::Polynomial;
-use crate::path::route::{Route, Stretch, stretches};
+use crate::path::rolls::is_half_turn;
+use crate::path::route::{Route, Stretch, diagonal, stretches};
 use crate::path::sample::{Kind, Sampler, Span};
 use crate::path::schedule::Schedule;
 use crate::prepare::clip_data::ClipData;
@@ -109,15 +110,10 @@ fn path_of<'a>(
     let own = set.vectors(Channel::Translation, track);
     let path = own.ok_or(FollowError::NoPath { track })?;
     if follow.is_closed() {
-        let (first, last) = (
-            path.keys[0].as_dvec3(),
-            path.keys[path.keys.len() - 1].as_dvec3(),
-        );
-        let keys = || path.keys.iter().map(|key| key.as_dvec3());
-        let least = keys().fold(DVec3::INFINITY, DVec3::min);
-        let most = keys().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let gap = (last - first).length();
-        if gap > GAP * (most - least).length() {
+        let keys = path.keys.iter().map(|key| key.as_dvec3());
+        let (first, last) = (path.keys[0], path.keys[path.keys.len() - 1]);
+        let gap = (last.as_dvec3() - first.as_dvec3()).length();
+        if gap > GAP * diagonal(keys) {
             return Err(FollowError::OpenLoop { track, gap });
         }
     }
@@ -151,7 +147,7 @@ struct Checked<'a> {
     track: usize,
     path: &'a VectorTrack,
     route: Route,
-    stretches: Option<Vec<Stretch>>,
+    stretches: Vec<Stretch>,
 }
 
 impl<'a> Checked<'a> {
@@ -183,11 +179,11 @@ impl<'a> Checked<'a> {
     }
 }
 
-/// A track, and the place of its path among those that move, with the number of its spans.
+/// A track with its path, and the number of this path's spans.
 struct Walk<'a> {
     track: usize,
     path: &'a VectorTrack,
-    moving: Option<(usize, usize)>,
+    spans: usize,
 }
 
 /// Adds the positions and rotations of some tracks.
@@ -201,81 +197,73 @@ fn add(
 ) -> Result<(), FollowError> {
     let checked = tracks.map(|track| Checked::new(set, track, follow));
     let checked = checked.collect::<Result<Vec<_>, _>>()?;
-    let minimal = (checked.iter()).filter(|_| follow.frame == Frame::Minimal);
-    let carried: Vec<(&Route, &Stretch)> = minimal
-        .flat_map(|own| (own.stretches.iter().flatten()).map(|stretch| (&own.route, stretch)))
-        .collect();
-    let uncarried = Uncarried::new(&carried);
-    let mut next = 0;
+    let carried = (checked.iter()).filter(|_| follow.frame == Frame::Minimal);
+    let carried = carried.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
+    let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
+    let mut first_stretch = 0;
     let (mut walks, mut paths, mut spans) = (Vec::new(), Vec::new(), Vec::new());
     for own in checked {
         let Checked { track, path, .. } = own;
-        let mut moving = None;
-        if let Some(stretches) = own.stretches {
-            let given = (&uncarried, &mut next);
-            let frames = Frames::new(
-                (own.route, stretches),
-                follow,
-                &path.ups,
-                track,
-                given,
-                warnings,
-            );
-            let first = spans.len();
-            add_spans(&mut spans, &frames, paths.len(), follow);
-            moving = Some((paths.len(), spans.len() - first));
-            paths.push(frames);
-        } else {
+        let count = own.stretches.len();
+        let (first, before) = (first_stretch, spans.len());
+        first_stretch += count;
+        let frames = Frames::new(
+            own.route,
+            own.stretches,
+            follow,
+            &path.ups,
+            &uncarried,
+            first,
+        );
+        if count == 0 {
             warnings.push(FollowWarning::StandsStill { track });
+        } else if is_half_turn(frames.left_over) {
+            warnings.push(FollowWarning::HalfTurn { track });
         }
+        add_spans(&mut spans, &frames, paths.len());
+        paths.push(frames);
         walks.push(Walk {
             track,
             path,
-            moving,
+            spans: spans.len() - before,
         });
     }
     let [positions, rotations] = prepared;
     let adding = Adding {
         walks: &walks,
         paths: &paths,
+        spans: &spans,
         follow,
         interpolation,
     };
-    adding.add(positions, &spans, Kind::Vector);
-    adding.add(rotations, &spans, Kind::Rotation);
+    adding.add(positions, Kind::Vector);
+    adding.add(rotations, Kind::Rotation);
     Ok(())
 }
 
-/// Whether a body is where its speed says, and not where its keys do.
-fn is_retimed(route: &Route, follow: &Follow) -> bool {
-    follow.speed != PathSpeed::Keys && route.lengths.total() > 0.0
-}
-
-/// Whether a body stands on its path, of which it may turn all the same.
-fn stands(route: &Route, follow: &Follow) -> bool {
-    follow.speed != PathSpeed::Keys && !is_retimed(route, follow)
-}
-
-/// How many of a path's stretches are used.
-fn count_used(frames: &Frames, follow: &Follow) -> usize {
-    match stands(&frames.route, follow) {
-        true => 1,
-        false => frames.stretches.len(),
+/// The stretches of a path that are used: of one on which a body stands the first alone.
+fn used(frames: &Frames) -> &[Stretch] {
+    let all = &frames.stretches[..];
+    match frames.route.stands() {
+        true => &all[..all.len().min(1)],
+        false => all,
     }
 }
 
 /// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
-fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize, follow: &Follow) {
-    let Frames {
-        route, stretches, ..
-    } = frames;
+fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
+    let (route, used) = (&frames.route, used(frames));
     let (start, end) = route.schedule.span();
-    let (stands, count) = (stands(route, follow), count_used(frames, follow));
-    for (stretch, own) in stretches[..count].iter().enumerate() {
-        let time = |t: f64| (route.schedule).time(&route.lengths, own.interval, t);
-        let is_last = stretch + 1 == count;
-        let mut from = if stands { start } else { time(own.from) };
-        let to = if is_last { end } else { time(own.to) };
+    for (stretch, own) in used.iter().enumerate() {
+        let is_last = stretch + 1 == used.len();
+        let mut from = match route.stands() {
+            true => start,
+            false => route.time(own.interval, own.from),
+        };
+        let to = match is_last {
+            true => end,
+            false => route.time(own.interval, own.to),
+        };
         for joint in route.schedule.joints(from..to).chain([to]) {
             if joint > from {
                 spans.push(Span {
@@ -293,26 +281,27 @@ fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize, follow: &Follo
 /// Adds the positions or the rotations of tracks.
 struct Adding<'a> {
     walks: &'a [Walk<'a>],
+    /// Of each walk.
     paths: &'a [Frames],
+    spans: &'a [Span],
     follow: &'a Follow,
     /// That of positions.
     interpolation: &'a Interpolation,
 }
 
 impl Adding<'_> {
-    fn add(&self, prepared: &mut Prepared, spans: &[Span], kind: Kind) {
+    fn add(&self, prepared: &mut Prepared, kind: Kind) {
         let follow = self.follow;
-        let is_fitted =
-            |path: usize| kind == Kind::Rotation || is_retimed(&self.paths[path].route, follow);
-        let own = spans.iter().copied();
-        let own: Vec<Span> = own.filter(|span| is_fitted(span.path as usize)).collect();
+        let is_fitted = |path: &Frames| kind == Kind::Rotation || path.route.is_retimed();
+        let of_fitted = |span: &Span| is_fitted(&self.paths[span.path as usize]);
+        let own: Vec<Span> = self.spans.iter().copied().filter(of_fitted).collect();
         let mut sampler = Sampler::new(self.paths, kind, follow);
         let fitted = fit(prepared, &own, &mut sampler);
         let is_spread = follow.frame != Frame::Minimal || follow.twist == Twist::Spread;
         let repeats = follow.is_closed() && (kind == Kind::Vector || is_spread);
         let (mut pieces, mut next) = (&fitted.pieces[..], 0);
-        for walk in self.walks {
-            let Some((path, count)) = walk.moving.filter(|moving| is_fitted(moving.0)) else {
+        for (path, (walk, frames)) in self.walks.iter().zip(self.paths).enumerate() {
+            if frames.stretches.is_empty() || !is_fitted(frames) {
                 match kind {
                     // Positions at the times of the keys are cubics already.
                     Kind::Vector => vectors::add(
@@ -327,30 +316,27 @@ impl Adding<'_> {
                     Kind::Rotation => walk.add(prepared, &[], [follow.body().to_array(); 2], true),
                 }
                 continue;
-            };
-            let frames = &self.paths[path];
+            }
+            let places = next..next + walk.spans;
+            next = places.end;
+            let (spans, ends) = (&own[places.clone()], &fitted.ends[places]);
             let (start, end) = frames.route.schedule.span();
-            let last = count_used(frames, follow) - 1;
-            let mut value = |stretch: usize, time: f64| {
-                // Most often a span begins or ends there.
-                let places = next..next + count;
-                for place in [places.clone().next(), places.last()].into_iter().flatten() {
-                    let span = own[place];
-                    let times = [span.from, span.to].into_iter();
-                    for (at, value) in times.zip(fitted.ends[place]) {
-                        if span.stretch as usize == stretch && at == time {
-                            return value;
-                        }
-                    }
-                }
-                sampler.value(path, stretch, time)
+            let last = used(frames).len() - 1;
+            // Most often a span begins or ends there.
+            let starts = |span: &&Span| span.stretch == 0 && span.from == start;
+            let arrives = |span: &&Span| span.stretch as usize == last && span.to == end;
+            let first_value = match spans.first().filter(starts) {
+                Some(_) => ends[0][0],
+                None => sampler.value(path, 0, start),
             };
-            let values = [value(0, start), value(last, end)];
-            next += count;
+            let last_value = match spans.last().filter(arrives) {
+                Some(_) => ends[ends.len() - 1][1],
+                None => sampler.value(path, last, end),
+            };
             let (now, rest) =
                 pieces.split_at(pieces.partition_point(|piece| (piece.0 as usize) < next));
             pieces = rest;
-            walk.add(prepared, now, values, repeats);
+            walk.add(prepared, now, [first_value, last_value], repeats);
         }
     }
 }
@@ -367,10 +353,9 @@ impl Walk<'_> {
     ) {
         let [first, last] = values.map(round_quat);
         let before = prepared.constant(first);
-        let after = if repeats {
-            before
-        } else {
-            prepared.constant(last)
+        let after = match repeats {
+            true => before,
+            false => prepared.constant(last),
         };
         let from = prepared.spans.len();
         for &(_, start, source) in pieces {

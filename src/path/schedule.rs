@@ -1,9 +1,9 @@
-//! When a body is where on its path.
+//! When a body is where on its path, and where it is when.
 
 use std::ops::Range;
 
-use crate::path::lengths::Lengths;
 use crate::path::options::PathSpeed;
+use crate::path::route::Route;
 
 /// The times of a path's intervals.
 #[derive(Debug, Clone)]
@@ -31,54 +31,6 @@ impl Schedule {
         [self.keys[interval], self.keys[interval + 1]]
     }
 
-    /// The time of a place in an interval.
-    pub(crate) fn time(&self, lengths: &Lengths, interval: usize, t: f64) -> f64 {
-        if self.speed == PathSpeed::Keys {
-            let [from, to] = self.keys_of(interval);
-            return if t == 1.0 { to } else { from + (to - from) * t };
-        }
-        let (start, end) = self.span();
-        let part = lengths.at(interval, t) / lengths.total();
-        start + (end - start) * self.moment(part.min(1.0))
-    }
-
-    /// The parameter of an interval at a time in it.
-    pub(crate) fn parameter(&self, lengths: &Lengths, interval: usize, time: f64) -> f64 {
-        if self.speed == PathSpeed::Keys {
-            let [from, to] = self.keys_of(interval);
-            return ((time - from) / (to - from)).clamp(0.0, 1.0);
-        }
-        lengths.parameter(interval, self.length(lengths, time))
-    }
-
-    /// The interval and its parameter at a time.
-    pub(crate) fn place(&self, lengths: &Lengths, time: f64) -> (usize, f64) {
-        let interval = if self.speed == PathSpeed::Keys {
-            let last = self.keys.len() - 2;
-            let after = self.keys.partition_point(|&key| key <= time);
-            after.saturating_sub(1).min(last)
-        } else {
-            lengths.interval(self.length(lengths, time))
-        };
-        (interval, self.parameter(lengths, interval, time))
-    }
-
-    /// The change of time with an interval's parameter where its curve has this speed.
-    pub(crate) fn slope(&self, lengths: &Lengths, interval: usize, t: f64, speed: f64) -> f64 {
-        let (start, end) = self.span();
-        let pace = |x: f64| match self.speed {
-            PathSpeed::Eased { start, end } => eased_speed(start, end, x),
-            _ => 1.0,
-        };
-        match self.speed {
-            PathSpeed::Keys => self.keys[interval + 1] - self.keys[interval],
-            _ => {
-                let x = self.moment(lengths.at(interval, t) / lengths.total());
-                speed * (end - start) / (lengths.total() * pace(x)).max(1e-300)
-            }
-        }
-    }
-
     /// The times at which the speed is not smooth, inside of a range.
     pub(crate) fn joints(&self, times: Range<f64>) -> impl Iterator<Item = f64> {
         let (from, to) = self.span();
@@ -90,17 +42,6 @@ impl Schedule {
         joints
             .into_iter()
             .filter(move |&time| time > times.start && time < times.end)
-    }
-
-    /// The length covered at a time.
-    fn length(&self, lengths: &Lengths, time: f64) -> f64 {
-        let (start, end) = self.span();
-        let x = ((time - start) / (end - start)).clamp(0.0, 1.0);
-        lengths.total()
-            * match self.speed {
-                PathSpeed::Eased { start, end } => eased(start, end, x),
-                _ => x,
-            }
     }
 
     /// The part of the time at which a part of the length is covered.
@@ -129,6 +70,79 @@ impl Schedule {
             }
         }
         0.5 * (low + high)
+    }
+}
+
+impl Route {
+    /// Whether a body is where its speed says, and not where its keys do.
+    pub(crate) fn is_retimed(&self) -> bool {
+        self.schedule.speed != PathSpeed::Keys && self.lengths.total() > 0.0
+    }
+
+    /// Whether a body stands on its path, of which it may turn all the same.
+    pub(crate) fn stands(&self) -> bool {
+        self.schedule.speed != PathSpeed::Keys && !self.is_retimed()
+    }
+
+    /// The time of a place in an interval.
+    pub(crate) fn time(&self, interval: usize, t: f64) -> f64 {
+        if self.schedule.speed == PathSpeed::Keys {
+            let [from, to] = self.schedule.keys_of(interval);
+            return if t == 1.0 { to } else { from + (to - from) * t };
+        }
+        let (start, end) = self.schedule.span();
+        let part = self.lengths.at(interval, t) / self.lengths.total();
+        start + (end - start) * self.schedule.moment(part.min(1.0))
+    }
+
+    /// The parameter of an interval at a time in it.
+    pub(crate) fn parameter(&self, interval: usize, time: f64) -> f64 {
+        if self.schedule.speed == PathSpeed::Keys {
+            let [from, to] = self.schedule.keys_of(interval);
+            return ((time - from) / (to - from)).clamp(0.0, 1.0);
+        }
+        self.lengths.parameter(interval, self.length(time))
+    }
+
+    /// The interval and its parameter at a time.
+    pub(crate) fn place(&self, time: f64) -> (usize, f64) {
+        let interval = if self.schedule.speed == PathSpeed::Keys {
+            let last = self.curves.len() - 1;
+            let after = self.schedule.keys.partition_point(|&key| key <= time);
+            after.saturating_sub(1).min(last)
+        } else {
+            self.lengths.interval(self.length(time))
+        };
+        (interval, self.parameter(interval, time))
+    }
+
+    /// The change of time with an interval's parameter where its curve has this speed.
+    pub(crate) fn pace(&self, interval: usize, t: f64, speed: f64) -> f64 {
+        if self.schedule.speed == PathSpeed::Keys {
+            let [from, to] = self.schedule.keys_of(interval);
+            return to - from;
+        }
+        let (start, end) = self.schedule.span();
+        let total = self.lengths.total();
+        let rate = match self.schedule.speed {
+            PathSpeed::Eased { start, end } => {
+                let x = self.schedule.moment(self.lengths.at(interval, t) / total);
+                eased_speed(start, end, x)
+            }
+            _ => 1.0,
+        };
+        speed * (end - start) / (total * rate).max(1e-300)
+    }
+
+    /// The length covered at a time.
+    fn length(&self, time: f64) -> f64 {
+        let (start, end) = self.schedule.span();
+        let x = ((time - start) / (end - start)).clamp(0.0, 1.0);
+        self.lengths.total()
+            * match self.schedule.speed {
+                PathSpeed::Eased { start, end } => eased(start, end, x),
+                _ => x,
+            }
     }
 }
 
