@@ -77,11 +77,9 @@ struct Unturned {
 
 /// The pieces of some stretches, before they are turned.
 pub(crate) struct Uncarried {
-    /// In the order in which they were found.
+    /// In the order of stretches and parameters.
     pieces: Vec<Unturned>,
-    /// Their places in the order of stretches and parameters.
-    order: Vec<usize>,
-    /// Where in `order` the pieces of each stretch begin, and where those of the last one end.
+    /// Where the pieces of each stretch begin, and where those of the last one end.
     firsts: Vec<usize>,
 }
 
@@ -116,44 +114,35 @@ impl Uncarried {
                 pieces.push(block.unturned(lane, own));
             }
         }
-        let mut order: Vec<usize> = (0..pieces.len()).collect();
-        if done > stretches.len() {
-            order.sort_unstable_by(|&a, &b| {
-                let (a, b) = (&pieces[a], &pieces[b]);
-                let by_place = a.piece.from.total_cmp(&b.piece.from);
-                a.stretch.cmp(&b.stretch).then(by_place)
-            });
-        }
+        // Most often no stretch was cut, and they are in order already.
+        pieces.sort_by(|a, b| {
+            let by_place = a.piece.from.total_cmp(&b.piece.from);
+            a.stretch.cmp(&b.stretch).then(by_place)
+        });
         let mut firsts = Vec::with_capacity(stretches.len() + 1);
         firsts.push(0);
         for count in counts {
             firsts.push(firsts[firsts.len() - 1] + count);
         }
-        Self {
-            pieces,
-            order,
-            firsts,
-        }
+        Self { pieces, firsts }
     }
 
-    /// The places of a stretch's pieces.
-    fn places(&self, stretch: usize) -> &[usize] {
-        &self.order[self.firsts[stretch]..self.firsts[stretch + 1]]
+    /// A stretch's pieces.
+    fn of(&self, stretch: usize) -> &[Unturned] {
+        &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]]
     }
 
     /// The directions at both ends of a stretch.
     pub(crate) fn ends(&self, stretch: usize) -> [DVec3; 2] {
-        let own = self.places(stretch);
-        let [first, last] = [own[0], own[own.len() - 1]].map(|place| &self.pieces[place]);
-        [first.ways[0], last.ways[1]]
+        let own = self.of(stretch);
+        [own[0].ways[0], own[own.len() - 1].ways[1]]
     }
 
     /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
     /// end.
     pub(crate) fn carry(&self, stretch: usize, start: DQuat, pieces: &mut Vec<Piece>) -> DQuat {
         let mut rotation = start;
-        for &place in self.places(stretch) {
-            let own = &self.pieces[place];
+        for own in self.of(stretch) {
             let unrolled = own.turns[0].conjugate() * rotation;
             let base = unrolled * own.rolls[0];
             rotation = own.turns[1] * (base * own.rolls[1]);

@@ -1,6 +1,8 @@
 //! Fits what is sampled along paths by the polynomials that the kernels evaluate, cut in two until
 //! they do.
 
+use bytemuck::Zeroable;
+
 use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
 use crate::fit::double::intervals::at;
 use crate::fit::nodes::FULL_NODES;
@@ -64,7 +66,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     prepared.segments.reserve(spans.len());
     let mut block: Vec<Waiting> = Vec::with_capacity(MOST);
     let mut own_spans: Vec<Span> = Vec::with_capacity(MOST);
-    let mut lanes = Box::new(FittedLanes::NONE);
+    let mut lanes = Box::new(FittedLanes::zeroed());
     while !waiting.is_empty() {
         block.clear();
         block.extend(waiting.drain(waiting.len().saturating_sub(MOST)..));
@@ -126,6 +128,7 @@ fn latest_times(spans: &[Span]) -> Vec<f64> {
 }
 
 /// Polynomials through the samples of a block of spans.
+#[derive(Zeroable)]
 struct FittedLanes {
     segments: [PolynomialSegment; MOST],
     /// The powers of two near the largest values.
@@ -139,16 +142,6 @@ struct FittedLanes {
 }
 
 impl FittedLanes {
-    const NONE: Self = Self {
-        segments: [PolynomialSegment {
-            coefficients: [[0.0; 4]; 2 * PAIRS + 1],
-        }; MOST],
-        units: [1.0; MOST],
-        tails: [0.0; MOST],
-        errors: [0.0; MOST],
-        are_far: [0.0; MOST],
-    };
-
     /// Whether the polynomial of a lane is near its curve, of which this error cannot be known.
     fn fits(&self, lane: usize, known: f64) -> bool {
         self.are_far[lane] == 0.0
@@ -170,6 +163,7 @@ impl InLanes for InFit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
+        self.own.units = [1.0; MOST];
         // The segment of each lane.
         let places: [usize; MOST] = std::array::from_fn(|lane| lane);
         for lane in (0..self.count).step_by(L::COUNT) {

@@ -352,13 +352,12 @@ fn first_side(up: DVec3, way: DVec3) -> DVec3 {
     if side.length() >= UPRIGHT {
         return side.normalize();
     }
+    // The axis that is farthest from it, x first.
     let [x, y, z] = way.abs().to_array();
-    let axis = if x <= y && x <= z {
-        DVec3::X
-    } else if y <= z {
-        DVec3::Y
-    } else {
-        DVec3::Z
+    let axis = match x <= y && x <= z {
+        true => DVec3::X,
+        false if y <= z => DVec3::Y,
+        false => DVec3::Z,
     };
     axis.cross(way).normalize()
 }

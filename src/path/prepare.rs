@@ -9,18 +9,13 @@ use crate::curve::options::{Axes, Quantity};
 use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_curve::Curves;
 use crate::path::carry::Uncarried;
 use crate::path::fit::fit;
 use crate::path::frames::Frames;
-use crate::path::options::{
-    Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
-};
-use crate::path::polynomial::Polynomial;
+use crate::path::options::{Direction, Follow, FollowError, FollowWarning, Frame, Twist};
 use crate::path::rolls::is_half_turn;
 use crate::path::route::{Route, Stretch, diagonal, stretches};
 use crate::path::sample::{Kind, Sampler, Span};
-use crate::path::schedule::Schedule;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
@@ -75,17 +70,13 @@ impl PreparedPaths {
             Ok((own, warnings))
         };
         let batches: Result<Vec<_>, FollowError> = firsts.into_par_iter().map(batch).collect();
-        let (mut groups, mut warnings) = ([Vec::new(), Vec::new()], Vec::new());
-        for ([own_positions, own_rotations], own_warnings) in batches? {
-            groups[0].push(own_positions);
-            groups[1].push(own_rotations);
-            warnings.extend(own_warnings);
-        }
-        let [of_positions, of_rotations] = groups;
+        let (prepared, warnings): (Vec<_>, Vec<_>) = batches?.into_iter().unzip();
+        let both = prepared.into_iter().map(|[a, b]| (a, b));
+        let (of_positions, of_rotations): (Vec<_>, Vec<_>) = both.unzip();
         Ok(Self {
             positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
             rotations: ClipData::of_groups(of_rotations, set, rotations, group_bytes),
-            warnings,
+            warnings: warnings.concat(),
         })
     }
 }
@@ -120,28 +111,6 @@ fn path_of<'a>(
     Ok(path)
 }
 
-/// The curves of a path.
-fn route(path: &VectorTrack, follow: &Follow) -> Route {
-    let curves = Curves::new(path, follow.method, follow.ends);
-    let polynomials = (0..path.keys.len() - 1).map(|i| Polynomial(curves.of(i).powers()));
-    let spreads =
-        follow.is_closed() && follow.twist == Twist::Spread && follow.frame == Frame::Minimal;
-    let needs_lengths = spreads
-        || follow.speed != PathSpeed::Keys
-        || matches!(follow.direction, Direction::Ahead(_))
-        || path.ups.iter().any(Option::is_some);
-    let mut route = Route::new(
-        path.keys[0].as_dvec3(),
-        polynomials.collect(),
-        Schedule::new(follow.speed, &path.times),
-        follow.is_closed(),
-    );
-    if needs_lengths {
-        route.measure();
-    }
-    route
-}
-
 /// The path of a track, with its stretches; without any if it stands still.
 struct Checked<'a> {
     track: usize,
@@ -156,7 +125,7 @@ impl<'a> Checked<'a> {
         if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
             return Err(FollowError::UpsUnused { track });
         }
-        let route = route(path, follow);
+        let route = Route::new(path, follow);
         // The body that others look at looks along its own path.
         let direction = match follow.direction {
             Direction::Track(target) if target == track => Direction::Tangent,
@@ -166,10 +135,10 @@ impl<'a> Checked<'a> {
             Direction::Track(target) if target >= set.track_count() => {
                 return Err(FollowError::Target { track, target });
             }
-            Direction::Track(target) => Some(self::route(path_of(set, target, follow)?, follow)),
+            Direction::Track(target) => Some(Route::new(path_of(set, target, follow)?, follow)),
             _ => None,
         };
-        let stretches = stretches(&route, direction, target.as_ref(), follow.speed);
+        let stretches = stretches(&route, direction, target.as_ref());
         Ok(Self {
             track,
             path,
@@ -253,7 +222,7 @@ fn used(frames: &Frames) -> &[Stretch] {
 /// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
 fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
     let (route, used) = (&frames.route, used(frames));
-    let (start, end) = route.schedule.span();
+    let (start, end) = route.span();
     for (stretch, own) in used.iter().enumerate() {
         let is_last = stretch + 1 == used.len();
         let mut from = match route.stands() {
@@ -264,7 +233,7 @@ fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
             true => end,
             false => route.time(own.interval, own.to),
         };
-        for joint in route.schedule.joints(from..to).chain([to]) {
+        for joint in route.joints(from..to).chain([to]) {
             if joint > from {
                 spans.push(Span {
                     path: path as u32,
@@ -320,7 +289,7 @@ impl Adding<'_> {
             let places = next..next + walk.spans;
             next = places.end;
             let (spans, ends) = (&own[places.clone()], &fitted.ends[places]);
-            let (start, end) = frames.route.schedule.span();
+            let (start, end) = frames.route.span();
             let last = used(frames).len() - 1;
             // Most often a span begins or ends there.
             let starts = |span: &&Span| span.stretch == 0 && span.from == start;

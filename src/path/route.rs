@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
+use crate::method::vector_curve::Curves;
 use crate::path::lengths::Lengths;
-use crate::path::options::{Direction, PathSpeed};
+use crate::path::options::{Direction, Follow, Frame, PathSpeed, Twist};
 use crate::path::polynomial::Polynomial;
-use crate::path::schedule::Schedule;
+use crate::tracks::vectors::VectorTrack;
 
 /// The curves of a path, and when a body is where on them.
 #[derive(Debug, Clone)]
@@ -19,7 +20,9 @@ pub(crate) struct Route {
     divided: Vec<(Vec<f64>, Polynomial)>,
     /// Empty until they are [measured](Self::measure).
     pub(crate) lengths: Lengths,
-    pub(crate) schedule: Schedule,
+    pub(crate) speed: PathSpeed,
+    /// The keys' own times, seconds.
+    pub(crate) times: Vec<f64>,
     pub(crate) is_closed: bool,
     /// The size of the path: the diagonal of its box.
     pub(crate) size: f64,
@@ -35,12 +38,10 @@ const STOPPED: f64 = 1e-9;
 const STILL: f64 = 1e-14;
 
 impl Route {
-    pub(crate) fn new(
-        start: DVec3,
-        curves: Vec<Polynomial>,
-        schedule: Schedule,
-        is_closed: bool,
-    ) -> Self {
+    pub(crate) fn new(path: &VectorTrack, follow: &Follow) -> Self {
+        let curves = Curves::new(path, follow.method, follow.ends);
+        let curves = (0..path.keys.len() - 1).map(|i| Polynomial(curves.of(i).powers()));
+        let curves: Vec<Polynomial> = curves.collect();
         let ends = (curves.iter()).flat_map(|curve| [curve.at(0.0), curve.at(1.0)]);
         let size = diagonal(ends.clone());
         let far = ends.fold(0.0f64, |far, end| far.max(end.abs().max_element()));
@@ -57,17 +58,27 @@ impl Route {
         };
         let slopes: Vec<Polynomial> = curves.iter().map(slope).collect();
         let divided = slopes.iter().map(divided).collect();
-        Self {
-            start,
+        let mut own = Self {
+            start: path.keys[0].as_dvec3(),
             curves,
             slopes,
             divided,
             lengths: Lengths::default(),
-            schedule,
-            is_closed,
+            speed: follow.speed,
+            times: path.times.clone(),
+            is_closed: follow.is_closed(),
             size,
             far,
+        };
+        let is_minimal = follow.frame == Frame::Minimal;
+        if (own.is_closed && follow.twist == Twist::Spread && is_minimal)
+            || follow.speed != PathSpeed::Keys
+            || matches!(follow.direction, Direction::Ahead(_))
+            || path.ups.iter().any(Option::is_some)
+        {
+            own.measure();
         }
+        own
     }
 
     /// Finds the lengths, which not every path needs.
@@ -104,7 +115,7 @@ impl Route {
             places.map(move |t| self.time(interval, t))
         };
         let mut times: Vec<f64> = ((0..self.curves.len()).flat_map(places))
-            .chain(self.schedule.joints(from..to))
+            .chain(self.joints(from..to))
             .filter(|&time| time > from && time < to)
             .collect();
         times.sort_by(f64::total_cmp);
@@ -237,7 +248,6 @@ pub(crate) fn stretches(
     route: &Route,
     direction: Direction,
     target: Option<&Route>,
-    speed: PathSpeed,
 ) -> Vec<Stretch> {
     let mut all: Vec<Stretch> = Vec::with_capacity(route.curves.len());
     let mut cuts: Vec<f64> = Vec::new();
@@ -260,7 +270,7 @@ pub(crate) fn stretches(
             cuts.extend(zeros);
         }
         // At given speeds, a body's motion is not smooth where its curve stops.
-        if speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
+        if route.speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
             cuts.extend(route.stops(interval));
         }
         match (direction, target) {

@@ -132,7 +132,7 @@ impl<'a> Sampler<'a> {
         let Rows { times, places, .. } = &mut *self.rows;
         for (lane, span) in spans.iter().enumerate() {
             let (route, own) = span.place(self.paths);
-            let [first, last] = route.schedule.keys_of(own.interval);
+            let [first, last] = route.keys_of(own.interval);
             let numbers = [span.from, span.to, first, last, own.from, own.to];
             put(times, lane, numbers);
         }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::*;
+use crate::path::options::PathSpeed;
 use crate::simd::dispatch::tests::same_at_every_width;
 
 /// Of each span of each track when it starts, and the numbers that give its values.
