@@ -31,12 +31,12 @@ const MOST_PIECES: usize = 1 << 14;
 
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
 /// k and degree j.
-struct Chebyshev {
+pub(crate) struct Chebyshev {
     nodes: [f64; NODES],
-    cosines: [[f64; NODES]; NODES],
+    pub(crate) cosines: [[f64; NODES]; NODES],
 }
 
-static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
+pub(crate) static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     let cosine =
         |j: usize, k: usize| sine_cosine(PI * j as f64 * (k as f64 + 0.5) / NODES as f64).1;
     Chebyshev {
@@ -195,7 +195,6 @@ impl Block {
             changes: &self.changes,
             from: &from,
             to: &to,
-            cosines: &CHEBYSHEV.cosines,
             own: &mut self.rolled,
         });
     }

@@ -47,17 +47,9 @@ const UPRIGHT: f64 = 1e-6;
 const INFLECTED: f64 = 1e-7;
 
 impl Frames {
-    /// The rotations of a body on a path, which has upward directions at some keys. Its stretches are
-    /// those from `first` on of `uncarried` if its frame is minimal.
-    pub(crate) fn new(
-        route: Route,
-        stretches: Vec<Stretch>,
-        follow: &Follow,
-        ups: &[Option<Vec3>],
-        uncarried: &Uncarried,
-        first: usize,
-    ) -> Self {
-        let mut own = Self {
+    /// A body on a path that is cut into these stretches.
+    pub(crate) fn new(route: Route, stretches: Vec<Stretch>, follow: &Follow) -> Self {
+        Self {
             route,
             turns: Vec::with_capacity(stretches.len()),
             stretches,
@@ -66,14 +58,24 @@ impl Frames {
             left_over: 0.0,
             up: follow.up.normalize(),
             body: follow.body(),
-        };
-        match follow.frame {
-            _ if own.stretches.is_empty() => {}
-            Frame::Fixed => own.fix(),
-            Frame::Minimal => own.carry_all(follow, ups, uncarried, first),
-            Frame::Frenet => own.frenet(),
         }
-        own
+    }
+
+    /// Finds the rotations on a path that has upward directions at some keys. If the frame is minimal,
+    /// its stretches are those from `first` on of `uncarried`.
+    pub(crate) fn turn(
+        &mut self,
+        follow: &Follow,
+        ups: &[Option<Vec3>],
+        uncarried: &Uncarried,
+        first: usize,
+    ) {
+        match follow.frame {
+            _ if self.stretches.is_empty() => {}
+            Frame::Fixed => self.fix(),
+            Frame::Minimal => self.carry_all(follow, ups, uncarried, first),
+            Frame::Frenet => self.frenet(),
+        }
     }
 
     /// The pieces of a stretch with a carried frame, and the rolls added to them.
@@ -166,7 +168,6 @@ impl Frames {
         let given = |key: usize| ups.get(key).copied().flatten().map(Vec3::as_dvec3);
         let [start, _] = uncarried.ends(first_stretch);
         let first = first_rotation(given(0).unwrap_or(self.up), start);
-        self.rolls.push(Rolls::default());
         self.pieces.reserve(self.stretches.len());
         let mut points = vec![(0.0, 0.0)];
         let mut most = 0.0f64;
@@ -191,7 +192,7 @@ impl Frames {
                 let length = self.route.lengths.of(interval)[0];
                 give(length, at_end, first_rotation(up, way));
             }
-            at_end = self.carry_one(at_end, 0, (uncarried, first_stretch + stretch));
+            at_end = self.carry_one(at_end, uncarried, first_stretch + stretch);
             (arriving, before) = (end, interval);
         }
         let total = self.route.lengths.total();
@@ -202,20 +203,16 @@ impl Frames {
             let arrived = around_corner(at_end, arriving, start);
             give(total, arrived, first);
         }
-        self.rolls[0] = Rolls::through(&points);
+        self.rolls.push(Rolls::through(&points));
         self.left_over = most;
     }
 
-    /// Carries a rotation along a stretch, to which some rolls are added; returns it at the end.
-    fn carry_one(
-        &mut self,
-        start: DQuat,
-        rolls: usize,
-        (uncarried, place): (&Uncarried, usize),
-    ) -> DQuat {
+    /// Carries a rotation along a stretch, to which the next rolls are added; returns it at the end.
+    fn carry_one(&mut self, start: DQuat, uncarried: &Uncarried, place: usize) -> DQuat {
         let first = self.pieces.len();
         let end = uncarried.carry(place, start, &mut self.pieces);
-        (self.turns).push(Turn::Carried(first..self.pieces.len(), rolls));
+        let pieces = first..self.pieces.len();
+        self.turns.push(Turn::Carried(pieces, self.rolls.len()));
         end
     }
 
@@ -251,8 +248,6 @@ impl Frames {
                 Some(before) => self.carried_to(stretch, before),
                 None => first_rotation(self.up, self.ends(stretch)[0]),
             };
-            let rolls = self.rolls.len();
-            self.rolls.push(Rolls::default());
             let straight = self.stretches[stretch..end].iter();
             let straight: Vec<_> = straight.map(|own| (&self.route, own)).collect();
             let uncarried = Uncarried::new(&straight);
@@ -260,15 +255,16 @@ impl Frames {
                 if own > stretch {
                     rotation = self.carried_to(own, rotation);
                 }
-                rotation = self.carry_one(rotation, rolls, (&uncarried, own - stretch));
+                rotation = self.carry_one(rotation, &uncarried, own - stretch);
             }
+            let mut points = Vec::new();
             if let Some(Some(next)) = normals.get(end) {
                 let wanted = of_axes(next.at(self.stretches[end].from), self.ends(end)[0]);
                 let angle = about_forward(self.carried_to(end, rotation), wanted);
                 let (start, arrival) = (&self.stretches[stretch], &self.stretches[end - 1]);
                 let first = self.route.lengths.at(start.interval, start.from);
                 let last = self.route.lengths.at(arrival.interval, arrival.to);
-                let points = match before {
+                points = match before {
                     // Half a turn is repaired, so that at most a quarter is left.
                     Some(_) => {
                         let half = std::f64::consts::PI;
@@ -277,9 +273,9 @@ impl Frames {
                     }
                     None => vec![(first, angle)],
                 };
-                self.rolls[rolls] = Rolls::through(&points);
                 rotation *= about_z(points[points.len() - 1].1);
             }
+            self.rolls.push(Rolls::through(&points));
             before = Some(rotation);
             stretch = end;
         }

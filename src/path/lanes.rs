@@ -6,7 +6,7 @@ use crate::fit::double::intervals::{put, store};
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
-use crate::path::carry::{MIDDLE, NODES, Piece};
+use crate::path::carry::{CHEBYSHEV, MIDDLE, NODES, Piece};
 use crate::path::route::{Heading, NO_DIRECTION, Route, Stretch};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
@@ -114,8 +114,6 @@ pub(crate) struct Rolling<'a, const PLACES: usize> {
     pub(crate) changes: &'a [[Row; 3]; PLACES],
     pub(crate) from: &'a Row,
     pub(crate) to: &'a Row,
-    /// `cosines[k][j]` is the Chebyshev polynomial of degree j at node k.
-    pub(crate) cosines: &'a [[f64; NODES]; NODES],
     pub(crate) own: &'a mut Rolled,
 }
 
@@ -140,6 +138,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one, two] = all::<L, 3>([0.0, 1.0, 2.0]);
+        let all_cosines = &CHEBYSHEV.cosines;
         let mut angles = [[0.0; MOST]; 2];
         for lane in (0..self.count).step_by(L::COUNT) {
             let [from, to] = [
@@ -162,7 +161,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
             let mut own = [zero; NODES + 2];
             for degree in 0..NODES {
                 let mut sum = zero;
-                for (value, cosines) in values.iter().zip(self.cosines) {
+                for (value, cosines) in values.iter().zip(all_cosines) {
                     sum = sum + *value * L::Doubles::all(cosines[degree]);
                 }
                 own[degree] = sum * two / L::Doubles::all(NODES as f64);

@@ -1,6 +1,7 @@
 //! Prepares the paths of a set: positions and rotations become segments, as those of other tracks.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -22,9 +23,6 @@ use crate::prepare::vectors;
 use crate::time::spans::{NONE, Part, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
-
-/// The number of paths that are prepared as one piece of work.
-const BATCH: usize = 64;
 
 /// The most keys, beside those of one path, that are followed together: as many as fill the vector
 /// lanes, and whose numbers stay in a thread's cache.
@@ -57,19 +55,14 @@ impl PreparedPaths {
             quantity: Quantity::Velocity(Axes::Parent),
             ..rotations
         };
-        let firsts: Vec<usize> = (0..set.track_count()).step_by(BATCH).collect();
-        let batch = |first: usize| {
+        let batch = |tracks: Range<usize>| {
             let mut own = [&positions, &rotations].map(Prepared::new);
             let mut warnings = Vec::new();
-            let mut tracks = first..set.track_count().min(first + BATCH);
-            while !tracks.is_empty() {
-                let some = tracks.start..tracks.start + few(set, tracks.clone());
-                tracks.start = some.end;
-                add(&mut own, set, some, follow, &positions, &mut warnings)?;
-            }
+            add(&mut own, set, tracks, follow, &positions, &mut warnings)?;
             Ok((own, warnings))
         };
-        let batches: Result<Vec<_>, FollowError> = firsts.into_par_iter().map(batch).collect();
+        let batches = batches(set).into_par_iter().map(batch);
+        let batches: Result<Vec<_>, FollowError> = batches.collect();
         let (prepared, warnings): (Vec<_>, Vec<_>) = batches?.into_iter().unzip();
         let both = prepared.into_iter().map(|[a, b]| (a, b));
         let (of_positions, of_rotations): (Vec<_>, Vec<_>) = both.unzip();
@@ -81,15 +74,21 @@ impl PreparedPaths {
     }
 }
 
-/// How many of some tracks, the first among them, have at most as many keys as are followed together.
-fn few(set: &TrackSet, tracks: Range<usize>) -> usize {
-    let mut keys = 0;
-    let fit = tracks.skip(1).take_while(|&track| {
+/// The tracks that are followed together.
+fn batches(set: &TrackSet) -> Vec<Range<usize>> {
+    let (mut all, mut keys) = (Vec::<Range<usize>>::new(), 0);
+    for track in 0..set.track_count() {
         let path = set.vectors(Channel::Translation, track);
         keys += path.map_or(0, |path| path.keys.len());
-        keys <= TOGETHER
-    });
-    1 + fit.count()
+        match all.last_mut() {
+            Some(last) if keys <= TOGETHER => last.end += 1,
+            _ => {
+                keys = 0;
+                all.push(track..track + 1);
+            }
+        }
+    }
+    all
 }
 
 /// The path of a track, checked.
@@ -111,48 +110,34 @@ fn path_of<'a>(
     Ok(path)
 }
 
-/// The path of a track, with its stretches; without any if it stands still.
-struct Checked<'a> {
+/// A body on the path of a track, whose rotations are not known yet.
+fn body_on(
+    path: &VectorTrack,
+    set: &TrackSet,
     track: usize,
-    path: &'a VectorTrack,
-    route: Route,
-    stretches: Vec<Stretch>,
-}
-
-impl<'a> Checked<'a> {
-    fn new(set: &'a TrackSet, track: usize, follow: &Follow) -> Result<Self, FollowError> {
-        let path = path_of(set, track, follow)?;
-        if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
-            return Err(FollowError::UpsUnused { track });
-        }
-        let route = Route::new(path, follow);
-        // The body that others look at looks along its own path.
-        let direction = match follow.direction {
-            Direction::Track(target) if target == track => Direction::Tangent,
-            direction => direction,
-        };
-        let target = match direction {
-            Direction::Track(target) if target >= set.track_count() => {
-                return Err(FollowError::Target { track, target });
-            }
-            Direction::Track(target) => Some(Route::new(path_of(set, target, follow)?, follow)),
-            _ => None,
-        };
-        let stretches = stretches(&route, direction, target.as_ref());
-        Ok(Self {
-            track,
-            path,
-            route,
-            stretches,
-        })
+    follow: &Follow,
+) -> Result<Frames, FollowError> {
+    if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
+        return Err(FollowError::UpsUnused { track });
     }
-}
-
-/// A track with its path, and the number of this path's spans.
-struct Walk<'a> {
-    track: usize,
-    path: &'a VectorTrack,
-    spans: usize,
+    let route = Route::new(path, follow);
+    // The body that others look at looks along its own path.
+    let direction = match follow.direction {
+        Direction::Track(target) if target == track => Direction::Tangent,
+        direction => direction,
+    };
+    let target = match direction {
+        Direction::Track(target) if target >= set.track_count() => {
+            return Err(FollowError::Target { track, target });
+        }
+        Direction::Track(target) => {
+            let path = path_of(set, target, follow)?;
+            Some(Arc::new(Route::new(path, follow)))
+        }
+        _ => None,
+    };
+    let stretches = stretches(&route, direction, target.as_ref());
+    Ok(Frames::new(route, stretches, follow))
 }
 
 /// Adds the positions and rotations of some tracks.
@@ -164,42 +149,31 @@ fn add(
     interpolation: &Interpolation,
     warnings: &mut Vec<FollowWarning>,
 ) -> Result<(), FollowError> {
-    let checked = tracks.map(|track| Checked::new(set, track, follow));
-    let checked = checked.collect::<Result<Vec<_>, _>>()?;
-    let carried = (checked.iter()).filter(|_| follow.frame == Frame::Minimal);
-    let carried = carried.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
+    let (mut points, mut paths) = (Vec::new(), Vec::new());
+    for track in tracks.clone() {
+        let path = path_of(set, track, follow)?;
+        paths.push(body_on(path, set, track, follow)?);
+        points.push(path);
+    }
+    let minimal = (paths.iter()).filter(|_| follow.frame == Frame::Minimal);
+    let carried = minimal.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
     let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
-    let mut first_stretch = 0;
-    let (mut walks, mut paths, mut spans) = (Vec::new(), Vec::new(), Vec::new());
-    for own in checked {
-        let Checked { track, path, .. } = own;
-        let count = own.stretches.len();
-        let (first, before) = (first_stretch, spans.len());
+    let (mut first_stretch, mut spans) = (0, Vec::new());
+    for (place, (path, own)) in points.iter().zip(&mut paths).enumerate() {
+        let (track, count) = (tracks.start + place, own.stretches.len());
+        own.turn(follow, &path.ups, &uncarried, first_stretch);
         first_stretch += count;
-        let frames = Frames::new(
-            own.route,
-            own.stretches,
-            follow,
-            &path.ups,
-            &uncarried,
-            first,
-        );
         if count == 0 {
             warnings.push(FollowWarning::StandsStill { track });
-        } else if is_half_turn(frames.left_over) {
+        } else if is_half_turn(own.left_over) {
             warnings.push(FollowWarning::HalfTurn { track });
         }
-        add_spans(&mut spans, &frames, paths.len());
-        paths.push(frames);
-        walks.push(Walk {
-            track,
-            path,
-            spans: spans.len() - before,
-        });
+        add_spans(&mut spans, own, place);
     }
     let [positions, rotations] = prepared;
     let adding = Adding {
-        walks: &walks,
+        first_track: tracks.start,
+        points: &points,
         paths: &paths,
         spans: &spans,
         follow,
@@ -249,9 +223,11 @@ fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
 
 /// Adds the positions or the rotations of tracks.
 struct Adding<'a> {
-    walks: &'a [Walk<'a>],
-    /// Of each walk.
+    first_track: usize,
+    /// The path of each track, and the body on it.
+    points: &'a [&'a VectorTrack],
     paths: &'a [Frames],
+    /// Those of the first path, then those of the next.
     spans: &'a [Span],
     follow: &'a Follow,
     /// That of positions.
@@ -269,26 +245,30 @@ impl Adding<'_> {
         let is_spread = follow.frame != Frame::Minimal || follow.twist == Twist::Spread;
         let repeats = follow.is_closed() && (kind == Kind::Vector || is_spread);
         let (mut pieces, mut next) = (&fitted.pieces[..], 0);
-        for (path, (walk, frames)) in self.walks.iter().zip(self.paths).enumerate() {
+        for (path, frames) in self.paths.iter().enumerate() {
+            let (track, times) = (self.first_track + path, &frames.route.times);
             if frames.stretches.is_empty() || !is_fitted(frames) {
                 match kind {
                     // Positions at the times of the keys are cubics already.
                     Kind::Vector => vectors::add(
                         prepared,
-                        walk.track,
-                        Some(walk.path),
+                        track,
+                        Some(self.points[path]),
                         Vec3::ZERO,
                         follow.method,
                         self.interpolation,
                     ),
                     // A body that never moves looks along +z.
-                    Kind::Rotation => walk.add(prepared, &[], [follow.body().to_array(); 2], true),
+                    Kind::Rotation => {
+                        let values = [follow.body().to_array(); 2];
+                        add_part(prepared, track, times, &[], values, true);
+                    }
                 }
                 continue;
             }
-            let places = next..next + walk.spans;
-            next = places.end;
-            let (spans, ends) = (&own[places.clone()], &fitted.ends[places]);
+            let first = next;
+            next = own.partition_point(|span| span.path as usize <= path);
+            let (spans, ends) = (&own[first..next], &fitted.ends[first..next]);
             let (start, end) = frames.route.span();
             let last = used(frames).len() - 1;
             // Most often a span begins or ends there.
@@ -302,47 +282,47 @@ impl Adding<'_> {
                 Some(_) => ends[ends.len() - 1][1],
                 None => sampler.value(path, last, end),
             };
-            let (now, rest) =
-                pieces.split_at(pieces.partition_point(|piece| (piece.0 as usize) < next));
+            let count = pieces.partition_point(|piece| (piece.0 as usize) < next);
+            let (now, rest) = pieces.split_at(count);
             pieces = rest;
-            walk.add(prepared, now, [first_value, last_value], repeats);
+            let values = [first_value, last_value];
+            add_part(prepared, track, times, now, values, repeats);
         }
     }
 }
 
-impl Walk<'_> {
-    /// Adds a part with these pieces of spans. The first and last values are held outside its times;
-    /// if it repeats, the last is the first.
-    fn add(
-        &self,
-        prepared: &mut Prepared,
-        pieces: &[(u32, f64, Source)],
-        values: [[f64; 4]; 2],
-        repeats: bool,
-    ) {
-        let [first, last] = values.map(round_quat);
-        let before = prepared.constant(first);
-        let after = match repeats {
-            true => before,
-            false => prepared.constant(last),
-        };
-        let from = prepared.spans.len();
-        for &(_, start, source) in pieces {
-            prepared.push_span(start, source, NONE);
-        }
-        if let Some(key) = prepared.spans.keys.get_mut(from) {
-            *key = before;
-        }
-        prepared.parts.push(Part {
-            track: self.track as u32,
-            first_key: 0,
-            spans: from..prepared.spans.len(),
-            end: self.path.times[self.path.times.len() - 1],
-            before,
-            after,
-            beyond: None,
-        });
+/// Adds a part: a track with keys at these times, and its pieces of spans. The first and last values
+/// are held outside; if it repeats, the last is the first.
+fn add_part(
+    prepared: &mut Prepared,
+    track: usize,
+    times: &[f64],
+    pieces: &[(u32, f64, Source)],
+    values: [[f64; 4]; 2],
+    repeats: bool,
+) {
+    let [first, last] = values.map(round_quat);
+    let before = prepared.constant(first);
+    let after = match repeats {
+        true => before,
+        false => prepared.constant(last),
+    };
+    let from = prepared.spans.len();
+    for &(_, start, source) in pieces {
+        prepared.push_span(start, source, NONE);
     }
+    if let Some(key) = prepared.spans.keys.get_mut(from) {
+        *key = before;
+    }
+    prepared.parts.push(Part {
+        track: track as u32,
+        first_key: 0,
+        spans: from..prepared.spans.len(),
+        end: times[times.len() - 1],
+        before,
+        after,
+        beyond: None,
+    });
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! A path with its curves, cut into stretches of one smooth direction each.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::method::vector_curve::Curves;
@@ -170,7 +172,7 @@ pub(crate) enum Heading {
     /// To the point ahead on the path.
     Ahead(f64),
     /// To a body on another path, or to the last resort where both are at one place.
-    Body(Box<Route>, DVec3),
+    Body(Arc<Route>, DVec3),
 }
 
 impl Stretch {
@@ -198,7 +200,7 @@ impl Stretch {
         let slope = route.slopes[self.interval].at(t);
         let (lengths, total) = (&route.lengths, route.lengths.total());
         let mut length = lengths.at(self.interval, t) + distance;
-        if route.is_closed && total > 0.0 {
+        if route.is_closed {
             length %= total;
         }
         let interval = lengths.interval(length);
@@ -247,7 +249,7 @@ pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynom
 pub(crate) fn stretches(
     route: &Route,
     direction: Direction,
-    target: Option<&Route>,
+    target: Option<&Arc<Route>>,
 ) -> Vec<Stretch> {
     let mut all: Vec<Stretch> = Vec::with_capacity(route.curves.len());
     let mut cuts: Vec<f64> = Vec::new();
@@ -295,7 +297,7 @@ pub(crate) fn stretches(
                     Heading::Ahead(distance)
                 }
                 (None, Direction::Track(_), Some(target)) => {
-                    Heading::Body(Box::new(target.clone()), DVec3::ZERO)
+                    Heading::Body(Arc::clone(target), DVec3::ZERO)
                 }
                 _ => Heading::Still(DVec3::ZERO),
             };
