@@ -177,7 +177,8 @@ impl Block {
         for (lane, own) in waiting.iter().enumerate() {
             (self.places[FROM][lane], self.places[TO][lane]) = (own.from, own.to);
         }
-        let (from, to) = (self.places[FROM], self.places[TO]);
+        let ends = [self.places[FROM], self.places[TO]];
+        let [from, to] = &ends;
         let centers: Row = std::array::from_fn(|lane| 0.5 * (from[lane] + to[lane]));
         let halves: Row = std::array::from_fn(|lane| 0.5 * (to[lane] - from[lane]));
         for (row, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
@@ -193,8 +194,7 @@ impl Block {
             count: waiting.len(),
             ways: &self.ways,
             changes: &self.changes,
-            from: &from,
-            to: &to,
+            ends: &ends,
             own: &mut self.rolled,
         });
     }

@@ -50,8 +50,7 @@ struct Waiting {
 
 /// Fits spans of paths, and adds their segments and constants to what is prepared.
 pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler<'_>) -> Fitted {
-    let kind = sampler.kind;
-    let latest = latest_times(spans);
+    let (paths, kind) = (sampler.paths, sampler.kind);
     let mut found = Fitted {
         pieces: Vec::with_capacity(2 * spans.len()),
         ends: vec![[[0.0; 4]; 2]; spans.len()],
@@ -92,7 +91,8 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
                 || middle <= span.from
                 || middle >= span.to;
             // A time is known within its own rounding, which is more of a shorter span.
-            let known = UNKNOWN * latest[span.path as usize] / width;
+            let (start, end) = paths[span.path as usize].route.span();
+            let known = UNKNOWN * start.abs().max(end.abs()) / width;
             let source = if lanes.fits(lane, known) {
                 let segments = &mut prepared.segments.polynomials;
                 segments.push(lanes.segments[lane]);
@@ -114,17 +114,6 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     }
     (found.pieces).sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     found
-}
-
-/// The largest magnitude of the times of each path.
-fn latest_times(spans: &[Span]) -> Vec<f64> {
-    let paths = spans.last().map_or(0, |span| span.path as usize + 1);
-    let mut latest = vec![0.0f64; paths];
-    for span in spans {
-        let own = &mut latest[span.path as usize];
-        *own = own.max(span.from.abs()).max(span.to.abs());
-    }
-    latest
 }
 
 /// Polynomials through the samples of a block of spans.

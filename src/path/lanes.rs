@@ -112,8 +112,8 @@ pub(crate) struct Rolling<'a, const PLACES: usize> {
     /// Directions at the nodes, at [`MIDDLE`], at the start and at the end, and their derivatives.
     pub(crate) ways: &'a [[Row; 3]; PLACES],
     pub(crate) changes: &'a [[Row; 3]; PLACES],
-    pub(crate) from: &'a Row,
-    pub(crate) to: &'a Row,
+    /// The parameters at the start and at the end.
+    pub(crate) ends: &'a [Row; 2],
     pub(crate) own: &'a mut Rolled,
 }
 
@@ -141,10 +141,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
         let all_cosines = &CHEBYSHEV.cosines;
         let mut angles = [[0.0; MOST]; 2];
         for lane in (0..self.count).step_by(L::COUNT) {
-            let [from, to] = [
-                L::Doubles::load(&self.from[lane..]),
-                L::Doubles::load(&self.to[lane..]),
-            ];
+            let [from, to] = load::<L, 2>(self.ends, lane);
             let half = L::Doubles::all(0.5) * (to - from);
             let middle = load::<L, 3>(&self.ways[MIDDLE], lane);
             let mut least = one;
@@ -181,10 +178,8 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
             }
             roll[0] = -at_middle;
             store(&mut self.own.roll, lane, roll);
-            let width = (to - from).larger(L::Doubles::all(f64::MIN_POSITIVE));
-            let x = ((two * to - from - to) / width).larger(-one).smaller(one);
             (-clenshaw(&roll, -one)).store(&mut angles[0][lane..]);
-            clenshaw(&roll, x).store(&mut angles[1][lane..]);
+            clenshaw(&roll, within([from, to], to)).store(&mut angles[1][lane..]);
             for end in 0..2 {
                 let way = load::<L, 3>(&self.ways[MIDDLE + 1 + end], lane);
                 store(&mut self.own.turns[end], lane, least_turn(middle, way));
@@ -199,8 +194,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
 /// The pieces of some lanes.
 #[derive(Default)]
 pub(crate) struct Pieces {
-    from: Row,
-    to: Row,
+    ends: [Row; 2],
     roll: [Row; NODES + 1],
     middle: [Row; 3],
     base: [Row; 4],
@@ -209,7 +203,7 @@ pub(crate) struct Pieces {
 impl Pieces {
     /// Sets the piece of a lane.
     pub(crate) fn set(&mut self, lane: usize, piece: &Piece) {
-        (self.from[lane], self.to[lane]) = (piece.from, piece.to);
+        put(&mut self.ends, lane, [piece.from, piece.to]);
         put(&mut self.roll, lane, piece.roll);
         put(&mut self.middle, lane, piece.middle.to_array());
         put(&mut self.base, lane, piece.base.to_array());
@@ -236,8 +230,6 @@ pub(crate) struct Carried<'a, const PLACES: usize> {
 impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let [one, two] = all::<L, 2>([1.0, 2.0]);
-        let least_width = L::Doubles::all(f64::MIN_POSITIVE);
         let mut others = self.others;
         for place in 0..PLACES {
             while let [(from, lane, piece), rest @ ..] = others
@@ -248,15 +240,10 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
             }
             let mut angles = [0.0; MOST];
             for lane in (0..self.count).step_by(L::COUNT) {
-                let [from, to] = [
-                    L::Doubles::load(&self.pieces.from[lane..]),
-                    L::Doubles::load(&self.pieces.to[lane..]),
-                ];
+                let ends = load::<L, 2>(&self.pieces.ends, lane);
                 let t = L::Doubles::load(&self.places[place][lane..]);
-                let width = (to - from).larger(least_width);
-                let x = ((two * t - from - to) / width).larger(-one).smaller(one);
                 let roll = load::<L, { NODES + 1 }>(&self.pieces.roll, lane);
-                clenshaw(&roll, x).store(&mut angles[lane..]);
+                clenshaw(&roll, within(ends, t)).store(&mut angles[lane..]);
             }
             let own = sines_and_cosines(&angles);
             let mut added = [[0.0; MOST]; 2];
@@ -294,6 +281,14 @@ pub(crate) fn least_turn<R: Real>(from: [R; 3], to: [R; 3]) -> [R; 4] {
         length.up_to(zero, zero, own[2] / length),
         length.up_to(zero, one, own[3] / length),
     ]
+}
+
+/// Where a place lies in a piece, from -1 at its start to 1 at its end.
+#[inline(always)]
+fn within<R: Real>([from, to]: [R; 2], t: R) -> R {
+    let (one, width) = (R::all(1.0), (to - from).larger(R::all(f64::MIN_POSITIVE)));
+    let x = (R::all(2.0) * t - from - to) / width;
+    x.larger(-one).smaller(one)
 }
 
 /// A sum of Chebyshev polynomials at x, from -1 to 1, by Clenshaw's recurrence.

@@ -70,7 +70,7 @@ pub(crate) type Samples = [[Row; 4]; PLACES];
 
 /// Samples spans of some paths; its memory is kept for the next ones.
 pub(crate) struct Sampler<'a> {
-    paths: &'a [Frames],
+    pub(crate) paths: &'a [Frames],
     pub(crate) kind: Kind,
     speed: PathSpeed,
     /// The rotation from the body to z forward, y up, if it is not the identity.
