@@ -55,15 +55,11 @@ impl PreparedPaths {
             quantity: Quantity::Velocity(Axes::Parent),
             ..rotations
         };
-        let batch = |tracks: Range<usize>| {
-            let mut own = [&positions, &rotations].map(Prepared::new);
-            let mut warnings = Vec::new();
-            add(&mut own, set, tracks, follow, &positions, &mut warnings)?;
-            Ok((own, warnings))
-        };
-        let batches = batches(set).into_par_iter().map(batch);
-        let batches: Result<Vec<_>, FollowError> = batches.collect();
-        let (prepared, warnings): (Vec<_>, Vec<_>) = batches?.into_iter().unzip();
+        let prepared = |tracks| prepared(set, tracks, follow, [&positions, &rotations]);
+        let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
+        // Of several errors that of the first track counts.
+        let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let (prepared, warnings): (Vec<_>, Vec<_>) = batches.into_iter().unzip();
         let both = prepared.into_iter().map(|[a, b]| (a, b));
         let (of_positions, of_rotations): (Vec<_>, Vec<_>) = both.unzip();
         Ok(Self {
@@ -140,15 +136,13 @@ fn body_on(
     Ok(Frames::new(route, stretches, follow))
 }
 
-/// Adds the positions and rotations of some tracks.
-fn add(
-    prepared: &mut [Prepared; 2],
+/// The positions and rotations of some tracks, and what is unusual about them.
+fn prepared(
     set: &TrackSet,
     tracks: Range<usize>,
     follow: &Follow,
-    interpolation: &Interpolation,
-    warnings: &mut Vec<FollowWarning>,
-) -> Result<(), FollowError> {
+    interpolations: [&Interpolation; 2],
+) -> Result<([Prepared; 2], Vec<FollowWarning>), FollowError> {
     let (mut points, mut paths) = (Vec::new(), Vec::new());
     for track in tracks.clone() {
         let path = path_of(set, track, follow)?;
@@ -158,7 +152,7 @@ fn add(
     let minimal = (paths.iter()).filter(|_| follow.frame == Frame::Minimal);
     let carried = minimal.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
     let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
-    let (mut first_stretch, mut spans) = (0, Vec::new());
+    let (mut first_stretch, mut spans, mut warnings) = (0, Vec::new(), Vec::new());
     for (place, (path, own)) in points.iter().zip(&mut paths).enumerate() {
         let (track, count) = (tracks.start + place, own.stretches.len());
         own.turn(follow, &path.ups, &uncarried, first_stretch);
@@ -170,18 +164,18 @@ fn add(
         }
         add_spans(&mut spans, own, place);
     }
-    let [positions, rotations] = prepared;
     let adding = Adding {
         first_track: tracks.start,
         points: &points,
         paths: &paths,
         spans: &spans,
         follow,
-        interpolation,
+        interpolation: interpolations[0],
     };
-    adding.add(positions, Kind::Vector);
-    adding.add(rotations, Kind::Rotation);
-    Ok(())
+    let [mut positions, mut rotations] = interpolations.map(Prepared::new);
+    adding.add(&mut positions, Kind::Vector);
+    adding.add(&mut rotations, Kind::Rotation);
+    Ok(([positions, rotations], warnings))
 }
 
 /// The stretches of a path that are used: of one on which a body stands the first alone.
