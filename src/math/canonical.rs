@@ -43,6 +43,15 @@ pub(crate) fn round_quat(q: Quaternion) -> [f32; 4] {
     q.map(round_f32)
 }
 
+/// The largest power of two that a magnitude reaches; 1 if that is tiny.
+pub(crate) fn power_of_two(magnitude: f64) -> f64 {
+    if magnitude > 1e-30 {
+        f64::from_bits(magnitude.to_bits() & (0x7ff << 52))
+    } else {
+        1.0
+    }
+}
+
 /// The unit quaternion nearest to `q`, in f32.
 pub(crate) fn unit_f32(q: DQuat) -> Quat {
     let q = q.to_array();

@@ -1,10 +1,11 @@
 //! Rotations by their axes, in vector lanes: of frames that are not carried.
 
 use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::store;
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, square,
 };
-use crate::path::lanes::{Row, load, store};
+use crate::path::lanes::{Row, all, load};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
 
@@ -24,9 +25,7 @@ pub(crate) struct ByAxes<'a, const PLACES: usize> {
 impl<const PLACES: usize> InLanes for ByAxes<'_, PLACES> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
-        let least = L::Doubles::all(f64::MIN_POSITIVE);
-        let most = L::Doubles::all(f64::MAX);
+        let [zero, one, least, most] = all::<L, 4>([0.0, 1.0, f64::MIN_POSITIVE, f64::MAX]);
         *self.are_along = [0.0; MOST];
         for lane in (0..self.count).step_by(L::COUNT) {
             let mut is_along = zero;
@@ -38,16 +37,10 @@ impl<const PLACES: usize> InLanes for ByAxes<'_, PLACES> {
                 is_along = inverse.up_to(most, is_along, one);
                 is_along = least.up_to(inverse, is_along, one);
                 let mut rotation = of_axes(scaled(across, inverse), way);
-                if let Some([x, y, z, w]) = self.body {
-                    let body = [
-                        L::Doubles::all(x),
-                        L::Doubles::all(y),
-                        L::Doubles::all(z),
-                        L::Doubles::all(w),
-                    ];
-                    rotation = product(rotation, body);
+                if let Some(body) = self.body {
+                    rotation = product(rotation, all::<L, 4>(body));
                 }
-                store(rotation, &mut self.rotations[place], lane);
+                store(&mut self.rotations[place], lane, rotation);
             }
             is_along.store(&mut self.are_along[lane..]);
         }

@@ -10,9 +10,10 @@ use std::sync::LazyLock;
 use glam::{DQuat, DVec3};
 
 use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::at;
 use crate::math::quaternion::{Quaternion, sine_cosine};
-use crate::path::lanes::{self, Directions, Polynomials, Rolled, Rolling, Row, at};
-use crate::path::route::{Heading, Route, Stretch};
+use crate::path::lanes::{self, Rolled, Rolling, Row, find_directions};
+use crate::path::route::{Route, Stretch};
 use crate::simd::dispatch::in_lanes;
 
 /// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
@@ -30,12 +31,12 @@ const MOST_PIECES: usize = 1 << 14;
 
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
 /// k and degree j.
-struct Chebyshev {
+pub(crate) struct Chebyshev {
     nodes: [f64; NODES],
-    cosines: [[f64; NODES]; NODES],
+    pub(crate) cosines: [[f64; NODES]; NODES],
 }
 
-static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
+pub(crate) static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     let cosine =
         |j: usize, k: usize| sine_cosine(PI * j as f64 * (k as f64 + 0.5) / NODES as f64).1;
     Chebyshev {
@@ -64,6 +65,7 @@ pub(crate) struct Piece {
 
 /// A piece whose rotation is not known yet, and what turns one from its start to its end.
 struct Unturned {
+    stretch: usize,
     piece: Piece,
     /// The directions at its ends.
     ways: [DVec3; 2],
@@ -75,36 +77,31 @@ struct Unturned {
 
 /// The pieces of some stretches, before they are turned.
 pub(crate) struct Uncarried {
-    /// In the order in which they were found.
+    /// In the order of stretches and parameters.
     pieces: Vec<Unturned>,
-    /// Their places in the order of stretches and parameters.
-    order: Vec<usize>,
-    /// Where in `order` the pieces of each stretch begin, and where those of the last one end.
+    /// Where the pieces of each stretch begin, and where those of the last one end.
     firsts: Vec<usize>,
 }
 
 impl Uncarried {
     /// Cuts stretches of any paths into pieces in which the roll is exact.
     pub(crate) fn new(stretches: &[(&Route, &Stretch)]) -> Self {
-        let mut block = Box::new(Block::NONE);
-        let mut waiting: Vec<Waiting> = Vec::with_capacity(stretches.len());
-        for (stretch, (_, own)) in stretches.iter().enumerate() {
-            waiting.push(Waiting {
-                stretch,
-                from: own.from,
-                to: own.to,
-            });
-        }
+        let mut block = Box::<Block>::default();
+        let whole = |(stretch, (_, own)): (usize, &(&Route, &Stretch))| Waiting {
+            stretch,
+            from: own.from,
+            to: own.to,
+        };
+        let mut waiting: Vec<Waiting> = stretches.iter().enumerate().map(whole).collect();
         let mut counts = vec![1; stretches.len()];
         let mut pieces: Vec<Unturned> = Vec::with_capacity(stretches.len());
-        let mut found: Vec<Waiting> = Vec::with_capacity(stretches.len());
         let mut done = 0;
         while done < waiting.len() {
             let some = done..waiting.len().min(done + MOST);
             done = some.end;
             block.find(stretches, &waiting[some.clone()]);
             for (lane, place) in some.enumerate() {
-                let Waiting { stretch, from, to } = waiting[place];
+                let own @ Waiting { stretch, from, to } = waiting[place];
                 let middle = 0.5 * (from + to);
                 let is_finest = to - from <= SHORTEST || counts[stretch] > MOST_PIECES;
                 if !block.fits(lane) && !is_finest && from < middle && middle < to {
@@ -114,47 +111,38 @@ impl Uncarried {
                     }
                     continue;
                 }
-                pieces.push(block.unturned(lane, from, to));
-                found.push(waiting[place]);
+                pieces.push(block.unturned(lane, own));
             }
         }
-        let mut order: Vec<usize> = (0..pieces.len()).collect();
-        if done > stretches.len() {
-            order.sort_unstable_by(|&a, &b| {
-                let (a, b) = (&found[a], &found[b]);
-                a.stretch.cmp(&b.stretch).then(a.from.total_cmp(&b.from))
-            });
-        }
+        // Most often no stretch was cut, and they are in order already.
+        pieces.sort_by(|a, b| {
+            let by_place = a.piece.from.total_cmp(&b.piece.from);
+            a.stretch.cmp(&b.stretch).then(by_place)
+        });
         let mut firsts = Vec::with_capacity(stretches.len() + 1);
         firsts.push(0);
         for count in counts {
             firsts.push(firsts[firsts.len() - 1] + count);
         }
-        Self {
-            pieces,
-            order,
-            firsts,
-        }
+        Self { pieces, firsts }
     }
 
-    /// The places of a stretch's pieces.
-    fn places(&self, stretch: usize) -> &[usize] {
-        &self.order[self.firsts[stretch]..self.firsts[stretch + 1]]
+    /// A stretch's pieces.
+    fn of(&self, stretch: usize) -> &[Unturned] {
+        &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]]
     }
 
     /// The directions at both ends of a stretch.
     pub(crate) fn ends(&self, stretch: usize) -> [DVec3; 2] {
-        let own = self.places(stretch);
-        let [first, last] = [own[0], own[own.len() - 1]].map(|place| &self.pieces[place]);
-        [first.ways[0], last.ways[1]]
+        let own = self.of(stretch);
+        [own[0].ways[0], own[own.len() - 1].ways[1]]
     }
 
     /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
     /// end.
     pub(crate) fn carry(&self, stretch: usize, start: DQuat, pieces: &mut Vec<Piece>) -> DQuat {
         let mut rotation = start;
-        for &place in self.places(stretch) {
-            let own = &self.pieces[place];
+        for own in self.of(stretch) {
             let unrolled = own.turns[0].conjugate() * rotation;
             let base = unrolled * own.rolls[0];
             rotation = own.turns[1] * (base * own.rolls[1]);
@@ -176,10 +164,8 @@ struct Waiting {
 }
 
 /// Pieces that are found at once, one in each lane.
+#[derive(Default)]
 struct Block {
-    from: Row,
-    to: Row,
-    headings: Polynomials,
     places: [Row; PLACES],
     ways: [[Row; 3]; PLACES],
     changes: [[Row; 3]; PLACES],
@@ -187,62 +173,28 @@ struct Block {
 }
 
 impl Block {
-    const NONE: Self = Self {
-        from: [0.0; MOST],
-        to: [0.0; MOST],
-        headings: [[[0.0; MOST]; 3]; 4],
-        places: [[0.0; MOST]; PLACES],
-        ways: [[[0.0; MOST]; 3]; PLACES],
-        changes: [[[0.0; MOST]; 3]; PLACES],
-        rolled: Rolled::NONE,
-    };
-
     fn find(&mut self, stretches: &[(&Route, &Stretch)], waiting: &[Waiting]) {
         for (lane, own) in waiting.iter().enumerate() {
-            (self.from[lane], self.to[lane]) = (own.from, own.to);
-            if let Heading::Polynomial(way) = &stretches[own.stretch].1.heading {
-                lanes::set(&mut self.headings, lane, way);
-            }
+            (self.places[FROM][lane], self.places[TO][lane]) = (own.from, own.to);
         }
-        let (mut centers, mut halves) = ([0.0; MOST], [0.0; MOST]);
-        for lane in 0..MOST {
-            let (from, to) = (self.from[lane], self.to[lane]);
-            (centers[lane], halves[lane]) = (0.5 * (from + to), 0.5 * (to - from));
-        }
+        let ends = [self.places[FROM], self.places[TO]];
+        let [from, to] = &ends;
+        let centers: Row = std::array::from_fn(|lane| 0.5 * (from[lane] + to[lane]));
+        let halves: Row = std::array::from_fn(|lane| 0.5 * (to[lane] - from[lane]));
         for (row, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
             for ((place, center), half) in row.iter_mut().zip(&centers).zip(&halves) {
                 *place = center + half * node;
             }
         }
         self.places[MIDDLE] = centers;
-        (self.places[FROM], self.places[TO]) = (self.from, self.to);
-        in_lanes(&mut Directions {
-            count: waiting.len(),
-            polynomials: &self.headings,
-            places: &self.places,
-            ways: &mut self.ways,
-            changes: Some(&mut self.changes),
-        });
-        for (lane, own) in waiting.iter().enumerate() {
-            let (route, stretch) = stretches[own.stretch];
-            if let Heading::Polynomial(_) = stretch.heading {
-                continue;
-            }
-            for place in 0..PLACES {
-                let [way, change] = stretch.way(route, self.places[place][lane]);
-                for c in 0..3 {
-                    self.ways[place][c][lane] = way[c];
-                    self.changes[place][c][lane] = change[c];
-                }
-            }
-        }
+        let own = waiting.iter().map(|own| stretches[own.stretch]);
+        let changes = Some(&mut self.changes);
+        find_directions(own, &self.places, &mut self.ways, changes);
         in_lanes(&mut Rolling {
             count: waiting.len(),
             ways: &self.ways,
             changes: &self.changes,
-            from: &self.from,
-            to: &self.to,
-            cosines: &CHEBYSHEV.cosines,
+            ends: &ends,
             own: &mut self.rolled,
         });
     }
@@ -252,30 +204,26 @@ impl Block {
         self.rolled.least[lane] > 0.5 && self.rolled.rest[lane] <= TOLERANCE
     }
 
-    fn unturned(&self, lane: usize, from: f64, to: f64) -> Unturned {
+    fn unturned(&self, lane: usize, Waiting { stretch, from, to }: Waiting) -> Unturned {
         let way = |place: usize| DVec3::from_array(at(&self.ways[place], lane));
-        let Rolled {
-            roll,
-            turns,
-            halves,
-            ..
-        } = &self.rolled;
-        let roll_of = |end: usize| {
-            let [sine, cosine] = at(&halves[end], lane);
+        let found = &self.rolled;
+        let roll = |end: usize| {
+            let [sine, cosine] = at(&found.halves[end], lane);
             DQuat::from_xyzw(0.0, 0.0, sine, cosine)
         };
-        let turn = |end: usize| turn_of(at(&turns[end], lane));
+        let turn = |end: usize| turn_of(at(&found.turns[end], lane));
         Unturned {
+            stretch,
             piece: Piece {
                 from,
                 to,
                 middle: way(MIDDLE),
                 base: DQuat::IDENTITY,
-                roll: at(roll, lane),
+                roll: at(&found.roll, lane),
             },
             ways: [way(FROM), way(TO)],
             turns: [turn(0), turn(1)],
-            rolls: [roll_of(0), roll_of(1)],
+            rolls: [roll(0), roll(1)],
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Fits what is sampled along paths by the polynomials that the kernels evaluate, cut in two until
 //! they do.
 
+use bytemuck::Zeroable;
+
 use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
+use crate::fit::double::intervals::at;
 use crate::fit::nodes::FULL_NODES;
-use crate::math::canonical::round_quat;
+use crate::math::canonical::{power_of_two, round_quat};
 use crate::math::quaternion::{Quaternion, Real, dot};
-use crate::path::lanes::{Row, at, load};
+use crate::path::lanes::{Row, load};
 use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
@@ -47,8 +50,7 @@ struct Waiting {
 
 /// Fits spans of paths, and adds their segments and constants to what is prepared.
 pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler<'_>) -> Fitted {
-    let kind = sampler.kind();
-    let latest = latest_times(spans);
+    let (paths, kind) = (sampler.paths, sampler.kind);
     let mut found = Fitted {
         pieces: Vec::with_capacity(2 * spans.len()),
         ends: vec![[[0.0; 4]; 2]; spans.len()],
@@ -63,7 +65,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     prepared.segments.reserve(spans.len());
     let mut block: Vec<Waiting> = Vec::with_capacity(MOST);
     let mut own_spans: Vec<Span> = Vec::with_capacity(MOST);
-    let mut lanes = Box::new(FittedLanes::NONE);
+    let mut lanes = Box::new(FittedLanes::zeroed());
     while !waiting.is_empty() {
         block.clear();
         block.extend(waiting.drain(waiting.len().saturating_sub(MOST)..));
@@ -89,7 +91,8 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
                 || middle <= span.from
                 || middle >= span.to;
             // A time is known within its own rounding, which is more of a shorter span.
-            let known = UNKNOWN * latest[span.path as usize] / width;
+            let (start, end) = paths[span.path as usize].route.span();
+            let known = UNKNOWN * start.abs().max(end.abs()) / width;
             let source = if lanes.fits(lane, known) {
                 let segments = &mut prepared.segments.polynomials;
                 segments.push(lanes.segments[lane]);
@@ -113,18 +116,8 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     found
 }
 
-/// The largest magnitude of the times of each path.
-fn latest_times(spans: &[Span]) -> Vec<f64> {
-    let paths = spans.last().map_or(0, |span| span.path as usize + 1);
-    let mut latest = vec![0.0f64; paths];
-    for span in spans {
-        let own = &mut latest[span.path as usize];
-        *own = own.max(span.from.abs()).max(span.to.abs());
-    }
-    latest
-}
-
 /// Polynomials through the samples of a block of spans.
+#[derive(Zeroable)]
 struct FittedLanes {
     segments: [PolynomialSegment; MOST],
     /// The powers of two near the largest values.
@@ -138,16 +131,6 @@ struct FittedLanes {
 }
 
 impl FittedLanes {
-    const NONE: Self = Self {
-        segments: [PolynomialSegment {
-            coefficients: [[0.0; 4]; 2 * PAIRS + 1],
-        }; MOST],
-        units: [1.0; MOST],
-        tails: [0.0; MOST],
-        errors: [0.0; MOST],
-        are_far: [0.0; MOST],
-    };
-
     /// Whether the polynomial of a lane is near its curve, of which this error cannot be known.
     fn fits(&self, lane: usize, known: f64) -> bool {
         self.are_far[lane] == 0.0
@@ -155,17 +138,6 @@ impl FittedLanes {
             && self.errors[lane] <= (LARGEST + known) * f64::from(self.units[lane])
     }
 }
-
-/// The segment of each lane.
-const LANES: [usize; MOST] = {
-    let mut lanes = [0; MOST];
-    let mut lane = 0;
-    while lane < MOST {
-        lanes[lane] = lane;
-        lane += 1;
-    }
-    lanes
-};
 
 /// Fits a block of spans.
 struct InFit<'a> {
@@ -180,6 +152,9 @@ impl InLanes for InFit<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
+        self.own.units = [1.0; MOST];
+        // The segment of each lane.
+        let places: [usize; MOST] = std::array::from_fn(|lane| lane);
         for lane in (0..self.count).step_by(L::COUNT) {
             let middle = load::<L, 4>(&self.samples[MIDDLE], lane);
             let mut values = [[zero; 4]; 2 * PAIRS];
@@ -255,7 +230,7 @@ impl InLanes for InFit<'_> {
                 error = farthest.up_to(zero, off, infinite).larger(error);
             }
             error.store(&mut self.own.errors[lane..]);
-            let places = &LANES[lane..lane + L::COUNT];
+            let places = &places[lane..lane + L::COUNT];
             L::store_powers(&powers, &mut self.own.segments, places);
         }
     }
@@ -263,15 +238,6 @@ impl InLanes for InFit<'_> {
 
 /// The cosine of half the largest turn from the middle that one polynomial may fit, and a bit more.
 const FAR: f64 = 0.5f64.next_up();
-
-/// The largest power of two that a magnitude reaches; 1 if that is tiny.
-fn power_of_two(magnitude: f64) -> f64 {
-    if magnitude > 1e-30 {
-        f64::from_bits(magnitude.to_bits() & (0x7ff << 52))
-    } else {
-        1.0
-    }
-}
 
 #[inline(always)]
 fn magnitude<R: Real>(number: R) -> R {

@@ -6,9 +6,9 @@ use glam::{DQuat, DVec3, Vec3};
 
 use crate::path::axes;
 use crate::path::carry::{Piece, Uncarried, about_z, around_corner, least_turn};
-use crate::path::options::{Follow, FollowWarning, Frame, Twist};
+use crate::path::options::{Follow, Frame, Twist};
 use crate::path::polynomial::Polynomial;
-use crate::path::rolls::{Rolls, is_half_turn, unwrapped, wrapped};
+use crate::path::rolls::{Rolls, unwrapped, wrapped};
 use crate::path::route::{Heading, Route, Stretch, signed};
 
 /// What gives the rotations of a stretch.
@@ -30,6 +30,8 @@ pub(crate) struct Frames {
     /// The pieces of all carried frames.
     pieces: Vec<Piece>,
     rolls: Vec<Rolls>,
+    /// The largest angle by which a minimal frame was off, where its roll is given.
+    pub(crate) left_over: f64,
     up: DVec3,
     body: DQuat,
 }
@@ -45,39 +47,35 @@ const UPRIGHT: f64 = 1e-6;
 const INFLECTED: f64 = 1e-7;
 
 impl Frames {
-    /// The rotations of a body on the `track`th path, which has upward directions at some keys. The
-    /// stretches of minimal frames are the next of those that wait to be carried.
-    pub(crate) fn new(
-        (route, stretches): (Route, Vec<Stretch>),
-        follow: &Follow,
-        ups: &[Option<Vec3>],
-        track: usize,
-        (uncarried, next): (&Uncarried, &mut usize),
-        warnings: &mut Vec<FollowWarning>,
-    ) -> Self {
-        let count = stretches.len();
-        let mut own = Self {
+    /// A body on a path that is cut into these stretches.
+    pub(crate) fn new(route: Route, stretches: Vec<Stretch>, follow: &Follow) -> Self {
+        Self {
             route,
+            turns: Vec::with_capacity(stretches.len()),
             stretches,
-            turns: Vec::with_capacity(count),
             pieces: Vec::new(),
             rolls: Vec::new(),
+            left_over: 0.0,
             up: follow.up.normalize(),
             body: follow.body(),
-        };
-        let mut left_over = 0.0;
+        }
+    }
+
+    /// Finds the rotations on a path that has upward directions at some keys. If the frame is minimal,
+    /// its stretches are those from `first` on of `uncarried`.
+    pub(crate) fn turn(
+        &mut self,
+        follow: &Follow,
+        ups: &[Option<Vec3>],
+        uncarried: &Uncarried,
+        first: usize,
+    ) {
         match follow.frame {
-            Frame::Fixed => own.fix(),
-            Frame::Minimal => {
-                left_over = own.carry_all(follow, ups, uncarried, *next);
-                *next += count;
-            }
-            Frame::Frenet => own.frenet(),
+            _ if self.stretches.is_empty() => {}
+            Frame::Fixed => self.fix(),
+            Frame::Minimal => self.carry_all(follow, ups, uncarried, first),
+            Frame::Frenet => self.frenet(),
         }
-        if is_half_turn(left_over) && left_over != 0.0 {
-            warnings.push(FollowWarning::HalfTurn { track });
-        }
-        own
     }
 
     /// The pieces of a stretch with a carried frame, and the rolls added to them.
@@ -118,29 +116,21 @@ impl Frames {
     fn fix(&mut self) {
         let up = self.up;
         let mut kept = DVec3::ZERO;
-        let mut turns = Vec::with_capacity(self.stretches.len());
         let mut cut = Vec::with_capacity(self.stretches.len());
         for own in std::mem::take(&mut self.stretches) {
-            let Heading::Polynomial(way) = &own.heading else {
-                let start = own.way(&self.route, own.from)[0];
-                if kept == DVec3::ZERO {
-                    kept = first_side(up, start);
+            let mut places = vec![own.from, own.to];
+            let side = match &own.heading {
+                Heading::Polynomial(way) => {
+                    let side = way.map(|c| up.cross(c));
+                    let tolerance = UPRIGHT * way.size();
+                    (side.size() > tolerance).then(|| side.without_zeros(tolerance))
                 }
-                turns.push(Turn::Fixed(None, kept));
-                kept = side_at(up, own.way(&self.route, own.to)[0], kept);
-                cut.push(own);
-                continue;
+                _ => None,
             };
-            let side = way.map(|c| up.cross(c));
-            let tolerance = UPRIGHT * way.size();
-            let is_upright = side.size() <= tolerance;
-            let divided = match is_upright {
-                true => (Vec::new(), side),
-                false => side.without_zeros(tolerance),
-            };
-            let within = |&zero: &f64| zero > own.from && zero < own.to;
-            let mut places: Vec<f64> = divided.0.iter().copied().filter(within).collect();
-            places.extend([own.from, own.to]);
+            if let Some((zeros, _)) = &side {
+                let within = |&&zero: &&f64| zero > own.from && zero < own.to;
+                places.extend(zeros.iter().filter(within));
+            }
             places.sort_by(f64::total_cmp);
             places.dedup();
             for pair in places.windows(2) {
@@ -153,9 +143,9 @@ impl Frames {
                 if kept == DVec3::ZERO {
                     kept = first_side(up, part.way(&self.route, from)[0]);
                 }
-                let x = (!is_upright).then(|| signed(&divided, 0.5 * (from + to)));
+                let x = side.as_ref().map(|own| signed(own, 0.5 * (from + to)));
                 let end = part.way(&self.route, to)[0];
-                turns.push(Turn::Fixed(x, kept));
+                self.turns.push(Turn::Fixed(x, kept));
                 kept = match x {
                     Some(x) => across(x.at(to), end),
                     None => side_at(up, end, kept),
@@ -163,33 +153,31 @@ impl Frames {
                 cut.push(part);
             }
         }
-        (self.stretches, self.turns) = (cut, turns);
+        self.stretches = cut;
     }
 
     /// Carries a frame along the whole path, and spreads what given upward directions and the end of
-    /// a closed path leave over. Returns the largest such angle.
+    /// a closed path leave over.
     fn carry_all(
         &mut self,
         follow: &Follow,
         ups: &[Option<Vec3>],
         uncarried: &Uncarried,
         first_stretch: usize,
-    ) -> f64 {
+    ) {
         let given = |key: usize| ups.get(key).copied().flatten().map(Vec3::as_dvec3);
         let [start, _] = uncarried.ends(first_stretch);
         let first = first_rotation(given(0).unwrap_or(self.up), start);
-        self.rolls.push(Rolls::default());
         self.pieces.reserve(self.stretches.len());
         let mut points = vec![(0.0, 0.0)];
         let mut most = 0.0f64;
-        let mut at_end = first;
-        let mut give = |points: &mut Vec<(f64, f64)>, length: f64, own: DQuat, wanted: DQuat| {
-            let angle = about_forward(own, wanted);
+        let mut give = |length: f64, own: DQuat, wanted: DQuat| {
             let near = points[points.len() - 1].1;
-            let angle = unwrapped(angle, near);
+            let angle = unwrapped(about_forward(own, wanted), near);
             most = most.max(wrapped(angle - near).abs());
             points.push((length, angle));
         };
+        let mut at_end = first;
         let mut arriving = start;
         let mut before = 0;
         for stretch in 0..self.stretches.len() {
@@ -202,37 +190,29 @@ impl Frames {
                 && let Some(up) = given(interval)
             {
                 let length = self.route.lengths.of(interval)[0];
-                give(&mut points, length, at_end, first_rotation(up, way));
+                give(length, at_end, first_rotation(up, way));
             }
-            at_end = self.carry_one(at_end, 0, (uncarried, first_stretch + stretch));
+            at_end = self.carry_one(at_end, uncarried, first_stretch + stretch);
             (arriving, before) = (end, interval);
         }
+        let total = self.route.lengths.total();
         if let Some(up) = given(self.route.curves.len()) {
-            give(
-                &mut points,
-                self.route.lengths.total(),
-                at_end,
-                first_rotation(up, arriving),
-            );
+            give(total, at_end, first_rotation(up, arriving));
         }
         if follow.is_closed() && follow.twist == Twist::Spread {
             let arrived = around_corner(at_end, arriving, start);
-            give(&mut points, self.route.lengths.total(), arrived, first);
+            give(total, arrived, first);
         }
-        self.rolls[0] = Rolls::through(&points);
-        most
+        self.rolls.push(Rolls::through(&points));
+        self.left_over = most;
     }
 
-    /// Carries a rotation along a stretch, to which some rolls are added; returns it at the end.
-    fn carry_one(
-        &mut self,
-        start: DQuat,
-        rolls: usize,
-        (uncarried, place): (&Uncarried, usize),
-    ) -> DQuat {
+    /// Carries a rotation along a stretch, to which the next rolls are added; returns it at the end.
+    fn carry_one(&mut self, start: DQuat, uncarried: &Uncarried, place: usize) -> DQuat {
         let first = self.pieces.len();
         let end = uncarried.carry(place, start, &mut self.pieces);
-        (self.turns).push(Turn::Carried(first..self.pieces.len(), rolls));
+        let pieces = first..self.pieces.len();
+        self.turns.push(Turn::Carried(pieces, self.rolls.len()));
         end
     }
 
@@ -265,33 +245,26 @@ impl Frames {
             let run = (stretch..self.stretches.len()).take_while(|&own| normals[own].is_none());
             let end = stretch + run.count();
             let mut rotation = match before {
-                Some(before) => {
-                    around_corner(before, self.ends(stretch - 1)[1], self.ends(stretch)[0])
-                }
+                Some(before) => self.carried_to(stretch, before),
                 None => first_rotation(self.up, self.ends(stretch)[0]),
             };
-            let rolls = self.rolls.len();
-            self.rolls.push(Rolls::default());
-            let lengths = &self.route.lengths;
-            let [first, last] = [(stretch, false), (end - 1, true)].map(|(own, at_end)| {
-                let own = &self.stretches[own];
-                lengths.at(own.interval, if at_end { own.to } else { own.from })
-            });
             let straight = self.stretches[stretch..end].iter();
             let straight: Vec<_> = straight.map(|own| (&self.route, own)).collect();
             let uncarried = Uncarried::new(&straight);
             for own in stretch..end {
                 if own > stretch {
-                    rotation = around_corner(rotation, self.ends(own - 1)[1], self.ends(own)[0]);
+                    rotation = self.carried_to(own, rotation);
                 }
-                rotation = self.carry_one(rotation, rolls, (&uncarried, own - stretch));
+                rotation = self.carry_one(rotation, &uncarried, own - stretch);
             }
+            let mut points = Vec::new();
             if let Some(Some(next)) = normals.get(end) {
-                let [way, _] = self.ends(end);
-                let arrived = around_corner(rotation, self.ends(end - 1)[1], way);
-                let wanted = of_axes(next.at(self.stretches[end].from), way);
-                let angle = about_forward(arrived, wanted);
-                let points = match before {
+                let wanted = of_axes(next.at(self.stretches[end].from), self.ends(end)[0]);
+                let angle = about_forward(self.carried_to(end, rotation), wanted);
+                let (start, arrival) = (&self.stretches[stretch], &self.stretches[end - 1]);
+                let first = self.route.lengths.at(start.interval, start.from);
+                let last = self.route.lengths.at(arrival.interval, arrival.to);
+                points = match before {
                     // Half a turn is repaired, so that at most a quarter is left.
                     Some(_) => {
                         let half = std::f64::consts::PI;
@@ -300,12 +273,18 @@ impl Frames {
                     }
                     None => vec![(first, angle)],
                 };
-                self.rolls[rolls] = Rolls::through(&points);
                 rotation *= about_z(points[points.len() - 1].1);
             }
+            self.rolls.push(Rolls::through(&points));
             before = Some(rotation);
             stretch = end;
         }
+    }
+
+    /// A rotation at the end of the stretch before, carried over the corner to a stretch.
+    fn carried_to(&self, stretch: usize, rotation: DQuat) -> DQuat {
+        let [arriving, leaving] = [self.ends(stretch - 1)[1], self.ends(stretch)[0]];
+        around_corner(rotation, arriving, leaving)
     }
 
     /// The directions at both ends of a stretch.
@@ -323,10 +302,8 @@ impl Frames {
         });
         // The line to the farthest point: the ends of a curve that comes back may be one point.
         let farthest = |a: &&DVec3, b: &&DVec3| a.length().total_cmp(&b.length());
-        let line = offsets
-            .iter()
-            .max_by(farthest)
-            .map_or(DVec3::ZERO, |far| far.normalize_or_zero());
+        let line = offsets.iter().max_by(farthest).copied();
+        let line = line.unwrap_or_default().normalize_or_zero();
         let off = |offset: &DVec3| (offset - line * line.dot(*offset)).length();
         let bow = offsets.iter().map(off).fold(0.0, f64::max);
         let far = self.route.far;
@@ -371,13 +348,12 @@ fn first_side(up: DVec3, way: DVec3) -> DVec3 {
     if side.length() >= UPRIGHT {
         return side.normalize();
     }
+    // The axis that is farthest from it, x first.
     let [x, y, z] = way.abs().to_array();
-    let axis = if x <= y && x <= z {
-        DVec3::X
-    } else if y <= z {
-        DVec3::Y
-    } else {
-        DVec3::Z
+    let axis = match x <= y && x <= z {
+        true => DVec3::X,
+        false if y <= z => DVec3::Y,
+        false => DVec3::Z,
     };
     axis.cross(way).normalize()
 }

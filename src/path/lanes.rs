@@ -2,43 +2,64 @@
 //! time on one, of as many paths as it takes to fill a block; all lanes take their places in turn.
 
 use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::{put, store};
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
-use crate::path::carry::{MIDDLE, NODES, Piece};
-use crate::path::polynomial::Polynomial;
-use crate::path::route::NO_DIRECTION;
-use crate::simd::dispatch::InLanes;
+use crate::path::carry::{CHEBYSHEV, MIDDLE, NODES, Piece};
+use crate::path::route::{Heading, NO_DIRECTION, Route, Stretch};
+use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
 
 /// A number for each lane.
 pub(crate) type Row = [f64; MOST];
 
-/// Polynomials: the coefficients of 1, t, t², t³.
-pub(crate) type Polynomials = [[Row; 3]; 4];
-
-/// Sets the polynomial of a lane.
-pub(crate) fn set(polynomials: &mut Polynomials, lane: usize, own: &Polynomial) {
-    for (rows, power) in polynomials.iter_mut().zip(own.0) {
-        for (row, c) in rows.iter_mut().zip(power.to_array()) {
-            row[lane] = c;
+/// Finds the directions at places of stretches, one stretch in each lane, and their derivatives if
+/// they are asked for.
+pub(crate) fn find_directions<'a, const PLACES: usize>(
+    stretches: impl ExactSizeIterator<Item = (&'a Route, &'a Stretch)> + Clone,
+    places: &[Row; PLACES],
+    ways: &mut [[Row; 3]; PLACES],
+    mut changes: Option<&mut [[Row; 3]; PLACES]>,
+) {
+    let mut polynomials = [[[0.0; MOST]; 3]; 4];
+    for (lane, (_, own)) in stretches.clone().enumerate() {
+        if let Heading::Polynomial(way) = &own.heading {
+            for (rows, power) in polynomials.iter_mut().zip(way.0) {
+                put(rows, lane, power.to_array());
+            }
+        }
+    }
+    in_lanes(&mut Directions {
+        count: stretches.len(),
+        polynomials: &polynomials,
+        places,
+        ways,
+        changes: changes.as_deref_mut(),
+    });
+    for (lane, (route, own)) in stretches.enumerate() {
+        if let Heading::Polynomial(_) = own.heading {
+            continue;
+        }
+        for place in 0..PLACES {
+            let [way, change] = own.way(route, places[place][lane]);
+            put(&mut ways[place], lane, way.to_array());
+            if let Some(changes) = &mut changes {
+                put(&mut changes[place], lane, change.to_array());
+            }
         }
     }
 }
 
-/// The vector of a lane.
-pub(crate) fn at<const N: usize>(rows: &[Row; N], lane: usize) -> [f64; N] {
-    rows.map(|row| row[lane])
-}
-
 /// The directions of polynomials at places, and their derivatives if they are asked for.
-pub(crate) struct Directions<'a, const PLACES: usize> {
+struct Directions<'a, const PLACES: usize> {
     /// How many lanes there are.
-    pub(crate) count: usize,
-    pub(crate) polynomials: &'a Polynomials,
-    pub(crate) places: &'a [Row; PLACES],
-    pub(crate) ways: &'a mut [[Row; 3]; PLACES],
-    pub(crate) changes: Option<&'a mut [[Row; 3]; PLACES]>,
+    count: usize,
+    /// The coefficients of 1, t, t², t³.
+    polynomials: &'a [[Row; 3]; 4],
+    places: &'a [Row; PLACES],
+    ways: &'a mut [[Row; 3]; PLACES],
+    changes: Option<&'a mut [[Row; 3]; PLACES]>,
 }
 
 impl<const PLACES: usize> InLanes for Directions<'_, PLACES> {
@@ -91,14 +112,13 @@ pub(crate) struct Rolling<'a, const PLACES: usize> {
     /// Directions at the nodes, at [`MIDDLE`], at the start and at the end, and their derivatives.
     pub(crate) ways: &'a [[Row; 3]; PLACES],
     pub(crate) changes: &'a [[Row; 3]; PLACES],
-    pub(crate) from: &'a Row,
-    pub(crate) to: &'a Row,
-    /// `cosines[k][j]` is the Chebyshev polynomial of degree j at node k.
-    pub(crate) cosines: &'a [[f64; NODES]; NODES],
+    /// The parameters at the start and at the end.
+    pub(crate) ends: &'a [Row; 2],
     pub(crate) own: &'a mut Rolled,
 }
 
 /// What is found of each piece.
+#[derive(Default)]
 pub(crate) struct Rolled {
     /// Chebyshev coefficients of the roll.
     pub(crate) roll: [Row; NODES + 1],
@@ -113,27 +133,15 @@ pub(crate) struct Rolled {
     pub(crate) halves: [[Row; 2]; 2],
 }
 
-impl Rolled {
-    pub(crate) const NONE: Self = Self {
-        roll: [[0.0; MOST]; NODES + 1],
-        least: [0.0; MOST],
-        rest: [0.0; MOST],
-        turns: [[[0.0; MOST]; 4]; 2],
-        halves: [[[0.0; MOST]; 2]; 2],
-    };
-}
-
 impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let [zero, one, two] = all::<L, 3>([0.0, 1.0, 2.0]);
+        let all_cosines = &CHEBYSHEV.cosines;
         let mut angles = [[0.0; MOST]; 2];
         for lane in (0..self.count).step_by(L::COUNT) {
-            let [from, to] = [
-                L::Doubles::load(&self.from[lane..]),
-                L::Doubles::load(&self.to[lane..]),
-            ];
+            let [from, to] = load::<L, 2>(self.ends, lane);
             let half = L::Doubles::all(0.5) * (to - from);
             let middle = load::<L, 3>(&self.ways[MIDDLE], lane);
             let mut least = one;
@@ -150,7 +158,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
             let mut own = [zero; NODES + 2];
             for degree in 0..NODES {
                 let mut sum = zero;
-                for (value, cosines) in values.iter().zip(self.cosines) {
+                for (value, cosines) in values.iter().zip(all_cosines) {
                     sum = sum + *value * L::Doubles::all(cosines[degree]);
                 }
                 own[degree] = sum * two / L::Doubles::all(NODES as f64);
@@ -169,14 +177,12 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
                 }
             }
             roll[0] = -at_middle;
-            store(roll, &mut self.own.roll, lane);
-            let width = (to - from).larger(L::Doubles::all(f64::MIN_POSITIVE));
-            let x = ((two * to - from - to) / width).larger(-one).smaller(one);
+            store(&mut self.own.roll, lane, roll);
             (-clenshaw(&roll, -one)).store(&mut angles[0][lane..]);
-            clenshaw(&roll, x).store(&mut angles[1][lane..]);
+            clenshaw(&roll, within([from, to], to)).store(&mut angles[1][lane..]);
             for end in 0..2 {
                 let way = load::<L, 3>(&self.ways[MIDDLE + 1 + end], lane);
-                store(least_turn(middle, way), &mut self.own.turns[end], lane);
+                store(&mut self.own.turns[end], lane, least_turn(middle, way));
             }
         }
         for (angles, halves) in angles.iter().zip(&mut self.own.halves) {
@@ -186,35 +192,21 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
 }
 
 /// The pieces of some lanes.
+#[derive(Default)]
 pub(crate) struct Pieces {
-    from: Row,
-    to: Row,
+    ends: [Row; 2],
     roll: [Row; NODES + 1],
     middle: [Row; 3],
     base: [Row; 4],
 }
 
 impl Pieces {
-    pub(crate) const NONE: Self = Self {
-        from: [0.0; MOST],
-        to: [0.0; MOST],
-        roll: [[0.0; MOST]; NODES + 1],
-        middle: [[0.0; MOST]; 3],
-        base: [[0.0; MOST]; 4],
-    };
-
     /// Sets the piece of a lane.
     pub(crate) fn set(&mut self, lane: usize, piece: &Piece) {
-        (self.from[lane], self.to[lane]) = (piece.from, piece.to);
-        for (row, c) in self.roll.iter_mut().zip(piece.roll) {
-            row[lane] = c;
-        }
-        for (row, c) in self.middle.iter_mut().zip(piece.middle.to_array()) {
-            row[lane] = c;
-        }
-        for (row, c) in self.base.iter_mut().zip(piece.base.to_array()) {
-            row[lane] = c;
-        }
+        put(&mut self.ends, lane, [piece.from, piece.to]);
+        put(&mut self.roll, lane, piece.roll);
+        put(&mut self.middle, lane, piece.middle.to_array());
+        put(&mut self.base, lane, piece.base.to_array());
     }
 }
 
@@ -238,8 +230,6 @@ pub(crate) struct Carried<'a, const PLACES: usize> {
 impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let [one, two] = all::<L, 2>([1.0, 2.0]);
-        let least_width = L::Doubles::all(f64::MIN_POSITIVE);
         let mut others = self.others;
         for place in 0..PLACES {
             while let [(from, lane, piece), rest @ ..] = others
@@ -250,15 +240,10 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
             }
             let mut angles = [0.0; MOST];
             for lane in (0..self.count).step_by(L::COUNT) {
-                let [from, to] = [
-                    L::Doubles::load(&self.pieces.from[lane..]),
-                    L::Doubles::load(&self.pieces.to[lane..]),
-                ];
+                let ends = load::<L, 2>(&self.pieces.ends, lane);
                 let t = L::Doubles::load(&self.places[place][lane..]);
-                let width = (to - from).larger(least_width);
-                let x = ((two * t - from - to) / width).larger(-one).smaller(one);
                 let roll = load::<L, { NODES + 1 }>(&self.pieces.roll, lane);
-                clenshaw(&roll, x).store(&mut angles[lane..]);
+                clenshaw(&roll, within(ends, t)).store(&mut angles[lane..]);
             }
             let own = sines_and_cosines(&angles);
             let mut added = [[0.0; MOST]; 2];
@@ -277,7 +262,7 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
                 if let Some(body) = self.body {
                     rotation = product(rotation, all::<L, 4>(body));
                 }
-                store(rotation, &mut self.rotations[place], lane);
+                store(&mut self.rotations[place], lane, rotation);
             }
         }
     }
@@ -296,6 +281,14 @@ pub(crate) fn least_turn<R: Real>(from: [R; 3], to: [R; 3]) -> [R; 4] {
         length.up_to(zero, zero, own[2] / length),
         length.up_to(zero, one, own[3] / length),
     ]
+}
+
+/// Where a place lies in a piece, from -1 at its start to 1 at its end.
+#[inline(always)]
+fn within<R: Real>([from, to]: [R; 2], t: R) -> R {
+    let (one, width) = (R::all(1.0), (to - from).larger(R::all(f64::MIN_POSITIVE)));
+    let x = (R::all(2.0) * t - from - to) / width;
+    x.larger(-one).smaller(one)
 }
 
 /// A sum of Chebyshev polynomials at x, from -1 to 1, by Clenshaw's recurrence.
@@ -340,17 +333,9 @@ pub(crate) fn load<L: Lanes, const N: usize>(rows: &[Row; N], lane: usize) -> [L
     own
 }
 
-/// Stores numbers to lanes from `lane` on.
-#[inline(always)]
-pub(crate) fn store<D: Doubles, const N: usize>(own: [D; N], rows: &mut [Row; N], lane: usize) {
-    for c in 0..N {
-        own[c].store(&mut rows[c][lane..]);
-    }
-}
-
 /// The same numbers in every lane.
 #[inline(always)]
-fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
+pub(crate) fn all<L: Lanes, const N: usize>(numbers: [f64; N]) -> [L::Doubles; N] {
     let mut own = [L::Doubles::all(0.0); N];
     for c in 0..N {
         own[c] = L::Doubles::all(numbers[c]);

@@ -1,5 +1,6 @@
 //! Lengths along a path, by which bodies travel at a given speed and look ahead.
 
+use crate::math::quadrature::{gauss, integral};
 use crate::path::polynomial::Polynomial;
 
 /// Lengths along the intervals of a path.
@@ -13,15 +14,6 @@ pub(crate) struct Lengths {
 
 /// Each interval has this many marks, and one where it stops.
 const PARTS: usize = 8;
-
-/// Points and weights of Gauss-Legendre quadrature on [-1, 1], exact for polynomials of degree 9.
-const GAUSS: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
 
 /// The most halvings of a quadrature.
 const FINEST: u32 = 24;
@@ -124,7 +116,7 @@ impl Lengths {
             }
             excess += if step.abs() < 1e-3 * (to - from) {
                 // One quadrature is exact enough for a short step.
-                gauss(slope, t, next)
+                gauss(&speed(slope), t, next)
             } else if step > 0.0 {
                 between(slope, t, next)
             } else {
@@ -136,27 +128,15 @@ impl Lengths {
     }
 }
 
-/// The length between two parameters: the interval is halved until both halves together agree with
-/// the whole.
+/// The length between two parameters.
 fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
-    refined(slope, from, to, gauss(slope, from, to), FINEST)
-}
-
-fn refined(slope: &Polynomial, from: f64, to: f64, whole: f64, halvings: u32) -> f64 {
-    let middle = 0.5 * (from + to);
-    let halves = [gauss(slope, from, middle), gauss(slope, middle, to)];
-    let sum = halves[0] + halves[1];
-    let differs = (sum - whole).abs() > 1e-14 * slope.size();
+    let tolerance = 1e-14 * slope.size();
     // What overflows is no number, and halving it finds none.
-    if halvings == 0 || !differs {
-        return sum;
-    }
-    refined(slope, from, middle, halves[0], halvings - 1)
-        + refined(slope, middle, to, halves[1], halvings - 1)
+    let differ = |whole: f64, sum: f64| (sum - whole).abs() > tolerance;
+    integral(&speed(slope), from, to, FINEST, &differ)
 }
 
-fn gauss(slope: &Polynomial, from: f64, to: f64) -> f64 {
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let speed = |&(at, weight): &(f64, f64)| weight * slope.at(middle + half * at).length();
-    half * GAUSS.iter().map(speed).sum::<f64>()
+/// The speed by the parameter.
+fn speed(slope: &Polynomial) -> impl Fn(f64) -> f64 {
+    move |t| slope.at(t).length()
 }

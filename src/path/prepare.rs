@@ -1,34 +1,28 @@
 //! Prepares the paths of a set: positions and rotations become segments, as those of other tracks.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
 use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_curve::Curves;
 use crate::path::carry::Uncarried;
 use crate::path::fit::fit;
 use crate::path::frames::Frames;
-use crate::path::options::{
-    Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
-};
-use crate::path::polynomial::Polynomial;
-use crate::path::route::{Route, Stretch, stretches};
+use crate::path::options::{Direction, Follow, FollowError, FollowWarning, Frame, Twist};
+use crate::path::rolls::is_half_turn;
+use crate::path::route::{Route, Stretch, diagonal, stretches};
 use crate::path::sample::{Kind, Sampler, Span};
-use crate::path::schedule::Schedule;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::time::spans::{NONE, Part, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
-
-/// The number of paths that are prepared as one piece of work.
-const BATCH: usize = 64;
 
 /// The most keys, beside those of one path, that are followed together: as many as fill the vector
 /// lanes, and whose numbers stay in a thread's cache.
@@ -61,43 +55,36 @@ impl PreparedPaths {
             quantity: Quantity::Velocity(Axes::Parent),
             ..rotations
         };
-        let firsts: Vec<usize> = (0..set.track_count()).step_by(BATCH).collect();
-        let batch = |first: usize| {
-            let mut own = [&positions, &rotations].map(Prepared::new);
-            let mut warnings = Vec::new();
-            let mut tracks = first..set.track_count().min(first + BATCH);
-            while !tracks.is_empty() {
-                let some = tracks.start..tracks.start + few(set, tracks.clone());
-                tracks.start = some.end;
-                add(&mut own, set, some, follow, &positions, &mut warnings)?;
-            }
-            Ok((own, warnings))
-        };
-        let batches: Result<Vec<_>, FollowError> = firsts.into_par_iter().map(batch).collect();
-        let (mut groups, mut warnings) = ([Vec::new(), Vec::new()], Vec::new());
-        for ([own_positions, own_rotations], own_warnings) in batches? {
-            groups[0].push(own_positions);
-            groups[1].push(own_rotations);
-            warnings.extend(own_warnings);
-        }
-        let [of_positions, of_rotations] = groups;
+        let prepared = |tracks| prepared(set, tracks, follow, [&positions, &rotations]);
+        let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
+        // Of several errors that of the first track counts.
+        let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let (prepared, warnings): (Vec<_>, Vec<_>) = batches.into_iter().unzip();
+        let both = prepared.into_iter().map(|[a, b]| (a, b));
+        let (of_positions, of_rotations): (Vec<_>, Vec<_>) = both.unzip();
         Ok(Self {
             positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
             rotations: ClipData::of_groups(of_rotations, set, rotations, group_bytes),
-            warnings,
+            warnings: warnings.concat(),
         })
     }
 }
 
-/// How many of some tracks, the first among them, have at most as many keys as are followed together.
-fn few(set: &TrackSet, tracks: Range<usize>) -> usize {
-    let mut keys = 0;
-    let fit = tracks.skip(1).take_while(|&track| {
+/// The tracks that are followed together.
+fn batches(set: &TrackSet) -> Vec<Range<usize>> {
+    let (mut all, mut keys) = (Vec::<Range<usize>>::new(), 0);
+    for track in 0..set.track_count() {
         let path = set.vectors(Channel::Translation, track);
         keys += path.map_or(0, |path| path.keys.len());
-        keys <= TOGETHER
-    });
-    1 + fit.count()
+        match all.last_mut() {
+            Some(last) if keys <= TOGETHER => last.end += 1,
+            _ => {
+                keys = 0;
+                all.push(track..track + 1);
+            }
+        }
+    }
+    all
 }
 
 /// The path of a track, checked.
@@ -109,174 +96,112 @@ fn path_of<'a>(
     let own = set.vectors(Channel::Translation, track);
     let path = own.ok_or(FollowError::NoPath { track })?;
     if follow.is_closed() {
-        let (first, last) = (
-            path.keys[0].as_dvec3(),
-            path.keys[path.keys.len() - 1].as_dvec3(),
-        );
-        let keys = || path.keys.iter().map(|key| key.as_dvec3());
-        let least = keys().fold(DVec3::INFINITY, DVec3::min);
-        let most = keys().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let gap = (last - first).length();
-        if gap > GAP * (most - least).length() {
+        let keys = path.keys.iter().map(|key| key.as_dvec3());
+        let (first, last) = (path.keys[0], path.keys[path.keys.len() - 1]);
+        let gap = (last.as_dvec3() - first.as_dvec3()).length();
+        if gap > GAP * diagonal(keys) {
             return Err(FollowError::OpenLoop { track, gap });
         }
     }
     Ok(path)
 }
 
-/// The curves of a path.
-fn route(path: &VectorTrack, follow: &Follow) -> Route {
-    let curves = Curves::new(path, follow.method, follow.ends);
-    let polynomials = (0..path.keys.len() - 1).map(|i| Polynomial(curves.of(i).powers()));
-    let spreads =
-        follow.is_closed() && follow.twist == Twist::Spread && follow.frame == Frame::Minimal;
-    let needs_lengths = spreads
-        || follow.speed != PathSpeed::Keys
-        || matches!(follow.direction, Direction::Ahead(_))
-        || path.ups.iter().any(Option::is_some);
-    let mut route = Route::new(
-        path.keys[0].as_dvec3(),
-        polynomials.collect(),
-        Schedule::new(follow.speed, &path.times),
-        follow.is_closed(),
-    );
-    if needs_lengths {
-        route.measure();
-    }
-    route
-}
-
-/// The path of a track, with its stretches; without any if it stands still.
-struct Checked<'a> {
+/// A body on the path of a track, whose rotations are not known yet.
+fn body_on(
+    path: &VectorTrack,
+    set: &TrackSet,
     track: usize,
-    path: &'a VectorTrack,
-    route: Route,
-    stretches: Option<Vec<Stretch>>,
-}
-
-impl<'a> Checked<'a> {
-    fn new(set: &'a TrackSet, track: usize, follow: &Follow) -> Result<Self, FollowError> {
-        let path = path_of(set, track, follow)?;
-        if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
-            return Err(FollowError::UpsUnused { track });
+    follow: &Follow,
+) -> Result<Frames, FollowError> {
+    if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
+        return Err(FollowError::UpsUnused { track });
+    }
+    let route = Route::new(path, follow);
+    // The body that others look at looks along its own path.
+    let direction = match follow.direction {
+        Direction::Track(target) if target == track => Direction::Tangent,
+        direction => direction,
+    };
+    let target = match direction {
+        Direction::Track(target) if target >= set.track_count() => {
+            return Err(FollowError::Target { track, target });
         }
-        let route = route(path, follow);
-        // The body that others look at looks along its own path.
-        let direction = match follow.direction {
-            Direction::Track(target) if target == track => Direction::Tangent,
-            direction => direction,
-        };
-        let target = match direction {
-            Direction::Track(target) if target >= set.track_count() => {
-                return Err(FollowError::Target { track, target });
-            }
-            Direction::Track(target) => Some(self::route(path_of(set, target, follow)?, follow)),
-            _ => None,
-        };
-        let stretches = stretches(&route, direction, target.as_ref(), follow.speed);
-        Ok(Self {
-            track,
-            path,
-            route,
-            stretches,
-        })
-    }
+        Direction::Track(target) => {
+            let path = path_of(set, target, follow)?;
+            Some(Arc::new(Route::new(path, follow)))
+        }
+        _ => None,
+    };
+    let stretches = stretches(&route, direction, target.as_ref());
+    Ok(Frames::new(route, stretches, follow))
 }
 
-/// A track, and the place of its path among those that move, with the number of its spans.
-struct Walk<'a> {
-    track: usize,
-    path: &'a VectorTrack,
-    moving: Option<(usize, usize)>,
-}
-
-/// Adds the positions and rotations of some tracks.
-fn add(
-    prepared: &mut [Prepared; 2],
+/// The positions and rotations of some tracks, and what is unusual about them.
+fn prepared(
     set: &TrackSet,
     tracks: Range<usize>,
     follow: &Follow,
-    interpolation: &Interpolation,
-    warnings: &mut Vec<FollowWarning>,
-) -> Result<(), FollowError> {
-    let checked = tracks.map(|track| Checked::new(set, track, follow));
-    let checked = checked.collect::<Result<Vec<_>, _>>()?;
-    let minimal = (checked.iter()).filter(|_| follow.frame == Frame::Minimal);
-    let carried: Vec<(&Route, &Stretch)> = minimal
-        .flat_map(|own| (own.stretches.iter().flatten()).map(|stretch| (&own.route, stretch)))
-        .collect();
-    let uncarried = Uncarried::new(&carried);
-    let mut next = 0;
-    let (mut walks, mut paths, mut spans) = (Vec::new(), Vec::new(), Vec::new());
-    for own in checked {
-        let Checked { track, path, .. } = own;
-        let mut moving = None;
-        if let Some(stretches) = own.stretches {
-            let given = (&uncarried, &mut next);
-            let frames = Frames::new(
-                (own.route, stretches),
-                follow,
-                &path.ups,
-                track,
-                given,
-                warnings,
-            );
-            let first = spans.len();
-            add_spans(&mut spans, &frames, paths.len(), follow);
-            moving = Some((paths.len(), spans.len() - first));
-            paths.push(frames);
-        } else {
-            warnings.push(FollowWarning::StandsStill { track });
-        }
-        walks.push(Walk {
-            track,
-            path,
-            moving,
-        });
+    interpolations: [&Interpolation; 2],
+) -> Result<([Prepared; 2], Vec<FollowWarning>), FollowError> {
+    let (mut points, mut paths) = (Vec::new(), Vec::new());
+    for track in tracks.clone() {
+        let path = path_of(set, track, follow)?;
+        paths.push(body_on(path, set, track, follow)?);
+        points.push(path);
     }
-    let [positions, rotations] = prepared;
+    let minimal = (paths.iter()).filter(|_| follow.frame == Frame::Minimal);
+    let carried = minimal.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
+    let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
+    let (mut first_stretch, mut spans, mut warnings) = (0, Vec::new(), Vec::new());
+    for (place, (path, own)) in points.iter().zip(&mut paths).enumerate() {
+        let (track, count) = (tracks.start + place, own.stretches.len());
+        own.turn(follow, &path.ups, &uncarried, first_stretch);
+        first_stretch += count;
+        if count == 0 {
+            warnings.push(FollowWarning::StandsStill { track });
+        } else if is_half_turn(own.left_over) {
+            warnings.push(FollowWarning::HalfTurn { track });
+        }
+        add_spans(&mut spans, own, place);
+    }
     let adding = Adding {
-        walks: &walks,
+        first_track: tracks.start,
+        points: &points,
         paths: &paths,
+        spans: &spans,
         follow,
-        interpolation,
+        interpolation: interpolations[0],
     };
-    adding.add(positions, &spans, Kind::Vector);
-    adding.add(rotations, &spans, Kind::Rotation);
-    Ok(())
+    let [mut positions, mut rotations] = interpolations.map(Prepared::new);
+    adding.add(&mut positions, Kind::Vector);
+    adding.add(&mut rotations, Kind::Rotation);
+    Ok(([positions, rotations], warnings))
 }
 
-/// Whether a body is where its speed says, and not where its keys do.
-fn is_retimed(route: &Route, follow: &Follow) -> bool {
-    follow.speed != PathSpeed::Keys && route.lengths.total() > 0.0
-}
-
-/// Whether a body stands on its path, of which it may turn all the same.
-fn stands(route: &Route, follow: &Follow) -> bool {
-    follow.speed != PathSpeed::Keys && !is_retimed(route, follow)
-}
-
-/// How many of a path's stretches are used.
-fn count_used(frames: &Frames, follow: &Follow) -> usize {
-    match stands(&frames.route, follow) {
-        true => 1,
-        false => frames.stretches.len(),
+/// The stretches of a path that are used: of one on which a body stands the first alone.
+fn used(frames: &Frames) -> &[Stretch] {
+    let all = &frames.stretches[..];
+    match frames.route.stands() {
+        true => &all[..all.len().min(1)],
+        false => all,
     }
 }
 
 /// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
-fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize, follow: &Follow) {
-    let Frames {
-        route, stretches, ..
-    } = frames;
-    let (start, end) = route.schedule.span();
-    let (stands, count) = (stands(route, follow), count_used(frames, follow));
-    for (stretch, own) in stretches[..count].iter().enumerate() {
-        let time = |t: f64| (route.schedule).time(&route.lengths, own.interval, t);
-        let is_last = stretch + 1 == count;
-        let mut from = if stands { start } else { time(own.from) };
-        let to = if is_last { end } else { time(own.to) };
-        for joint in route.schedule.joints(from..to).chain([to]) {
+fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
+    let (route, used) = (&frames.route, used(frames));
+    let (start, end) = route.span();
+    for (stretch, own) in used.iter().enumerate() {
+        let is_last = stretch + 1 == used.len();
+        let mut from = match route.stands() {
+            true => start,
+            false => route.time(own.interval, own.from),
+        };
+        let to = match is_last {
+            true => end,
+            false => route.time(own.interval, own.to),
+        };
+        for joint in route.joints(from..to).chain([to]) {
             if joint > from {
                 spans.push(Span {
                     path: path as u32,
@@ -292,103 +217,106 @@ fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize, follow: &Follo
 
 /// Adds the positions or the rotations of tracks.
 struct Adding<'a> {
-    walks: &'a [Walk<'a>],
+    first_track: usize,
+    /// The path of each track, and the body on it.
+    points: &'a [&'a VectorTrack],
     paths: &'a [Frames],
+    /// Those of the first path, then those of the next.
+    spans: &'a [Span],
     follow: &'a Follow,
     /// That of positions.
     interpolation: &'a Interpolation,
 }
 
 impl Adding<'_> {
-    fn add(&self, prepared: &mut Prepared, spans: &[Span], kind: Kind) {
+    fn add(&self, prepared: &mut Prepared, kind: Kind) {
         let follow = self.follow;
-        let is_fitted =
-            |path: usize| kind == Kind::Rotation || is_retimed(&self.paths[path].route, follow);
-        let own = spans.iter().copied();
-        let own: Vec<Span> = own.filter(|span| is_fitted(span.path as usize)).collect();
+        let is_fitted = |path: &Frames| kind == Kind::Rotation || path.route.is_retimed();
+        let of_fitted = |span: &Span| is_fitted(&self.paths[span.path as usize]);
+        let own: Vec<Span> = self.spans.iter().copied().filter(of_fitted).collect();
         let mut sampler = Sampler::new(self.paths, kind, follow);
         let fitted = fit(prepared, &own, &mut sampler);
         let is_spread = follow.frame != Frame::Minimal || follow.twist == Twist::Spread;
         let repeats = follow.is_closed() && (kind == Kind::Vector || is_spread);
         let (mut pieces, mut next) = (&fitted.pieces[..], 0);
-        for walk in self.walks {
-            let Some((path, count)) = walk.moving.filter(|moving| is_fitted(moving.0)) else {
+        for (path, frames) in self.paths.iter().enumerate() {
+            let (track, times) = (self.first_track + path, &frames.route.times);
+            if frames.stretches.is_empty() || !is_fitted(frames) {
                 match kind {
                     // Positions at the times of the keys are cubics already.
                     Kind::Vector => vectors::add(
                         prepared,
-                        walk.track,
-                        Some(walk.path),
+                        track,
+                        Some(self.points[path]),
                         Vec3::ZERO,
                         follow.method,
                         self.interpolation,
                     ),
                     // A body that never moves looks along +z.
-                    Kind::Rotation => walk.add(prepared, &[], [follow.body().to_array(); 2], true),
-                }
-                continue;
-            };
-            let frames = &self.paths[path];
-            let (start, end) = frames.route.schedule.span();
-            let last = count_used(frames, follow) - 1;
-            let mut value = |stretch: usize, time: f64| {
-                // Most often a span begins or ends there.
-                let places = next..next + count;
-                for place in [places.clone().next(), places.last()].into_iter().flatten() {
-                    let span = own[place];
-                    let times = [span.from, span.to].into_iter();
-                    for (at, value) in times.zip(fitted.ends[place]) {
-                        if span.stretch as usize == stretch && at == time {
-                            return value;
-                        }
+                    Kind::Rotation => {
+                        let values = [follow.body().to_array(); 2];
+                        add_part(prepared, track, times, &[], values, true);
                     }
                 }
-                sampler.value(path, stretch, time)
+                continue;
+            }
+            let first = next;
+            next = own.partition_point(|span| span.path as usize <= path);
+            let (spans, ends) = (&own[first..next], &fitted.ends[first..next]);
+            let (start, end) = frames.route.span();
+            let last = used(frames).len() - 1;
+            // Most often a span begins or ends there.
+            let starts = |span: &&Span| span.stretch == 0 && span.from == start;
+            let arrives = |span: &&Span| span.stretch as usize == last && span.to == end;
+            let first_value = match spans.first().filter(starts) {
+                Some(_) => ends[0][0],
+                None => sampler.value(path, 0, start),
             };
-            let values = [value(0, start), value(last, end)];
-            next += count;
-            let (now, rest) =
-                pieces.split_at(pieces.partition_point(|piece| (piece.0 as usize) < next));
+            let last_value = match spans.last().filter(arrives) {
+                Some(_) => ends[ends.len() - 1][1],
+                None => sampler.value(path, last, end),
+            };
+            let count = pieces.partition_point(|piece| (piece.0 as usize) < next);
+            let (now, rest) = pieces.split_at(count);
             pieces = rest;
-            walk.add(prepared, now, values, repeats);
+            let values = [first_value, last_value];
+            add_part(prepared, track, times, now, values, repeats);
         }
     }
 }
 
-impl Walk<'_> {
-    /// Adds a part with these pieces of spans. The first and last values are held outside its times;
-    /// if it repeats, the last is the first.
-    fn add(
-        &self,
-        prepared: &mut Prepared,
-        pieces: &[(u32, f64, Source)],
-        values: [[f64; 4]; 2],
-        repeats: bool,
-    ) {
-        let [first, last] = values.map(round_quat);
-        let before = prepared.constant(first);
-        let after = if repeats {
-            before
-        } else {
-            prepared.constant(last)
-        };
-        let from = prepared.spans.len();
-        for &(_, start, source) in pieces {
-            prepared.push_span(start, source, NONE);
-        }
-        if let Some(key) = prepared.spans.keys.get_mut(from) {
-            *key = before;
-        }
-        prepared.parts.push(Part {
-            track: self.track as u32,
-            first_key: 0,
-            spans: from..prepared.spans.len(),
-            end: self.path.times[self.path.times.len() - 1],
-            before,
-            after,
-            beyond: None,
-        });
+/// Adds a part: a track with keys at these times, and its pieces of spans. The first and last values
+/// are held outside; if it repeats, the last is the first.
+fn add_part(
+    prepared: &mut Prepared,
+    track: usize,
+    times: &[f64],
+    pieces: &[(u32, f64, Source)],
+    values: [[f64; 4]; 2],
+    repeats: bool,
+) {
+    let [first, last] = values.map(round_quat);
+    let before = prepared.constant(first);
+    let after = match repeats {
+        true => before,
+        false => prepared.constant(last),
+    };
+    let from = prepared.spans.len();
+    for &(_, start, source) in pieces {
+        prepared.push_span(start, source, NONE);
     }
+    if let Some(key) = prepared.spans.keys.get_mut(from) {
+        *key = before;
+    }
+    prepared.parts.push(Part {
+        track: track as u32,
+        first_key: 0,
+        spans: from..prepared.spans.len(),
+        end: times[times.len() - 1],
+        before,
+        after,
+        beyond: None,
+    });
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
 //! A path with its curves, cut into stretches of one smooth direction each.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
+use crate::method::vector_curve::Curves;
 use crate::path::lengths::Lengths;
-use crate::path::options::{Direction, PathSpeed};
+use crate::path::options::{Direction, Follow, Frame, PathSpeed, Twist};
 use crate::path::polynomial::Polynomial;
-use crate::path::schedule::Schedule;
+use crate::tracks::vectors::VectorTrack;
 
 /// The curves of a path, and when a body is where on them.
 #[derive(Debug, Clone)]
@@ -19,7 +22,9 @@ pub(crate) struct Route {
     divided: Vec<(Vec<f64>, Polynomial)>,
     /// Empty until they are [measured](Self::measure).
     pub(crate) lengths: Lengths,
-    pub(crate) schedule: Schedule,
+    pub(crate) speed: PathSpeed,
+    /// The keys' own times, seconds.
+    pub(crate) times: Vec<f64>,
     pub(crate) is_closed: bool,
     /// The size of the path: the diagonal of its box.
     pub(crate) size: f64,
@@ -35,55 +40,47 @@ const STOPPED: f64 = 1e-9;
 const STILL: f64 = 1e-14;
 
 impl Route {
-    pub(crate) fn new(
-        start: DVec3,
-        curves: Vec<Polynomial>,
-        schedule: Schedule,
-        is_closed: bool,
-    ) -> Self {
-        let ends = || {
-            curves
-                .iter()
-                .flat_map(|curve| [curve.at(0.0), curve.at(1.0)])
+    pub(crate) fn new(path: &VectorTrack, follow: &Follow) -> Self {
+        let curves = Curves::new(path, follow.method, follow.ends);
+        let curves = (0..path.keys.len() - 1).map(|i| Polynomial(curves.of(i).powers()));
+        let curves: Vec<Polynomial> = curves.collect();
+        let ends = (curves.iter()).flat_map(|curve| [curve.at(0.0), curve.at(1.0)]);
+        let size = diagonal(ends.clone());
+        let far = ends.fold(0.0f64, |far, end| far.max(end.abs().max_element()));
+        let slope = |curve: &Polynomial| {
+            let slope = curve.derivative();
+            match slope.size() <= STILL * far.max(size) {
+                true => slope.map(|_| DVec3::ZERO),
+                false => slope,
+            }
         };
-        let least = ends().fold(DVec3::INFINITY, DVec3::min);
-        let most = ends().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let size = if curves.is_empty() {
-            0.0
-        } else {
-            (most - least).length()
+        let divided = |slope: &Polynomial| match slope.size() {
+            0.0 => (Vec::new(), *slope),
+            size => slope.without_zeros(STOPPED * size),
         };
-        let far = ends().fold(0.0f64, |far, end| far.max(end.abs().max_element()));
-        let slopes: Vec<Polynomial> = curves
-            .iter()
-            .map(|curve| {
-                let slope = curve.derivative();
-                let is_still = slope.size() <= STILL * far.max(size);
-                if is_still {
-                    slope.map(|_| DVec3::ZERO)
-                } else {
-                    slope
-                }
-            })
-            .collect();
-        let divided: Vec<(Vec<f64>, Polynomial)> = slopes
-            .iter()
-            .map(|slope| match slope.size() {
-                0.0 => (Vec::new(), *slope),
-                size => slope.without_zeros(STOPPED * size),
-            })
-            .collect();
-        Self {
-            start,
+        let slopes: Vec<Polynomial> = curves.iter().map(slope).collect();
+        let divided = slopes.iter().map(divided).collect();
+        let mut own = Self {
+            start: path.keys[0].as_dvec3(),
             curves,
             slopes,
             divided,
             lengths: Lengths::default(),
-            schedule,
-            is_closed,
+            speed: follow.speed,
+            times: path.times.clone(),
+            is_closed: follow.is_closed(),
             size,
             far,
+        };
+        let is_minimal = follow.frame == Frame::Minimal;
+        if (own.is_closed && follow.twist == Twist::Spread && is_minimal)
+            || follow.speed != PathSpeed::Keys
+            || matches!(follow.direction, Direction::Ahead(_))
+            || path.ups.iter().any(Option::is_some)
+        {
+            own.measure();
         }
+        own
     }
 
     /// Finds the lengths, which not every path needs.
@@ -102,33 +99,55 @@ impl Route {
         if self.curves.is_empty() {
             return [self.start, DVec3::ZERO];
         }
-        let (interval, t) = self.schedule.place(&self.lengths, time);
+        let (interval, t) = self.place(time);
         let slope = self.slopes[interval].at(t);
-        let pace = self
-            .schedule
-            .slope(&self.lengths, interval, t, slope.length());
-        let velocity = if pace > 0.0 {
-            slope / pace
-        } else {
-            DVec3::ZERO
+        let pace = self.pace(interval, t, slope.length());
+        let velocity = match pace > 0.0 {
+            true => slope / pace,
+            false => DVec3::ZERO,
         };
         [self.curves[interval].at(t), velocity]
     }
 
-    /// The place at a length beyond a place, and how far it lies beyond an open path's end.
-    fn ahead(&self, interval: usize, t: f64, distance: f64) -> (usize, f64, f64) {
-        let total = self.lengths.total();
-        let mut length = self.lengths.at(interval, t) + distance;
-        if self.is_closed && total > 0.0 {
-            length %= total;
-        }
-        let interval = self.lengths.interval(length);
-        (
-            interval,
-            self.lengths.parameter(interval, length),
-            (length - total).max(0.0),
-        )
+    /// The times between two at which the path's own curves change.
+    fn times_between(&self, from: f64, to: f64) -> Vec<f64> {
+        let places = |interval: usize| {
+            let stops = self.stops(interval).iter().copied();
+            let places = stops.chain([0.0, 1.0]);
+            places.map(move |t| self.time(interval, t))
+        };
+        let mut times: Vec<f64> = ((0..self.curves.len()).flat_map(places))
+            .chain(self.joints(from..to))
+            .filter(|&time| time > from && time < to)
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
     }
+
+    /// The places in an interval from which the point this far ahead lies between two intervals.
+    fn passings(&self, interval: usize, distance: f64) -> Vec<f64> {
+        let (lengths, total) = (&self.lengths, self.lengths.total());
+        let [from, to] = lengths.of(interval);
+        let (rounds, distance) = match self.is_closed {
+            true => (&[0.0, total][..], distance % total.max(1e-300)),
+            false => (&[0.0][..], distance),
+        };
+        let starts = (0..self.curves.len()).map(|other| lengths.of(other)[0]);
+        (starts.chain([total]))
+            .flat_map(|start| rounds.iter().map(move |round| start + round - distance))
+            .filter(|&length| length > from && length < to)
+            .map(|length| lengths.parameter(interval, length))
+            .collect()
+    }
+}
+
+/// The size of some points: the diagonal of their box.
+pub(crate) fn diagonal(points: impl Iterator<Item = DVec3> + Clone) -> f64 {
+    let least = points.clone().fold(DVec3::INFINITY, DVec3::min);
+    let most = points.fold(DVec3::NEG_INFINITY, DVec3::max);
+    // Less than 0 where there is no point.
+    (most - least).max(DVec3::ZERO).length()
 }
 
 /// A direction with its derivative by an interval's parameter.
@@ -153,7 +172,7 @@ pub(crate) enum Heading {
     /// To the point ahead on the path.
     Ahead(f64),
     /// To a body on another path, or to the last resort where both are at one place.
-    Body(Box<Route>, DVec3),
+    Body(Arc<Route>, DVec3),
 }
 
 impl Stretch {
@@ -165,10 +184,8 @@ impl Stretch {
             Heading::Ahead(distance) => self.ahead(route, t, *distance),
             Heading::Body(target, last) => {
                 let slope = route.slopes[self.interval].at(t);
-                let (schedule, lengths) = (&route.schedule, &route.lengths);
-                let time = schedule.time(lengths, self.interval, t);
-                let [place, velocity] = target.position(time);
-                let pace = schedule.slope(lengths, self.interval, t, slope.length());
+                let [place, velocity] = target.position(route.time(self.interval, t));
+                let pace = route.pace(self.interval, t, slope.length());
                 let to = place - route.curves[self.interval].at(t);
                 if to.length() <= HELD * route.size.max(target.size) {
                     return [*last, DVec3::ZERO];
@@ -181,17 +198,21 @@ impl Stretch {
 
     fn ahead(&self, route: &Route, t: f64, distance: f64) -> Way {
         let slope = route.slopes[self.interval].at(t);
-        let tangent = || {
-            // Divided by its zeros, the slope has a direction where the curve stops too.
-            let way = signed(&route.divided[self.interval], 0.5 * (self.from + self.to));
-            [way.at(t), way.derivative().at(t)]
-        };
-        let (interval, at, beyond) = route.ahead(self.interval, t, distance);
+        let (lengths, total) = (&route.lengths, route.lengths.total());
+        let mut length = lengths.at(self.interval, t) + distance;
+        if route.is_closed {
+            length %= total;
+        }
+        let interval = lengths.interval(length);
+        let at = lengths.parameter(interval, length);
+        let beyond = (length - total).max(0.0);
         let leading = direction([route.slopes[interval].at(at), DVec3::ZERO])[0];
         let to =
             route.curves[interval].at(at) + leading * beyond - route.curves[self.interval].at(t);
         if to.length() < 1e-6 * distance {
-            return tangent();
+            // Divided by its zeros, the slope has a direction where the curve stops too.
+            let way = signed(&route.divided[self.interval], 0.5 * (self.from + self.to));
+            return [way.at(t), way.derivative().at(t)];
         }
         [to, leading * slope.length() - slope]
     }
@@ -224,74 +245,45 @@ pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynom
 }
 
 /// Cuts a path into stretches. What the direction is where a body stands is filled in from before,
-/// at the start from after; `None` if it never moves.
+/// at the start from after; there are none if it never moves.
 pub(crate) fn stretches(
     route: &Route,
     direction: Direction,
-    target: Option<&Route>,
-    speed: PathSpeed,
-) -> Option<Vec<Stretch>> {
+    target: Option<&Arc<Route>>,
+) -> Vec<Stretch> {
     let mut all: Vec<Stretch> = Vec::with_capacity(route.curves.len());
     let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..route.curves.len() {
-        // At given speeds, a body's motion is not smooth where its curve stops.
-        cuts.clear();
-        if speed != PathSpeed::Keys {
-            cuts.extend(route.stops(interval));
-        }
         let slope = &route.slopes[interval];
-        let seen;
-        let polynomial = match direction {
-            Direction::Tangent if slope.size() == 0.0 => Some(None),
-            Direction::Tangent => Some(Some(&route.divided[interval])),
+        // Where the direction is that of a polynomial, this without its zeros.
+        let divided = match direction {
+            Direction::Tangent if slope.size() > 0.0 => Some(route.divided[interval].clone()),
             Direction::Point(point) => {
                 let mut own = route.curves[interval].map(|c| -c);
                 own.0[0] += point;
                 let tolerance = HELD * route.size;
-                seen = (own.size() > tolerance).then(|| own.without_zeros(tolerance));
-                Some(seen.as_ref())
+                (own.size() > tolerance).then(|| own.without_zeros(tolerance))
             }
             _ => None,
         };
-        if let Some((zeros, _)) = polynomial.flatten() {
+        cuts.clear();
+        cuts.extend([0.0, 1.0]);
+        if let Some((zeros, _)) = &divided {
             cuts.extend(zeros);
         }
-        match direction {
-            Direction::Tangent | Direction::Point(_) => {}
-            Direction::Ahead(distance) => {
-                cuts.extend(route.stops(interval));
-                let [from, to] = route.lengths.of(interval);
-                let total = route.lengths.total();
-                let rounds: &[f64] = if route.is_closed { &[0.0, 1.0] } else { &[0.0] };
-                for other in 0..=route.curves.len() {
-                    let start = match route.curves.len() == other {
-                        true => total,
-                        false => route.lengths.of(other)[0],
-                    };
-                    for round in rounds {
-                        let length = start + round * total - distance % total.max(1e-300);
-                        let length = if route.is_closed {
-                            length
-                        } else {
-                            start - distance
-                        };
-                        if length > from && length < to {
-                            cuts.push(route.lengths.parameter(interval, length));
-                        }
-                    }
-                }
-            }
-            Direction::Track(_) => {
-                if let Some(target) = target {
-                    let times =
-                        [0.0, 1.0].map(|t| route.schedule.time(&route.lengths, interval, t));
-                    for time in target.times_between(times[0], times[1]) {
-                        cuts.push(route.schedule.parameter(&route.lengths, interval, time));
-                    }
-                }
-            }
+        // At given speeds, a body's motion is not smooth where its curve stops.
+        if route.speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
+            cuts.extend(route.stops(interval));
         }
-        cuts.extend([0.0, 1.0]);
+        match (direction, target) {
+            (Direction::Ahead(distance), _) => cuts.extend(route.passings(interval, distance)),
+            (Direction::Track(_), Some(target)) => {
+                let [from, to] = [0.0, 1.0].map(|t| route.time(interval, t));
+                let times = target.times_between(from, to).into_iter();
+                cuts.extend(times.map(|time| route.parameter(interval, time)));
+            }
+            _ => {}
+        }
         cuts.sort_by(f64::total_cmp);
         cuts.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
         if let Some(last) = cuts.last_mut() {
@@ -299,15 +291,13 @@ pub(crate) fn stretches(
         }
         for pair in cuts.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            let heading = match (polynomial, direction, target) {
-                (Some(Some(divided)), ..) => {
-                    Heading::Polynomial(signed(divided, 0.5 * (from + to)))
-                }
+            let heading = match (&divided, direction, target) {
+                (Some(divided), ..) => Heading::Polynomial(signed(divided, 0.5 * (from + to))),
                 (None, Direction::Ahead(distance), _) if route.lengths.total() > 0.0 => {
                     Heading::Ahead(distance)
                 }
                 (None, Direction::Track(_), Some(target)) => {
-                    Heading::Body(Box::new(target.clone()), DVec3::ZERO)
+                    Heading::Body(Arc::clone(target), DVec3::ZERO)
                 }
                 _ => Heading::Still(DVec3::ZERO),
             };
@@ -323,23 +313,17 @@ pub(crate) fn stretches(
             all.push(own);
         }
     }
-    settle(route, &mut all).then_some(all)
+    settle(route, &mut all);
+    all
 }
 
-/// Fills in the directions of bodies that stand. Returns whether there is any.
-fn settle(route: &Route, all: &mut [Stretch]) -> bool {
-    let first = all.iter().map(|own| own.way(route, own.from)[0]);
-    let Some(mut last) = first.into_iter().find(|way| *way != DVec3::ZERO) else {
-        return false;
+/// Fills in the directions of bodies that stand; takes all stretches where there is none.
+fn settle(route: &Route, all: &mut Vec<Stretch>) {
+    let mut first = all.iter().map(|own| own.way(route, own.from)[0]);
+    let Some(mut last) = first.find(|way| *way != DVec3::ZERO) else {
+        all.clear();
+        return;
     };
-    let is_open = |own: &Stretch| match &own.heading {
-        Heading::Still(way) => *way == DVec3::ZERO,
-        Heading::Body(..) => true,
-        _ => false,
-    };
-    if !all.iter().any(is_open) {
-        return true;
-    }
     for own in all {
         match &mut own.heading {
             Heading::Still(way) if *way == DVec3::ZERO => *way = last,
@@ -347,25 +331,5 @@ fn settle(route: &Route, all: &mut [Stretch]) -> bool {
             _ => {}
         }
         last = own.way(route, own.to)[0];
-    }
-    true
-}
-
-impl Route {
-    /// The times between two at which the path's own curves change.
-    fn times_between(&self, from: f64, to: f64) -> Vec<f64> {
-        let ends = self.curves.len();
-        let mut times: Vec<f64> = (0..ends)
-            .flat_map(|interval| {
-                let stops = self.stops(interval).iter().copied();
-                let places = stops.chain([0.0, 1.0]);
-                places.map(move |t| self.schedule.time(&self.lengths, interval, t))
-            })
-            .chain(self.schedule.joints(from..to))
-            .filter(|&time| time > from && time < to)
-            .collect();
-        times.sort_by(f64::total_cmp);
-        times.dedup();
-        times
     }
 }

@@ -4,14 +4,15 @@
 use glam::DVec3;
 
 use crate::fit::double::fit::MOST;
+use crate::fit::double::intervals::{at, put};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::quaternion::{Quaternion, Real};
 use crate::path::axes::ByAxes;
 use crate::path::carry::Piece;
 use crate::path::frames::Frames;
-use crate::path::lanes::{self, Carried, Directions, Pieces, Polynomials, Row};
+use crate::path::lanes::{Carried, Pieces, Row, find_directions, load};
 use crate::path::options::{Follow, PathSpeed};
-use crate::path::route::Heading;
+use crate::path::route::{Route, Stretch};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
 
@@ -56,13 +57,21 @@ pub(crate) struct Span {
     pub(crate) to: f64,
 }
 
+impl Span {
+    /// Its route and its stretch among those of some paths.
+    fn place<'a>(&self, paths: &'a [Frames]) -> (&'a Route, &'a Stretch) {
+        let own = &paths[self.path as usize];
+        (&own.route, &own.stretches[self.stretch as usize])
+    }
+}
+
 /// Values at the places of spans, a row for each of their four components.
 pub(crate) type Samples = [[Row; 4]; PLACES];
 
 /// Samples spans of some paths; its memory is kept for the next ones.
 pub(crate) struct Sampler<'a> {
-    paths: &'a [Frames],
-    kind: Kind,
+    pub(crate) paths: &'a [Frames],
+    pub(crate) kind: Kind,
     speed: PathSpeed,
     /// The rotation from the body to z forward, y up, if it is not the identity.
     body: Option<Quaternion>,
@@ -70,10 +79,10 @@ pub(crate) struct Sampler<'a> {
 }
 
 /// The numbers of a block of spans.
+#[derive(Default)]
 struct Rows {
     times: Times,
     places: [Row; PLACES],
-    polynomials: Polynomials,
     ways: [[Row; 3]; PLACES],
     pieces: Pieces,
     rolls: [Row; PLACES],
@@ -85,28 +94,13 @@ struct Rows {
 impl<'a> Sampler<'a> {
     pub(crate) fn new(paths: &'a [Frames], kind: Kind, follow: &Follow) -> Self {
         let body = follow.body().to_array();
-        let row = [0.0; MOST];
         Self {
             paths,
             kind,
             speed: follow.speed,
             body: (body != [0.0, 0.0, 0.0, 1.0]).then_some(body),
-            rows: Box::new(Rows {
-                times: Times::NONE,
-                places: [row; PLACES],
-                polynomials: [[row; 3]; 4],
-                ways: [[row; 3]; PLACES],
-                pieces: Pieces::NONE,
-                rolls: [row; PLACES],
-                sides: [[row; 3]; PLACES],
-                by_axes: [[row; 4]; PLACES],
-                values: [[row; 4]; PLACES],
-            }),
+            rows: Box::default(),
         }
-    }
-
-    pub(crate) fn kind(&self) -> Kind {
-        self.kind
     }
 
     /// The value on a stretch of a path at one time.
@@ -117,7 +111,7 @@ impl<'a> Sampler<'a> {
             from: time,
             to: time,
         };
-        lanes::at(&self.sample(&[span])[START], 0)
+        at(&self.sample(&[span])[START], 0)
     }
 
     /// The values on at most as many spans as there are lanes.
@@ -137,25 +131,17 @@ impl<'a> Sampler<'a> {
     fn places_by_keys(&mut self, spans: &[Span]) {
         let Rows { times, places, .. } = &mut *self.rows;
         for (lane, span) in spans.iter().enumerate() {
-            let Frames {
-                route, stretches, ..
-            } = &self.paths[span.path as usize];
-            let own = &stretches[span.stretch as usize];
-            let [first, last] = route.schedule.keys_of(own.interval);
+            let (route, own) = span.place(self.paths);
+            let [first, last] = route.keys_of(own.interval);
             let numbers = [span.from, span.to, first, last, own.from, own.to];
-            for (row, number) in times.0.iter_mut().zip(numbers) {
-                row[lane] = number;
-            }
+            put(times, lane, numbers);
         }
         in_lanes(&mut ByKeys { times, places });
     }
 
     fn places_by_length(&mut self, spans: &[Span]) {
         for (lane, span) in spans.iter().enumerate() {
-            let Frames {
-                route, stretches, ..
-            } = &self.paths[span.path as usize];
-            let own = &stretches[span.stretch as usize];
+            let (route, own) = span.place(self.paths);
             let width = span.to - span.from;
             for (place, (row, part)) in self.rows.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {
@@ -163,8 +149,7 @@ impl<'a> Sampler<'a> {
                     _ => span.from + width * part,
                 };
                 row[lane] = if route.lengths.total() > 0.0 {
-                    let t = (route.schedule).parameter(&route.lengths, own.interval, time);
-                    t.clamp(own.from, own.to)
+                    route.parameter(own.interval, time).clamp(own.from, own.to)
                 } else {
                     // A path without length is stood on.
                     own.from
@@ -176,49 +161,18 @@ impl<'a> Sampler<'a> {
     fn positions(&mut self, spans: &[Span]) {
         let Rows { places, values, .. } = &mut *self.rows;
         for (lane, span) in spans.iter().enumerate() {
-            let Frames {
-                route, stretches, ..
-            } = &self.paths[span.path as usize];
-            let curve = &route.curves[stretches[span.stretch as usize].interval];
+            let (route, own) = span.place(self.paths);
+            let curve = &route.curves[own.interval];
             for (value, place) in values.iter_mut().zip(&*places) {
-                let at = curve.at(place[lane]);
-                for c in 0..3 {
-                    value[c][lane] = at[c];
-                }
-                value[3][lane] = 0.0;
+                put(value, lane, curve.at(place[lane]).extend(0.0).to_array());
             }
         }
     }
 
     fn rotations(&mut self, spans: &[Span]) {
-        let paths = self.paths;
-        let rows = &mut *self.rows;
-        for (lane, span) in spans.iter().enumerate() {
-            let own = &paths[span.path as usize].stretches[span.stretch as usize];
-            if let Heading::Polynomial(way) = &own.heading {
-                lanes::set(&mut rows.polynomials, lane, way);
-            }
-        }
-        in_lanes(&mut Directions {
-            count: spans.len(),
-            polynomials: &rows.polynomials,
-            places: &rows.places,
-            ways: &mut rows.ways,
-            changes: None,
-        });
-        for (lane, span) in spans.iter().enumerate() {
-            let own = &paths[span.path as usize];
-            let stretch = &own.stretches[span.stretch as usize];
-            if let Heading::Polynomial(_) = stretch.heading {
-                continue;
-            }
-            for (ways, place) in rows.ways.iter_mut().zip(&rows.places) {
-                let [way, _] = stretch.way(&own.route, place[lane]);
-                for c in 0..3 {
-                    ways[c][lane] = way[c];
-                }
-            }
-        }
+        let (paths, rows) = (self.paths, &mut *self.rows);
+        let stretches = spans.iter().map(|span| span.place(paths));
+        find_directions(stretches, &rows.places, &mut rows.ways, None);
         self.carried(spans);
         self.by_axes(spans);
     }
@@ -233,24 +187,18 @@ impl<'a> Sampler<'a> {
             values,
             ..
         } = &mut *self.rows;
-        let is_carried = |span: &Span| {
-            let own = &self.paths[span.path as usize];
-            own.carried(span.stretch as usize).is_some()
-        };
-        let mut others = (spans.iter().enumerate())
-            .filter(|(_, span)| !is_carried(span))
-            .peekable();
-        if others.peek().is_none() {
+        let frames = |span: &Span| &self.paths[span.path as usize];
+        let vector = |rows: &[Row; 3], lane: usize| DVec3::from_array(at(rows, lane));
+        let is_carried = |span: &Span| frames(span).carried(span.stretch as usize).is_some();
+        let others = (spans.iter().enumerate()).filter(|(_, span)| !is_carried(span));
+        if others.clone().next().is_none() {
             return;
         }
         for (lane, span) in others.clone() {
-            let own = &self.paths[span.path as usize];
             for (place, side) in sides.iter_mut().enumerate() {
-                let way = DVec3::from_array(lanes::at(&ways[place], lane));
-                let found = own.side(span.stretch as usize, places[place][lane], way);
-                for (row, c) in side.iter_mut().zip(found.to_array()) {
-                    row[lane] = c;
-                }
+                let way = vector(&ways[place], lane);
+                let own = frames(span).side(span.stretch as usize, places[place][lane], way);
+                put(side, lane, own.to_array());
             }
         }
         let mut are_along = [0.0; MOST];
@@ -264,16 +212,12 @@ impl<'a> Sampler<'a> {
         });
         for (lane, span) in others {
             for (place, value) in values.iter_mut().enumerate() {
-                let mut rotation = lanes::at(&by_axes[place], lane);
+                let mut rotation = at(&by_axes[place], lane);
                 if are_along[lane] != 0.0 {
-                    let [side, way] = [&sides[place], &ways[place]]
-                        .map(|rows| DVec3::from_array(lanes::at(rows, lane)));
-                    let own = &self.paths[span.path as usize];
-                    rotation = own.rotation(side, way).to_array();
+                    let [side, way] = [&sides[place], &ways[place]].map(|own| vector(own, lane));
+                    rotation = frames(span).rotation(side, way).to_array();
                 }
-                for (row, c) in value.iter_mut().zip(rotation) {
-                    row[lane] = c;
-                }
+                put(value, lane, rotation);
             }
         }
     }
@@ -297,7 +241,15 @@ impl<'a> Sampler<'a> {
                 continue;
             };
             any = true;
-            are_rolled |= added.are_spread() || added.at(0.0) != 0.0;
+            let (is_spread, first) = (added.are_spread(), added.at(0.0));
+            are_rolled |= is_spread || first != 0.0;
+            let interval = own.stretches[span.stretch as usize].interval;
+            for (roll, place) in rolls.iter_mut().zip(&*places) {
+                roll[lane] = match is_spread {
+                    true => added.at(own.route.lengths.at(interval, place[lane])),
+                    false => first,
+                };
+            }
             if let [only] = all {
                 pieces.set(lane, only);
                 continue;
@@ -316,23 +268,6 @@ impl<'a> Sampler<'a> {
             return;
         }
         others.sort_by_key(|(place, ..)| *place);
-        if are_rolled {
-            for (lane, span) in spans.iter().enumerate() {
-                let own = &paths[span.path as usize];
-                let stretch = span.stretch as usize;
-                let Some((_, added)) = own.carried(stretch) else {
-                    continue;
-                };
-                let interval = own.stretches[stretch].interval;
-                for (roll, place) in rolls.iter_mut().zip(&*places) {
-                    let length = match added.are_spread() {
-                        true => own.route.lengths.at(interval, place[lane]),
-                        false => 0.0,
-                    };
-                    roll[lane] = added.at(length);
-                }
-            }
-        }
         in_lanes(&mut Carried {
             count: spans.len(),
             pieces,
@@ -348,11 +283,7 @@ impl<'a> Sampler<'a> {
 
 /// The times at which spans start and end, those of their intervals' keys, and the parameters between
 /// which their stretches lie.
-struct Times([Row; 6]);
-
-impl Times {
-    const NONE: Self = Self([[0.0; MOST]; 6]);
-}
+type Times = [Row; 6];
 
 /// The places of spans on paths that are as their keys say.
 struct ByKeys<'a> {
@@ -365,7 +296,7 @@ impl InLanes for ByKeys<'_> {
     fn run<L: Lanes>(&mut self) {
         let (zero, one) = (L::Doubles::all(0.0), L::Doubles::all(1.0));
         for lane in (0..MOST).step_by(L::COUNT) {
-            let [from, to, first, last, start, end] = lanes::load::<L, 6>(&self.times.0, lane);
+            let [from, to, first, last, start, end] = load::<L, 6>(self.times, lane);
             let width = to - from;
             for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {

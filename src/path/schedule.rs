@@ -1,111 +1,108 @@
-//! When a body is where on its path.
+//! When a body is where on its path, and where it is when.
 
 use std::ops::Range;
 
-use crate::path::lengths::Lengths;
 use crate::path::options::PathSpeed;
+use crate::path::route::Route;
 
-/// The times of a path's intervals.
-#[derive(Debug, Clone)]
-pub(crate) struct Schedule {
-    speed: PathSpeed,
-    /// The keys' own times, seconds.
-    keys: Vec<f64>,
-}
-
-impl Schedule {
-    pub(crate) fn new(speed: PathSpeed, keys: &[f64]) -> Self {
-        Self {
-            speed,
-            keys: keys.to_vec(),
-        }
-    }
-
+impl Route {
     /// When the path starts and ends.
     pub(crate) fn span(&self) -> (f64, f64) {
-        (self.keys[0], self.keys[self.keys.len() - 1])
+        (self.times[0], self.times[self.times.len() - 1])
     }
 
     /// The key times between which an interval lies.
     pub(crate) fn keys_of(&self, interval: usize) -> [f64; 2] {
-        [self.keys[interval], self.keys[interval + 1]]
+        [self.times[interval], self.times[interval + 1]]
+    }
+
+    /// Whether a body is where its speed says, and not where its keys do.
+    pub(crate) fn is_retimed(&self) -> bool {
+        self.speed != PathSpeed::Keys && self.lengths.total() > 0.0
+    }
+
+    /// Whether a body stands on its path, of which it may turn all the same.
+    pub(crate) fn stands(&self) -> bool {
+        self.speed != PathSpeed::Keys && !self.is_retimed()
     }
 
     /// The time of a place in an interval.
-    pub(crate) fn time(&self, lengths: &Lengths, interval: usize, t: f64) -> f64 {
+    pub(crate) fn time(&self, interval: usize, t: f64) -> f64 {
         if self.speed == PathSpeed::Keys {
             let [from, to] = self.keys_of(interval);
             return if t == 1.0 { to } else { from + (to - from) * t };
         }
         let (start, end) = self.span();
-        let part = lengths.at(interval, t) / lengths.total();
-        start + (end - start) * self.moment(part.min(1.0))
+        let part = self.lengths.at(interval, t) / self.lengths.total();
+        start + (end - start) * self.speed.moment(part.min(1.0))
     }
 
     /// The parameter of an interval at a time in it.
-    pub(crate) fn parameter(&self, lengths: &Lengths, interval: usize, time: f64) -> f64 {
+    pub(crate) fn parameter(&self, interval: usize, time: f64) -> f64 {
         if self.speed == PathSpeed::Keys {
             let [from, to] = self.keys_of(interval);
             return ((time - from) / (to - from)).clamp(0.0, 1.0);
         }
-        lengths.parameter(interval, self.length(lengths, time))
+        self.lengths.parameter(interval, self.length(time))
     }
 
     /// The interval and its parameter at a time.
-    pub(crate) fn place(&self, lengths: &Lengths, time: f64) -> (usize, f64) {
+    pub(crate) fn place(&self, time: f64) -> (usize, f64) {
         let interval = if self.speed == PathSpeed::Keys {
-            let last = self.keys.len() - 2;
-            let after = self.keys.partition_point(|&key| key <= time);
+            let last = self.curves.len() - 1;
+            let after = self.times.partition_point(|&key| key <= time);
             after.saturating_sub(1).min(last)
         } else {
-            lengths.interval(self.length(lengths, time))
+            self.lengths.interval(self.length(time))
         };
-        (interval, self.parameter(lengths, interval, time))
+        (interval, self.parameter(interval, time))
     }
 
     /// The change of time with an interval's parameter where its curve has this speed.
-    pub(crate) fn slope(&self, lengths: &Lengths, interval: usize, t: f64, speed: f64) -> f64 {
+    pub(crate) fn pace(&self, interval: usize, t: f64, speed: f64) -> f64 {
+        if self.speed == PathSpeed::Keys {
+            let [from, to] = self.keys_of(interval);
+            return to - from;
+        }
         let (start, end) = self.span();
-        let pace = |x: f64| match self.speed {
-            PathSpeed::Eased { start, end } => eased_speed(start, end, x),
+        let total = self.lengths.total();
+        let rate = match self.speed {
+            PathSpeed::Eased { start, end } => {
+                let x = self.speed.moment(self.lengths.at(interval, t) / total);
+                eased_speed(start, end, x)
+            }
             _ => 1.0,
         };
-        match self.speed {
-            PathSpeed::Keys => self.keys[interval + 1] - self.keys[interval],
-            _ => {
-                let x = self.moment(lengths.at(interval, t) / lengths.total());
-                speed * (end - start) / (lengths.total() * pace(x)).max(1e-300)
-            }
-        }
+        speed * (end - start) / (total * rate).max(1e-300)
     }
 
     /// The times at which the speed is not smooth, inside of a range.
-    pub(crate) fn joints(&self, times: Range<f64>) -> impl Iterator<Item = f64> {
+    pub(crate) fn joints(&self, times: Range<f64>) -> impl Iterator<Item = f64> + use<> {
         let (from, to) = self.span();
         let parts = match self.speed {
             PathSpeed::Eased { start, end } => [start, 1.0 - end],
             _ => [0.0; 2],
         };
-        let joints = parts.map(|part| from + (to - from) * part);
-        joints
-            .into_iter()
-            .filter(move |&time| time > times.start && time < times.end)
+        let joints = parts.map(|part| from + (to - from) * part).into_iter();
+        joints.filter(move |&time| time > times.start && time < times.end)
     }
 
     /// The length covered at a time.
-    fn length(&self, lengths: &Lengths, time: f64) -> f64 {
+    fn length(&self, time: f64) -> f64 {
         let (start, end) = self.span();
         let x = ((time - start) / (end - start)).clamp(0.0, 1.0);
-        lengths.total()
+        self.lengths.total()
             * match self.speed {
                 PathSpeed::Eased { start, end } => eased(start, end, x),
                 _ => x,
             }
     }
+}
 
+impl PathSpeed {
     /// The part of the time at which a part of the length is covered.
-    fn moment(&self, part: f64) -> f64 {
-        let PathSpeed::Eased { start, end } = self.speed else {
+    fn moment(self, part: f64) -> f64 {
+        let Self::Eased { start, end } = self else {
             return part;
         };
         let top = 2.0 / (2.0 - start - end);
@@ -172,7 +169,6 @@ mod tests {
             start: 0.2,
             end: 0.3,
         };
-        let schedule = Schedule::new(speed, &[0.0, 1.0]);
         let expected = [
             (0.1, 0.025),
             (0.2, 2.0 / 15.0),
@@ -182,7 +178,7 @@ mod tests {
         ];
         for (x, s) in expected {
             assert!((eased(0.2, 0.3, x) - s).abs() < 1e-9);
-            assert!((schedule.moment(eased(0.2, 0.3, x)) - x).abs() < 1e-12);
+            assert!((speed.moment(eased(0.2, 0.3, x)) - x).abs() < 1e-12);
             let slope = (eased(0.2, 0.3, x + 1e-6) - eased(0.2, 0.3, x - 1e-6)) / 2e-6;
             assert!((eased_speed(0.2, 0.3, x) - slope).abs() < 1e-6);
         }

@@ -1,9 +1,7 @@
 //! Bodies that follow the paths of a set.
 
-use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::Uploaded;
 use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::path::options::{Follow, FollowWarning};
 use crate::path::prepare::PreparedPaths;
@@ -52,13 +50,9 @@ impl Engine {
     ) -> Result<Followed, Error> {
         let group_bytes = self.backend.group_bytes();
         let prepared = PreparedPaths::new(set, follow, group_bytes)?;
-        let clip = |data| -> Result<Clip, Error> {
-            let uploaded = Uploaded::of_data(&self.backend, data, None)?;
-            Ok(Clip::new(self.clone(), uploaded))
-        };
         Ok(Followed {
-            positions: clip(prepared.positions)?.samples(frames, layout)?,
-            rotations: clip(prepared.rotations)?.samples(frames, layout)?,
+            positions: self.samples_of(prepared.positions, frames, layout)?,
+            rotations: self.samples_of(prepared.rotations, frames, layout)?,
             warnings: prepared.warnings,
         })
     }

@@ -11,6 +11,7 @@ use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
 use crate::output::pose_error::PoseError;
+use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
@@ -75,7 +76,7 @@ impl Engine {
         let mut walk = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
-                for link in &links {
+                for link in links {
                     local.walk(link, sample, model);
                 }
                 for (matrix, bind) in model.iter_mut().zip(bind.iter().flatten()) {
@@ -207,7 +208,7 @@ impl ModelMatrices {
     }
 
     fn rows_of(&self, track: usize, sample: usize) -> Option<&Rows> {
-        let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| &self.matrices[sample * self.tracks + track])
+        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(&self.matrices[place])
     }
 }

@@ -5,38 +5,10 @@ use rayon::prelude::*;
 use crate::shader::Link;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
+use crate::twin::pose_world;
 
 /// Values in one task.
 const TASK: usize = 8192;
-
-/// Blends layers, which lie one after another, into one.
-pub(crate) fn blend(layers: &[[f32; 4]], weights: &[f32], output: &mut [[f32; 4]]) {
-    let count = output.len();
-    for_each(output, |place| {
-        pose_blend::pose(layers, weights, count, place)
-    });
-}
-
-/// Mixes two layers by slerp.
-pub(crate) fn mix(from: &[[f32; 4]], to: &[[f32; 4]], weight: f32, output: &mut [[f32; 4]]) {
-    for_each(output, |place| {
-        pose_mix::pose(from[place], to[place], weight)
-    });
-}
-
-/// Adds a layer to a base: `base · (reference⁻¹ layer)^weight`.
-pub(crate) fn add(
-    base: &[[f32; 4]],
-    layer: &[[f32; 4]],
-    reference: &[[f32; 4]],
-    weight: f32,
-    output: &mut [[f32; 4]],
-) {
-    for_each(output, |place| {
-        pose_add::pose(base[place], layer[place], reference[place], weight)
-    });
-}
 
 /// Turns frames of local rotations into rotations and positions in the world.
 pub(crate) fn world(local: &[[f32; 4]], links: &[Link], output: &mut [[f32; 4]]) {
@@ -62,7 +34,8 @@ impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
     }
 }
 
-fn for_each(output: &mut [[f32; 4]], pose: impl Fn(usize) -> [f32; 4] + Sync) {
+/// Sets the values at all places.
+pub(crate) fn for_each(output: &mut [[f32; 4]], pose: impl Fn(usize) -> [f32; 4] + Sync) {
     let tasks = output.par_chunks_mut(TASK).enumerate();
     tasks.for_each(|(task, output)| {
         in_lanes(&mut Task {

@@ -1,7 +1,6 @@
 //! Poses from poses, on the engine's device: layers are blended, mixed or added, and a skeleton is
 //! walked from its roots down to rotations and positions in the world.
 
-use crate::pose::on_cpu;
 use glam::{Quat, Vec3};
 
 use crate::engine::Engine;
@@ -12,8 +11,10 @@ use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
+use crate::pose::on_cpu;
 use crate::pose::skeleton::Skeleton;
 use crate::shader::{Kernel, PoseDispatch};
+use crate::twin::{pose_add, pose_blend, pose_mix};
 
 impl Engine {
     /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
@@ -39,7 +40,9 @@ impl Engine {
             }
             let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
             let Some(device) = device else {
-                on_cpu::blend(values, &weights, output);
+                let count = output.len();
+                let blended = |place| pose_blend::pose(values, &weights, count, place);
+                on_cpu::for_each(output, blended);
                 return Ok(());
             };
             let inputs = [bytes(values), bytes(&weights)];
@@ -58,7 +61,8 @@ impl Engine {
         self.each_rotation(from, 1, |device, start, output| {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
-                on_cpu::mix(a, b, weight, output);
+                let mixed = |place: usize| pose_mix::pose(a[place], b[place], weight);
+                on_cpu::for_each(output, mixed);
                 return Ok(());
             };
             let weight = [weight];
@@ -99,7 +103,8 @@ impl Engine {
                 reference[track].to_array()
             }));
             let Some(device) = device else {
-                on_cpu::add(a, b, &own, weight, output);
+                let added = |place: usize| pose_add::pose(a[place], b[place], own[place], weight);
+                on_cpu::for_each(output, added);
                 return Ok(());
             };
             own.push([weight, 0.0, 0.0, 0.0]);
@@ -150,10 +155,10 @@ impl Engine {
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
-                    None => on_cpu::world(&frame_major, &links, output),
+                    None => on_cpu::world(&frame_major, links, output),
                     Some(device) => device.pass(
                         Kernel::PosesWorld,
-                        &[bytes(&frame_major), bytes(&links)],
+                        &[bytes(&frame_major), bytes(links)],
                         dispatch(count, tracks),
                         bytemuck::cast_slice_mut(output),
                     )?,
@@ -181,13 +186,8 @@ impl Engine {
             for (start, output) in (0..).step_by(most).zip(made.chunks_mut(most)) {
                 work(device, start, bytemuck::cast_slice_mut(output))?;
             }
-            let (tracks, samples) = (like.tracks(), like.samples());
-            Ok(Rotations::new(
-                Box::new(made),
-                tracks,
-                samples,
-                like.layout(),
-            ))
+            let (tracks, samples, layout) = like.shape();
+            Ok(Rotations::new(Box::new(made), tracks, samples, layout))
         })
     }
 
@@ -254,8 +254,8 @@ impl WorldPoses {
     }
 
     fn place(&self, track: usize, sample: usize) -> Option<usize> {
-        let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| 2 * (sample * self.tracks + track))
+        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(2 * place)
     }
 }
 
@@ -293,12 +293,12 @@ fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
     bytemuck::cast_slice(&layer.as_quats()[start..start + count])
 }
 
-fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
+pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
 /// Runs a kernel that makes one value in each invocation.
-fn pass(
+pub(super) fn pass(
     device: &VulkanEngine,
     kernel: Kernel,
     inputs: &[&[u8]],

@@ -10,10 +10,8 @@ use crate::shader::{Link, ROOT};
 /// The parent of each track, and its offset in the parent's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    parents: Vec<Option<usize>>,
-    offsets: Vec<Vec3>,
-    /// Parents before their children.
-    order: Vec<usize>,
+    /// The tracks in the order in which the kernels walk them, parents before their children.
+    links: Vec<Link>,
 }
 
 impl Skeleton {
@@ -63,11 +61,15 @@ impl Skeleton {
         if let Some(track) = children.iter().position(|left| !left.is_empty()) {
             return Err(SkeletonError::Cycle { track });
         }
-        Ok(Self {
-            parents,
-            offsets,
-            order,
-        })
+        let link = |track: usize| Link {
+            offset: offsets[track].to_array().map(canonical),
+            track: track as u32,
+            parent: parents[track].map_or(ROOT, |parent| parent as u32),
+            padding_3: [0; 3],
+        };
+        let mut links = reserved(tracks, "a skeleton")?;
+        links.extend(order.into_iter().map(link));
+        Ok(Self { links })
     }
 
     /// A chain of boxes: the first hangs at the origin, each other at the lower end of
@@ -92,24 +94,17 @@ impl Skeleton {
     /// Number of tracks.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.parents.len()
+        self.links.len()
     }
 
     /// Whether it has no tracks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.parents.is_empty()
+        self.links.is_empty()
     }
 
-    /// The tracks in the order in which the kernels walk them, parents before children.
-    pub(crate) fn links(&self) -> Vec<Link> {
-        let link = |&track: &usize| Link {
-            offset: self.offsets[track].to_array().map(canonical),
-            track: track as u32,
-            parent: self.parents[track].map_or(ROOT, |parent| parent as u32),
-            padding_3: [0; 3],
-        };
-        self.order.iter().map(link).collect()
+    pub(crate) fn links(&self) -> &[Link] {
+        &self.links
     }
 }
 
@@ -121,7 +116,11 @@ mod tests {
     fn parents_come_first_and_circles_are_refused() {
         let parents = vec![Some(2), None, Some(1), Some(2)];
         let skeleton = Skeleton::new(parents, vec![Vec3::ZERO; 4]).unwrap();
-        assert_eq!(skeleton.order, [1, 2, 0, 3]);
+        let places = |own: &Skeleton| -> Vec<_> {
+            let links = own.links.iter();
+            links.map(|link| (link.track, link.parent)).collect()
+        };
+        assert_eq!(places(&skeleton), [(1, ROOT), (2, 1), (0, 2), (3, 2)]);
         let refused = |parents: &[Option<usize>]| {
             Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
         };
@@ -144,6 +143,6 @@ mod tests {
             Err(SkeletonError::OffsetNotFinite { track: 0, .. })
         ));
         let chain = Skeleton::chain(3, 2.0).unwrap();
-        assert_eq!(chain.parents, [None, Some(0), Some(1)]);
+        assert_eq!(places(&chain), [(0, ROOT), (1, 0), (2, 1)]);
     }
 }

@@ -7,7 +7,8 @@ use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
-use crate::shader::{Kernel, PoseDispatch};
+use crate::pose::poses::{self, bytes};
+use crate::shader::Kernel;
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::{Block, Pass, Row};
 
@@ -171,11 +172,7 @@ impl Set<'_> {
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
         let (limit, radius) = (device.pass_limit().max(2), pass.weights.len());
-        let detail = u32::from(pass.are_rotations);
-        let dispatch = |count: usize, detail: u32| PoseDispatch {
-            count: count as u32,
-            detail,
-        };
+        let detail = usize::from(pass.are_rotations);
         let stride = self.samples - 1 + 2 * radius;
         // Between rows that are smoothed at once the kernel runs over what lies beyond their ends too:
         // more than the rows themselves where it is wider than they are long.
@@ -195,12 +192,7 @@ impl Set<'_> {
             let mut steps = vec![[0.0; 4]; values.len() - 1];
             for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
                 let values = &values[first..=first + output.len()];
-                device.pass(
-                    Kernel::PosesSteps,
-                    &[bytemuck::cast_slice(values)],
-                    dispatch(output.len(), detail),
-                    bytemuck::cast_slice_mut(output),
-                )?;
+                poses::pass(device, Kernel::PosesSteps, &[bytes(values)], detail, output)?;
             }
             let mut padded = Vec::with_capacity(rows.len() * stride);
             let mut spaced = Vec::with_capacity(rows.len() * stride);
@@ -214,18 +206,10 @@ impl Set<'_> {
             let block = limit.saturating_sub(2 * radius).max(1);
             for (first, output) in (0..).step_by(block).zip(found.chunks_mut(block)) {
                 let steps = &padded[first..first + output.len() + 2 * radius - 1];
-                let inputs: [&[u8]; 3] = [
-                    bytemuck::cast_slice(&spaced[first..first + output.len()]),
-                    bytemuck::cast_slice(steps),
-                    bytemuck::cast_slice(pass.weights),
-                ];
-                let pass = dispatch(output.len(), 2 * radius as u32 + detail);
-                device.pass(
-                    Kernel::PosesSmooth,
-                    &inputs,
-                    pass,
-                    bytemuck::cast_slice_mut(output),
-                )?;
+                let values = &spaced[first..first + output.len()];
+                let inputs = [bytes(values), bytes(steps), bytes(pass.weights)];
+                let detail = 2 * radius + detail;
+                poses::pass(device, Kernel::PosesSmooth, &inputs, detail, output)?;
             }
             for (row, start) in rows.iter().zip((0..).step_by(stride)) {
                 for sample in 0..self.samples {

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::output::rotations::{Layout, Rotations, Vectors};
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::prepare::clip_data::ClipData;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -83,8 +83,17 @@ impl Engine {
         let interpolation = interpolation.into();
         let group_bytes = self.backend.group_bytes();
         let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes);
+        self.samples_of(data, frames, layout)
+    }
+
+    /// Evaluates prepared tracks.
+    pub(super) fn samples_of<T>(
+        &self,
+        data: ClipData,
+        frames: &Frames,
+        layout: Layout,
+    ) -> Result<Samples<T>, Error> {
         let uploaded = Uploaded::of_data(&self.backend, data, None)?;
-        let clip = Clip::new(self.clone(), uploaded);
-        clip.samples(frames, layout)
+        Clip::new(self.clone(), uploaded).samples(frames, layout)
     }
 }

@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
+use crate::reduce::Task;
 use crate::reduce::value::Value;
-use crate::reduce::{ReducedKeys, Task};
 
 /// A curve changes as far as this many keys from one that is put in or taken out.
 const REACH: usize = 2;
@@ -108,15 +108,10 @@ impl<T: Value> Task<'_, T> {
         intervals.map(worst).collect()
     }
 
-    /// The keys at some places.
-    pub(crate) fn bessel_keys_at(&self, places: &[usize]) -> ReducedKeys<T> {
+    /// The largest distance of a sample from the curve through the keys at some places.
+    pub(crate) fn bessel_error(&self, places: &[usize]) -> f64 {
         let worst = self.worst_of_each(places, 0..places.len() - 1);
         let largest = worst.iter().map(|own| own.1).fold(0.0, f64::max);
-        ReducedKeys {
-            places: places.to_vec(),
-            keys: places.iter().map(|&place| self.samples[place]).collect(),
-            tangents: Vec::new(),
-            error: largest * self.tolerance,
-        }
+        largest * self.tolerance
     }
 }

@@ -3,8 +3,8 @@
 
 use glam::DVec4;
 
+use crate::reduce::Task;
 use crate::reduce::value::Value;
-use crate::reduce::{ReducedKeys, Task};
 
 /// The places of the keys of intervals that are as long as possible: the farthest sample from each key
 /// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down
@@ -41,38 +41,31 @@ pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Ve
 impl<T: Value> Task<'_, T> {
     /// Whether all samples within an interval are near.
     pub(crate) fn fits(&self, from: usize, to: usize, is_cubic: bool) -> bool {
-        self.error(from, to, is_cubic)
-            .is_some_and(|error| error <= self.tolerance)
+        let error = self.interval(from, to, is_cubic, self.tolerance);
+        error.is_some()
     }
 
-    /// The keys at some places, with the tangents of cubics.
-    pub(crate) fn keys_at(&self, places: &[usize], is_cubic: bool) -> ReducedKeys<T> {
-        let mut found = ReducedKeys {
-            keys: places.iter().map(|&place| self.samples[place]).collect(),
-            ..ReducedKeys::default()
-        };
+    /// The largest distance of a sample from the intervals between the keys at some places.
+    pub(crate) fn interval_error(&self, places: &[usize], is_cubic: bool) -> f64 {
+        let error = |pair: &[usize]| self.interval(pair[0], pair[1], is_cubic, f64::INFINITY);
+        let errors = places.windows(2).map(error);
+        errors.fold(0.0, |most, own| most.max(own.unwrap_or(f64::INFINITY)))
+    }
+
+    /// The tangents of cubics at the keys at some places, per second.
+    pub(crate) fn tangents_at(&self, places: &[usize]) -> Vec<[T; 2]> {
+        let mut found = Vec::with_capacity(places.len());
         let mut arriving = T::zero();
         for pair in places.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            let error = self.interval(from, to, is_cubic, f64::INFINITY);
-            found.error = found.error.max(error.unwrap_or(f64::INFINITY));
-            if is_cubic {
-                let seconds = self.times[to] - self.times[from];
-                let tangents = self.tangents(from, to);
-                let [leaving, next] = tangents.map(|own| T::of_numbers(own / seconds));
-                found.tangents.push([arriving, leaving]);
-                arriving = next;
-            }
+            let seconds = self.times[to] - self.times[from];
+            let tangents = self.tangents(from, to);
+            let [leaving, next] = tangents.map(|own| T::of_numbers(own / seconds));
+            found.push([arriving, leaving]);
+            arriving = next;
         }
-        if is_cubic {
-            found.tangents.push([arriving, T::zero()]);
-        }
-        found.places = places.to_vec();
+        found.push([arriving, T::zero()]);
         found
-    }
-
-    fn error(&self, from: usize, to: usize, is_cubic: bool) -> Option<f64> {
-        self.interval(from, to, is_cubic, self.tolerance)
     }
 
     /// The largest distance of the samples within an interval; nothing where it is over `most`.

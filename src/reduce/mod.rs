@@ -7,11 +7,14 @@
 //! farthest away, until it is near everywhere, and then each that can be missed is taken out.
 //!
 //! All is computed in f64. Every sample is looked at, and none is farther from the curve than the
-//! tolerance; cubics are looked at half way between samples too, so that they do not stray there; what an evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
+//! tolerance; cubics are looked at half way between samples too, so that they do not stray there; what an
+//! evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
 
 mod inserted;
 mod intervals;
 mod value;
+
+use std::ops::Range;
 
 use glam::{DQuat, DVec3};
 
@@ -105,7 +108,10 @@ pub fn reduce_rotations(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<DQuat>, ReduceError> {
-    reduced(times, &continued(samples), tolerance, curve)
+    let own = continued(samples);
+    let task = Task::new(times, &own, tolerance)?;
+    let mut found = reduced(times.len(), &[task], &[], curve);
+    Ok(found.rotations.pop().unwrap_or_default())
 }
 
 /// As [`reduce_rotations`], for translations or scales; the tolerance is a distance.
@@ -118,7 +124,9 @@ pub fn reduce_vectors(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<DVec3>, ReduceError> {
-    reduced(times, samples, tolerance, curve)
+    let task = Task::new(times, samples, tolerance)?;
+    let mut found = reduced(times.len(), &[], &[task], curve);
+    Ok(found.vectors.pop().unwrap_or_default())
 }
 
 /// Keys of several channels at the same times: every sample of each is within its tolerance. For files
@@ -133,55 +141,52 @@ pub fn reduce_together(
     curve: ReducedCurve,
 ) -> Result<ReducedTogether, ReduceError> {
     let turned: Vec<Vec<DQuat>> = rotations.iter().map(|own| continued(&own.0)).collect();
-    let tolerances = rotations.iter().map(|own| own.1);
-    let turning = turned.iter().zip(tolerances);
-    let turning: Vec<Task<'_, DQuat>> = turning
-        .map(|(samples, tolerance)| Task::new(times, samples, tolerance))
-        .collect::<Result<_, _>>()?;
-    let moving: Vec<Task<'_, DVec3>> = (vectors.iter())
+    let turning = (turned.iter().zip(rotations))
+        .map(|(samples, own)| Task::new(times, samples, own.1))
+        .collect::<Result<Vec<_>, _>>()?;
+    let moving = (vectors.iter())
         .map(|(samples, tolerance)| Task::new(times, samples, *tolerance))
-        .collect::<Result<_, _>>()?;
-    if times.is_empty() {
-        return Ok(ReducedTogether::default());
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(reduced(times.len(), &turning, &moving, curve))
+}
+
+/// The keys of channels with so many samples each.
+fn reduced(
+    samples: usize,
+    turning: &[Task<'_, DQuat>],
+    moving: &[Task<'_, DVec3>],
+    curve: ReducedCurve,
+) -> ReducedTogether {
+    if samples == 0 {
+        return ReducedTogether::default();
     }
     let is_still = turning.iter().all(|task| task.still().is_some())
         && moving.iter().all(|task| task.still().is_some());
-    let is_cubic = curve == ReducedCurve::GltfCubic;
     let by_intervals = |is_cubic| {
-        longest(times.len(), |from, to| {
+        longest(samples, |from, to| {
             turning.iter().all(|task| task.fits(from, to, is_cubic))
                 && moving.iter().all(|task| task.fits(from, to, is_cubic))
         })
     };
+    let worst_of_each = |keys: &[usize], intervals: Range<usize>| {
+        let own = || intervals.clone();
+        let turning = turning.iter().map(|task| task.worst_of_each(keys, own()));
+        let moving = moving.iter().map(|task| task.worst_of_each(keys, own()));
+        let further = |(a, b): ((usize, f64), (usize, f64))| if b.1 > a.1 { b } else { a };
+        let all = turning.chain(moving);
+        let all = all.reduce(|a, b| a.into_iter().zip(b).map(further).collect());
+        all.unwrap_or_default()
+    };
     let places = match curve {
         _ if is_still => vec![0],
-        ReducedCurve::BesselOverhauser => {
-            inserted(times.len(), by_intervals(true), &|keys, intervals| {
-                let turning = turning
-                    .iter()
-                    .map(|task| task.worst_of_each(keys, intervals.clone()));
-                let moving = moving
-                    .iter()
-                    .map(|task| task.worst_of_each(keys, intervals.clone()));
-                let further = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
-                let all = turning.chain(moving);
-                let all =
-                    all.reduce(|a, b| a.into_iter().zip(b).map(|(a, b)| further(a, b)).collect());
-                all.unwrap_or_default()
-            })
-        }
-        _ => by_intervals(is_cubic),
+        ReducedCurve::BesselOverhauser => inserted(samples, by_intervals(true), &worst_of_each),
+        ReducedCurve::Linear => by_intervals(false),
+        ReducedCurve::GltfCubic => by_intervals(true),
     };
-    Ok(ReducedTogether {
-        rotations: turning
-            .iter()
-            .map(|task| task.keys(&places, curve))
-            .collect(),
-        vectors: moving
-            .iter()
-            .map(|task| task.keys(&places, curve))
-            .collect(),
-    })
+    ReducedTogether {
+        rotations: turning.iter().map(|own| own.keys(&places, curve)).collect(),
+        vectors: moving.iter().map(|own| own.keys(&places, curve)).collect(),
+    }
 }
 
 /// The keys of several channels, all at the same places.
@@ -223,7 +228,8 @@ impl<'a, T: Value> Task<'a, T> {
         if !(tolerance >= 0.0 && tolerance.is_finite()) {
             return Err(ReduceError::Tolerance { tolerance });
         }
-        if let Some(place) = samples.iter().position(|sample| !sample.is_finite()) {
+        let is_bad = |sample: &T| !sample.numbers().is_finite();
+        if let Some(place) = samples.iter().position(is_bad) {
             return Err(ReduceError::Sample { place });
         }
         let increases = |place: usize| place == 0 || times[place - 1] < times[place];
@@ -246,44 +252,21 @@ impl<'a, T: Value> Task<'a, T> {
         (farthest <= self.tolerance).then_some(farthest)
     }
 
+    /// The keys at some places.
     fn keys(&self, places: &[usize], curve: ReducedCurve) -> ReducedKeys<T> {
-        match curve {
-            _ if places.len() < 2 => ReducedKeys {
-                places: places.to_vec(),
-                keys: places.iter().map(|&place| self.samples[place]).collect(),
-                tangents: match curve {
-                    ReducedCurve::GltfCubic => vec![[T::zero(); 2]; places.len()],
-                    _ => Vec::new(),
-                },
-                error: self.still().unwrap_or(f64::INFINITY),
+        ReducedKeys {
+            places: places.to_vec(),
+            keys: places.iter().map(|&place| self.samples[place]).collect(),
+            tangents: match curve {
+                ReducedCurve::GltfCubic => self.tangents_at(places),
+                _ => Vec::new(),
             },
-            ReducedCurve::BesselOverhauser => self.bessel_keys_at(places),
-            ReducedCurve::Linear => self.keys_at(places, false),
-            ReducedCurve::GltfCubic => self.keys_at(places, true),
+            error: match curve {
+                _ if places.len() < 2 => self.still().unwrap_or(f64::INFINITY),
+                ReducedCurve::BesselOverhauser => self.bessel_error(places),
+                ReducedCurve::Linear => self.interval_error(places, false),
+                ReducedCurve::GltfCubic => self.interval_error(places, true),
+            },
         }
     }
-}
-
-fn reduced<T: Value>(
-    times: &[f64],
-    samples: &[T],
-    tolerance: f64,
-    curve: ReducedCurve,
-) -> Result<ReducedKeys<T>, ReduceError> {
-    let task = Task::new(times, samples, tolerance)?;
-    if samples.is_empty() {
-        return Ok(ReducedKeys::default());
-    }
-    let is_cubic = curve == ReducedCurve::GltfCubic;
-    let by_intervals = |is_cubic| longest(samples.len(), |from, to| task.fits(from, to, is_cubic));
-    let places = match curve {
-        _ if task.still().is_some() => vec![0],
-        ReducedCurve::BesselOverhauser => {
-            inserted(samples.len(), by_intervals(true), &|keys, intervals| {
-                task.worst_of_each(keys, intervals)
-            })
-        }
-        _ => by_intervals(is_cubic),
-    };
-    Ok(task.keys(&places, curve))
 }

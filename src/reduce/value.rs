@@ -32,10 +32,6 @@ pub(crate) trait Value: Copy + Default + PartialEq {
 
     /// The Bessel-Overhauser curve through keys.
     fn bessel_overhauser(times: &[f64], keys: &[Self]) -> Box<dyn Fn(f64) -> Self>;
-
-    fn is_finite(self) -> bool {
-        self.numbers().is_finite()
-    }
 }
 
 impl Value for DQuat {

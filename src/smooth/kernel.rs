@@ -270,22 +270,6 @@ mod tests {
         );
     }
 
-    /// A tent over cells of the values 2, -1 and 3, at places in the middle one.
-    #[test]
-    fn a_tent_between_samples() {
-        let tent = SmoothingKernel::Tent(1.0);
-        let at = |x: f64| {
-            let cells = [(2.0, -1.0), (-1.0, 0.0), (3.0, 1.0)];
-            cells
-                .iter()
-                .map(|(value, from)| value * tent.mass(from - x, from + 1.0 - x))
-                .sum::<f64>()
-        };
-        for (x, expected) in [(0.0, 0.5), (0.25, -0.03125), (0.5, -0.125)] {
-            assert!((at(x) - expected).abs() < 1e-12, "{x}: {}", at(x));
-        }
-    }
-
     #[test]
     fn kernels_that_mean_nothing_are_refused() {
         let refused = |name: &str| {

@@ -2,6 +2,7 @@
 
 use crate::fit::double::curve::Curve;
 use crate::math::dual::Dual;
+use crate::math::quadrature::{gauss, integral};
 use crate::math::quaternion::{length, step};
 
 /// A curve's parameter is divided into this many equal parts; the arc length up to each is kept.
@@ -14,15 +15,6 @@ const SLOW: f64 = 1e-4;
 /// starts from rest has turned by a billionth of its length there, and its direction is known to
 /// seven digits.
 const NEXT_TO_REST: f64 = 1e-5;
-
-/// Points and weights of Gauss-Legendre quadrature on [-1, 1], exact for polynomials of degree 9.
-const GAUSS: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
 
 /// How far a curve has turned at each eighth of its parameter, radians.
 #[derive(Debug)]
@@ -98,7 +90,7 @@ impl Pace {
             }
             // One quadrature is exact enough for a short step.
             excess += if step.abs() < 1e-3 {
-                gauss(curve, u, next)
+                gauss(&speed(curve), u, next)
             } else {
                 turned(curve, u, next)
             };
@@ -108,33 +100,21 @@ impl Pace {
     }
 }
 
-/// The arc length between two parameters, radians. The interval is halved until both halves
-/// together agree with the whole.
+/// The arc length between two parameters, radians.
 fn turned(curve: &Curve, from: f64, to: f64) -> f64 {
-    refined(curve, from, to, gauss(curve, from, to), FINEST)
+    let differ = |whole: f64, sum: f64| {
+        let agree = (sum - whole).abs() <= 1e-13 * (1.0 + sum);
+        !agree
+    };
+    integral(&speed(curve), from, to, FINEST, &differ)
 }
 
 /// The most halvings. They are needed where a curve almost stops: its speed has a corner there.
 const FINEST: u32 = 8;
 
-fn refined(curve: &Curve, from: f64, to: f64, whole: f64, halvings: u32) -> f64 {
-    let middle = 0.5 * (from + to);
-    let halves = [gauss(curve, from, middle), gauss(curve, middle, to)];
-    let sum = halves[0] + halves[1];
-    if halvings == 0 || (sum - whole).abs() <= 1e-13 * (1.0 + sum) {
-        return sum;
-    }
-    refined(curve, from, middle, halves[0], halvings - 1)
-        + refined(curve, middle, to, halves[1], halvings - 1)
-}
-
-fn gauss(curve: &Curve, from: f64, to: f64) -> f64 {
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let speed = |&(at, weight): &(f64, f64)| {
-        let (velocity, _) = rates(curve, middle + half * at);
-        weight * length(velocity)
-    };
-    half * GAUSS.iter().map(speed).sum::<f64>()
+/// The angular speed by the parameter.
+fn speed(curve: &Curve) -> impl Fn(f64) -> f64 {
+    move |u| length(rates(curve, u).0)
 }
 
 /// Angular velocity and acceleration at `u`, per unit of the parameter.

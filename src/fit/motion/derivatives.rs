@@ -5,6 +5,7 @@ use crate::curve::options::{Axes, Quantity};
 use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
 use crate::fit::double::intervals::LANES;
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
+use crate::math::canonical::power_of_two;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, rotated, step};
 use crate::shader::PolynomialSegment;
@@ -90,11 +91,7 @@ fn sample<const PAIRS: usize>(
     let largest = (pairs.as_flattened().as_flattened().iter())
         .chain(&between)
         .fold(0.0f64, |largest, component| largest.max(component.abs()));
-    let unit = if largest > 1e-30 {
-        f64::from_bits(largest.to_bits() & (0x7ff << 52))
-    } else {
-        1.0
-    };
+    let unit = power_of_two(largest);
     for c in 0..4 {
         middle[c][lane] = (between[c] / unit) as f32;
         for (k, [before, after]) in pairs.iter().enumerate() {

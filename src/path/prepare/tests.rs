@@ -1,6 +1,9 @@
 //! Paths are followed together.
 
+use glam::DVec3;
+
 use super::*;
+use crate::path::options::PathSpeed;
 use crate::simd::dispatch::tests::same_at_every_width;
 
 /// Of each span of each track when it starts, and the numbers that give its values.
@@ -11,16 +14,7 @@ fn values(set: &TrackSet, tracks: Range<usize>, follow: &Follow) -> [Values; 2] 
         quantity: Quantity::Velocity(Axes::Parent),
         ..BESSEL_OVERHAUSER.into()
     };
-    let mut own = [(); 2].map(|()| Prepared::new(&interpolation));
-    add(
-        &mut own,
-        set,
-        tracks,
-        follow,
-        &interpolation,
-        &mut Vec::new(),
-    )
-    .unwrap();
+    let (own, _) = prepared(set, tracks, follow, [&interpolation; 2]).unwrap();
     own.map(|own| {
         let span = |span: usize| {
             let numbers = match own.spans.sources[span] {
