@@ -118,7 +118,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
                     options.memory = memory;
                 });
                 for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {
-                    if !is_turn(way + budget, i, 3) {
+                    if !is_turn(way + budget, i, budgets.len()) {
                         continue;
                     }
                     let what = format!("{method}, {transfer:?}, {mapping:?}, {memory:?} bytes");
