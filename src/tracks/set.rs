@@ -191,7 +191,7 @@ impl TrackSet {
     /// Whether every two neighbouring keys of a track are less than half a turn apart as they
     /// were given: then the shortest path and the path as authored are the same.
     pub(crate) fn arcs_are_short(&self) -> bool {
-        self.signs.arcs_are_short()
+        !self.signs.any_long
     }
 
     /// The signs of the keys of consecutive tracks along the shortest path.
