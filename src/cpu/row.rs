@@ -105,7 +105,7 @@ impl<S: Evaluate> Row<'_, S> {
                         output.made(start..start + count);
                     }
                     Source::Exact(index) => {
-                        let parameter = block.parameter::<FrameClock>(j);
+                        let parameter = block.parameter(j, clock);
                         let source = RunSource::Exact { index, parameter };
                         let run = Run::new(last - count, count, source);
                         self.exact(&run, &mut output.samples()[start..][..count]);

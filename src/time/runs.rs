@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use crate::math::canonical::round_f32;
-use crate::time::frame_clock::{Clock, CopyClock, FrameClock};
+use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::time::spans::{NONE, Part, Source, Spans};
@@ -76,11 +76,12 @@ impl Distance {
     }
 }
 
-/// Where the interval of a cubic that is evaluated in f64 starts, and its length.
+/// Where the interval of a curve that is evaluated in f64 starts, and its length: in frames, or in
+/// seconds if samples have explicit times.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Parameter {
-    Frames { start: f64, frames: f64 },
-    Seconds { start: f64, seconds: f64 },
+pub(crate) struct Parameter {
+    pub(crate) start: f64,
+    pub(crate) length: f64,
 }
 
 /// Takes runs. A trait rather than a closure: a closure's body is not compiled for
@@ -121,12 +122,8 @@ impl Spans {
     ) -> Result<(), FramesError> {
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let clock = FrameClock::new(*rate, *start, part.end);
-                if copy.is_own() {
-                    self.runs_of_frames(part, clock, &copy.samples, emit)
-                } else {
-                    self.runs_of_copy(part, clock, copy, emit)
-                }
+                let clock = FrameClock::new(*rate, *start, part.end).in_copy(copy);
+                self.runs_of_frames(part, clock, &copy.samples, emit)
             }
             Ticks::Times { times, stride } => {
                 let own = &times[part.track as usize * stride..];
@@ -136,36 +133,18 @@ impl Spans {
         }
     }
 
-    /// The runs in a copy other than the track itself. Not inlined, so that the usual path stays
-    /// small.
-    #[inline(never)]
-    fn runs_of_copy(
+    /// Emits the runs of one part among frames, in order.
+    #[inline(always)]
+    fn runs_of_frames(
         &self,
         part: &Part,
         clock: FrameClock,
-        copy: &TrackCopy,
-        emit: &mut impl Emit,
-    ) -> Result<(), FramesError> {
-        if copy.sign < 0.0 {
-            let clock = CopyClock::<true>::new(clock, copy);
-            return self.runs_of_frames(part, clock, &copy.samples, emit);
-        }
-        let clock = CopyClock::<false>::new(clock, copy);
-        self.runs_of_frames(part, clock, &copy.samples, emit)
-    }
-
-    /// Emits the runs of one part among frames, in order.
-    #[inline(always)]
-    pub(crate) fn runs_of_frames<C: Clock>(
-        &self,
-        part: &Part,
-        clock: C,
         samples: &Range<usize>,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
         let starts = &self.starts[part.spans.clone()];
         let begin = starts.first().copied().unwrap_or(part.end);
-        if C::IS_REVERSED {
+        if clock.is_reversed() {
             // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
             // never a copy.
             let end = clock.boundary(part.end);
@@ -178,7 +157,7 @@ impl Spans {
         while let Some(own) = intervals.fill(&mut block) {
             for j in block.occupied {
                 let met = own.start + j;
-                let (span, key) = match (C::IS_REVERSED, met) {
+                let (span, key) = match (clock.is_reversed(), met) {
                     (false, _) => (part.spans.start + met, self.keys[part.spans.start + met]),
                     (true, 0) => (part.spans.end - 1, part.after),
                     (true, _) => (part.spans.end - 1 - met, self.keys[part.spans.end - met]),
@@ -211,12 +190,12 @@ impl Spans {
                     }
                     Source::Constant(constant) => emit.constant(first, count, constant),
                     Source::Exact(index) => {
-                        emit.exact(first, count, index, block.parameter::<C>(j));
+                        emit.exact(first, count, index, block.parameter(j, clock));
                     }
                 }
             }
         }
-        if C::IS_REVERSED {
+        if clock.is_reversed() {
             let end = clock.boundary(begin);
             emit_constant(end.first as usize, usize::MAX, samples, part.before, emit);
         } else {
@@ -231,20 +210,19 @@ impl Spans {
 pub(crate) fn runs_before(
     part: &Part,
     begin: f64,
-    clock: impl Clock,
+    clock: FrameClock,
     samples: &Range<usize>,
     emit: &mut impl Emit,
 ) {
-    if part.before != NONE {
-        let begin = clock.boundary(begin);
-        emit_constant(0, begin.first as usize, samples, part.before, emit);
+    let [_, from_before, _] = part.at_ends();
+    if [part.before, from_before] == [NONE; 2] {
+        return;
     }
-    if let Some(from) = part.beyond.as_ref().map(|beyond| beyond.from_before)
-        && from != NONE
-    {
-        let begin = clock.boundary(begin);
-        let before = 0..begin.first as usize;
-        extrapolate(before, samples, from, clock, begin.frame, emit);
+    let begin = clock.boundary(begin);
+    let first = begin.first as usize;
+    emit_constant(0, first, samples, part.before, emit);
+    if from_before != NONE {
+        extrapolate(0..first, samples, from_before, clock, begin.frame, emit);
     }
 }
 
@@ -252,27 +230,24 @@ pub(crate) fn runs_before(
 #[inline(always)]
 pub(crate) fn runs_after(
     part: &Part,
-    clock: impl Clock,
+    clock: FrameClock,
     samples: &Range<usize>,
     emit: &mut impl Emit,
 ) {
-    let Some(beyond) = &part.beyond else {
-        if part.after != NONE {
-            let end = clock.boundary(part.end);
-            emit_constant(end.first as usize, usize::MAX, samples, part.after, emit);
-        }
+    let [at_end, _, from_after] = part.at_ends();
+    if [part.after, at_end, from_after] == [NONE; 3] {
         return;
-    };
+    }
     let end = clock.boundary(part.end);
     let mut first = end.first as usize;
-    if beyond.at_end != NONE && first as f64 == end.frame {
-        emit_constant(first, first + 1, samples, beyond.at_end, emit);
+    if at_end != NONE && first as f64 == end.frame {
+        emit_constant(first, first + 1, samples, at_end, emit);
         first += 1;
     }
     emit_constant(first, usize::MAX, samples, part.after, emit);
-    if beyond.from_after != NONE {
+    if from_after != NONE {
         let after = first..usize::MAX;
-        extrapolate(after, samples, beyond.from_after, clock, end.frame, emit);
+        extrapolate(after, samples, from_after, clock, end.frame, emit);
     }
 }
 
@@ -283,7 +258,7 @@ fn extrapolate(
     outside: Range<usize>,
     samples: &Range<usize>,
     index: u32,
-    clock: impl Clock,
+    clock: FrameClock,
     end: f64,
     emit: &mut impl Emit,
 ) {
@@ -292,8 +267,8 @@ fn extrapolate(
         outside.end.min(samples.end),
     );
     if first < last {
-        let (start, frames) = (end, clock.rate());
-        let parameter = Parameter::Frames { start, frames };
+        let (start, length) = (end, clock.rate());
+        let parameter = Parameter { start, length };
         emit.exact(first, last - first, index, parameter);
     }
 }

@@ -7,7 +7,7 @@ use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
 use crate::time::runs::{Affine, Distance, Emit, Parameter, Run, RunSource};
-use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
+use crate::time::spans::{NONE, Part, Source, Spans};
 
 impl Spans {
     /// Emits the runs of one part among samples with explicit times.
@@ -20,31 +20,23 @@ impl Spans {
         emit: &mut impl Emit,
     ) {
         let starts = &self.starts[part.spans.clone()];
-        let mut sample = samples.start;
-        let mut i = 0;
+        let begin = starts.first().copied().unwrap_or(part.end);
+        let (mut sample, mut i) = (samples.start, 0);
         while sample < samples.end {
             let time = times[sample];
-            i = interval_at(starts, time, i);
-            let begin = starts.first().copied().unwrap_or(part.end);
             let (covered, source) = if begin <= time && time < part.end {
+                i = interval_at(starts, time, i);
+                let (start, span) = (starts[i], part.spans.start + i);
                 let end = starts.get(i + 1).copied().unwrap_or(part.end);
-                let start = starts[i];
-                let key = self.keys[part.spans.start + i];
+                let key = self.keys[span];
                 if time == start && key != NONE {
                     (start..time.next_up(), Some(RunSource::Constant(key)))
                 } else {
                     let open = if key == NONE { start } else { start.next_up() };
-                    let source = self.time_source(part.spans.start + i, end);
-                    (open..end, Some(source))
+                    (open..end, Some(self.time_source(span, end)))
                 }
-            } else if let Some(beyond) = &part.beyond {
-                let rest = &times[sample..samples.end];
-                sample += outside(part, (begin, beyond), rest, sample, emit);
-                continue;
-            } else if time >= part.end {
-                (part.end..f64::INFINITY, constant_source(part.after))
             } else {
-                (f64::NEG_INFINITY..begin, constant_source(part.before))
+                outside(part, begin, time)
             };
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
@@ -85,10 +77,11 @@ impl Spans {
         let seconds = end - start;
         match self.sources[span] {
             Source::Constant(constant) => RunSource::Constant(constant),
-            Source::Exact(index) => RunSource::Exact {
-                index,
-                parameter: Parameter::Seconds { start, seconds },
-            },
+            Source::Exact(index) => {
+                let length = seconds;
+                let parameter = Parameter { start, length };
+                RunSource::Exact { index, parameter }
+            }
             Source::Segment(index) => {
                 let middle = start + seconds * 0.5;
                 let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
@@ -99,56 +92,31 @@ impl Spans {
     }
 }
 
-/// Emits the run of the first of `times`, which lies outside a part's keys, and returns its number
-/// of samples. Not inlined, so that the usual path stays small.
+/// The source of a sample outside a part's keys, `None` if another part has it, and the times that
+/// have the same source. Not inlined, so that the usual path stays small.
 #[inline(never)]
-fn outside(
-    part: &Part,
-    (begin, beyond): (f64, &Beyond),
-    times: &[f64],
-    sample: usize,
-    emit: &mut impl Emit,
-) -> usize {
-    let time = times[0];
-    let (covered, source) = if time < begin {
-        let source = source_beyond(part.before, beyond.from_before, begin);
+fn outside(part: &Part, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
+    let [at_end, from_before, from_after] = part.at_ends();
+    if time < begin {
+        let source = source_beyond(part.before, from_before, begin);
         (f64::NEG_INFINITY..begin, source)
-    } else if time == part.end && beyond.at_end != NONE {
-        (time..time.next_up(), constant_source(beyond.at_end))
+    } else if time == part.end && at_end != NONE {
+        (time..time.next_up(), Some(RunSource::Constant(at_end)))
     } else {
-        let source = source_beyond(part.after, beyond.from_after, part.end);
+        let source = source_beyond(part.after, from_after, part.end);
         (part.end..f64::INFINITY, source)
-    };
-    let count = times
-        .iter()
-        .take_while(|time| covered.contains(time))
-        .count();
-    match source {
-        Some(RunSource::Constant(constant)) => emit.constant(sample, count, constant),
-        Some(RunSource::Exact { index, parameter }) => emit.exact(sample, count, index, parameter),
-        Some(RunSource::Segment(..)) | None => {}
-    }
-    count
-}
-
-/// The source of samples outside the keys: a constant, or a curve whose parameter is seconds from
-/// `end`; `None` if another part has it.
-fn source_beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
-    match (constant_source(constant), curve) {
-        (None, NONE) => None,
-        (None, index) => Some(RunSource::Exact {
-            index,
-            parameter: Parameter::Seconds {
-                start: end,
-                seconds: 1.0,
-            },
-        }),
-        (held, _) => held,
     }
 }
 
-fn constant_source(constant: u32) -> Option<RunSource> {
-    (constant != NONE).then_some(RunSource::Constant(constant))
+/// A constant, or a curve whose parameter is seconds from `end`; `None` if there is neither.
+fn source_beyond(constant: u32, index: u32, end: f64) -> Option<RunSource> {
+    let (start, length) = (end, 1.0);
+    let parameter = Parameter { start, length };
+    match (constant, index) {
+        (NONE, NONE) => None,
+        (NONE, index) => Some(RunSource::Exact { index, parameter }),
+        (constant, _) => Some(RunSource::Constant(constant)),
+    }
 }
 
 /// Finds where times lie among keys. The constants of the last interval are kept, because many
