@@ -119,56 +119,23 @@ fn source_beyond(constant: u32, index: u32, end: f64) -> Option<RunSource> {
     }
 }
 
-/// Finds where times lie among keys. The constants of the last interval are kept, because many
-/// tracks share their times, and a comparison is cheaper than a division.
-pub(crate) struct TimePlan {
-    start: f64,
-    end: f64,
-    middle: f64,
-    scale: f32,
+/// The key before a time and the time's parameter after it; `near` is the key to look at first.
+#[inline(always)]
+pub(crate) fn key_sample(times: &[f64], time: f64, near: usize) -> KeySample {
+    let key = key_before(times, time, near);
+    let parameter = match key & IS_KEY {
+        0 => parameter(times[key as usize], times[key as usize + 1], time),
+        _ => 0.0,
+    };
+    KeySample { key, parameter }
 }
 
-impl TimePlan {
-    pub(crate) fn new() -> Self {
-        Self {
-            start: f64::NAN,
-            end: f64::NAN,
-            middle: 0.0,
-            scale: 0.0,
-        }
-    }
-
-    /// The key and the parameter of a time; `near` is the key to look at first.
-    #[inline(always)]
-    pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> KeySample {
-        let key = key_before(starts, time, near);
-        if key & IS_KEY != 0 {
-            return KeySample {
-                key,
-                parameter: 0.0,
-            };
-        }
-        let (start, end) = (starts[key as usize], starts[key as usize + 1]);
-        KeySample {
-            key,
-            parameter: self.parameter(start, end, time),
-        }
-    }
-
-    /// The parameter of a time between two keys.
-    #[inline(always)]
-    fn parameter(&mut self, start: f64, end: f64, time: f64) -> f32 {
-        if self.start != start || self.end != end {
-            let seconds = end - start;
-            *self = Self {
-                start,
-                end,
-                middle: start + seconds * 0.5,
-                scale: finite_scale(1.0 / seconds),
-            };
-        }
-        round_f32(time - self.middle) * self.scale + 0.0
-    }
+/// The parameter of a time in the interval from `start` to `end`.
+#[inline(always)]
+fn parameter(start: f64, end: f64, time: f64) -> f32 {
+    let seconds = end - start;
+    let middle = start + seconds * 0.5;
+    round_f32(time - middle) * finite_scale(1.0 / seconds) + 0.0
 }
 
 /// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is
@@ -239,14 +206,9 @@ impl TimeLanes {
         self.count = lane + 1;
     }
 
-    /// The parameter of each time in its interval, by the operations of `TimePlan::parameter`.
+    /// The parameter of each time in its interval.
     #[inline(always)]
     pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
-        std::array::from_fn(|lane| {
-            let seconds = self.ends[lane] - self.starts[lane];
-            let middle = self.starts[lane] + seconds * 0.5;
-            let scale = finite_scale(1.0 / seconds);
-            round_f32(self.times[lane] - middle) * scale + 0.0
-        })
+        std::array::from_fn(|lane| parameter(self.starts[lane], self.ends[lane], self.times[lane]))
     }
 }
