@@ -351,22 +351,6 @@ mod tests {
     #[test]
     fn impossible_requests_are_refused_before_any_work() {
         let span = Some((0.0, 1e9));
-        let error = Frames::fps(1_000_000).resolve(4, span).unwrap_err();
-        assert!(
-            matches!(error, FramesError::TooMany { tracks: 4, .. }),
-            "{error}"
-        );
-        let reversed = Frames::fps(1)
-            .between(2.0, 1.0)
-            .resolve(1, span)
-            .unwrap_err();
-        assert_eq!(
-            reversed,
-            FramesError::ReversedRange {
-                start: 2.0,
-                end: 1.0
-            }
-        );
         let ranged = Frames::at(vec![0.0, 1.0]).between(0.0, 1.0);
         assert_eq!(ranged.resolve(1, span), Err(FramesError::TimesInRange));
         let nan = Frames::at(vec![0.0, f64::NAN])
