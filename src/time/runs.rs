@@ -42,6 +42,24 @@ pub(crate) enum RunSource {
     Exact { index: u32, parameter: Parameter },
 }
 
+impl RunSource {
+    /// A constant, if it is not [`NONE`].
+    #[inline]
+    pub(crate) fn held(constant: u32) -> Option<Self> {
+        (constant != NONE).then_some(Self::Constant(constant))
+    }
+
+    /// What gives samples outside the keys: a constant, or a curve whose parameter is seconds from
+    /// the outermost key; `None` if another part has them. In the unit of the timeline that key lies
+    /// at `start`, and a second is `length` long.
+    #[inline]
+    pub(crate) fn outside(constant: u32, index: u32, start: f64, length: f64) -> Option<Self> {
+        let parameter = Parameter { start, length };
+        let curve = (index != NONE).then_some(Self::Exact { index, parameter });
+        Self::held(constant).or(curve)
+    }
+}
+
 /// How a run's parameter follows from the distance to the segment's middle:
 /// `distance × scale + offset`.
 #[derive(Debug, Clone, Copy)]
@@ -88,20 +106,6 @@ pub(crate) struct Parameter {
 /// the vector width of the function that it is inlined into.
 pub(crate) trait Emit {
     fn run(&mut self, run: Run);
-
-    /// Takes samples with a constant. Most places that emit know that they have one; what evaluates
-    /// segments is not compiled for them.
-    #[inline(always)]
-    fn constant(&mut self, sample: usize, count: usize, constant: u32) {
-        self.run(Run::new(sample, count, RunSource::Constant(constant)));
-    }
-
-    /// Takes samples of a curve that is evaluated in f64, likewise.
-    #[inline(always)]
-    fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
-        let source = RunSource::Exact { index, parameter };
-        self.run(Run::new(sample, count, source));
-    }
 }
 
 impl Emit for Vec<Run> {
@@ -144,13 +148,9 @@ impl Spans {
     ) -> Result<(), FramesError> {
         let starts = &self.starts[part.spans.clone()];
         let begin = starts.first().copied().unwrap_or(part.end);
-        if clock.is_reversed() {
-            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
-            // never a copy.
-            let end = clock.boundary(part.end);
-            emit_constant(0, end.first as usize, samples, part.after, emit);
-        } else {
-            runs_before(part, begin, clock, samples, emit);
+        let [first, at_end, last] = part.runs_outside(begin, clock, samples);
+        if let Some(run) = first {
+            emit.run(run);
         }
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
         let mut block = IntervalBlock::new();
@@ -164,7 +164,7 @@ impl Spans {
                 };
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
                 if key != NONE && block.is_held[j] == 1 {
-                    emit.constant(first, 1, key);
+                    emit.run(Run::new(first, 1, RunSource::Constant(key)));
                     first += 1;
                     if first == last {
                         continue;
@@ -188,103 +188,61 @@ impl Spans {
                         let source = RunSource::Segment(index, distance, block.affine(j));
                         emit.run(Run::new(first, count, source));
                     }
-                    Source::Constant(constant) => emit.constant(first, count, constant),
+                    Source::Constant(constant) => {
+                        emit.run(Run::new(first, count, RunSource::Constant(constant)));
+                    }
                     Source::Exact(index) => {
-                        emit.exact(first, count, index, block.parameter(j, clock));
+                        let parameter = block.parameter(j, clock);
+                        let source = RunSource::Exact { index, parameter };
+                        emit.run(Run::new(first, count, source));
                     }
                 }
             }
         }
-        if clock.is_reversed() {
-            let end = clock.boundary(begin);
-            emit_constant(end.first as usize, usize::MAX, samples, part.before, emit);
-        } else {
-            runs_after(part, clock, samples, emit);
+        for run in [at_end, last].into_iter().flatten() {
+            emit.run(run);
         }
         Ok(())
     }
 }
 
-/// Emits the runs before the first key, if the part is the track's first.
-#[inline(always)]
-pub(crate) fn runs_before(
-    part: &Part,
-    begin: f64,
-    clock: FrameClock,
-    samples: &Range<usize>,
-    emit: &mut impl Emit,
-) {
-    let [_, from_before, _] = part.at_ends();
-    if [part.before, from_before] == [NONE; 2] {
-        return;
-    }
-    let begin = clock.boundary(begin);
-    let first = begin.first as usize;
-    emit_constant(0, first, samples, part.before, emit);
-    if from_before != NONE {
-        extrapolate(0..first, samples, from_before, clock, begin.frame, emit);
-    }
-}
-
-/// Emits the runs from the last key on, if the part is the track's last.
-#[inline(always)]
-pub(crate) fn runs_after(
-    part: &Part,
-    clock: FrameClock,
-    samples: &Range<usize>,
-    emit: &mut impl Emit,
-) {
-    let [at_end, _, from_after] = part.at_ends();
-    if [part.after, at_end, from_after] == [NONE; 3] {
-        return;
-    }
-    let end = clock.boundary(part.end);
-    let mut first = end.first as usize;
-    if at_end != NONE && first as f64 == end.frame {
-        emit_constant(first, first + 1, samples, at_end, emit);
-        first += 1;
-    }
-    emit_constant(first, usize::MAX, samples, part.after, emit);
-    if from_after != NONE {
-        let after = first..usize::MAX;
-        extrapolate(after, samples, from_after, clock, end.frame, emit);
-    }
-}
-
-/// Emits the requested samples among `outside`, on the extrapolating curve `index`, whose parameter
-/// is seconds from the frame coordinate `end`.
-#[inline(never)]
-fn extrapolate(
-    outside: Range<usize>,
-    samples: &Range<usize>,
-    index: u32,
-    clock: FrameClock,
-    end: f64,
-    emit: &mut impl Emit,
-) {
-    let (first, last) = (
-        outside.start.max(samples.start),
-        outside.end.min(samples.end),
-    );
-    if first < last {
-        let (start, length) = (end, clock.rate());
-        let parameter = Parameter { start, length };
-        emit.exact(first, last - first, index, parameter);
-    }
-}
-
-/// Emits the requested samples from `from` to `to` with a constant; nothing if it is [`NONE`].
-#[inline(always)]
-fn emit_constant(
-    from: usize,
-    to: usize,
-    samples: &Range<usize>,
-    constant: u32,
-    emit: &mut impl Emit,
-) {
-    let (sample, to) = (from.max(samples.start), to.min(samples.end));
-    if sample < to && constant != NONE {
-        emit.constant(sample, to - sample, constant);
+impl Part {
+    /// The runs outside its keys, those of the requested samples that it has: before the first key,
+    /// at exactly the last one, and from there on. `begin` is when its first span starts, in seconds.
+    pub(crate) fn runs_outside(
+        &self,
+        begin: f64,
+        clock: FrameClock,
+        samples: &Range<usize>,
+    ) -> [Option<Run>; 3] {
+        let [at_end, from_before, from_after] = self.at_ends();
+        let (begin, end) = (clock.boundary(begin), clock.boundary(self.end));
+        let (from, to) = (begin.first as usize, end.first as usize);
+        let run = |outside: Range<usize>, source: Option<RunSource>| {
+            let (first, last) = (
+                outside.start.max(samples.start),
+                outside.end.min(samples.end),
+            );
+            source
+                .filter(|_| first < last)
+                .map(|source| Run::new(first, last - first, source))
+        };
+        if clock.is_reversed() {
+            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
+            // never a copy.
+            let (first, last) = (RunSource::held(self.after), RunSource::held(self.before));
+            return [run(0..to, first), None, run(from..usize::MAX, last)];
+        }
+        let is_key = at_end != NONE && to as f64 == end.frame;
+        let after = to.saturating_add(usize::from(is_key));
+        let second = clock.rate();
+        let first = RunSource::outside(self.before, from_before, begin.frame, second);
+        let last = RunSource::outside(self.after, from_after, end.frame, second);
+        [
+            run(0..from, first),
+            run(to..after, RunSource::held(at_end)),
+            run(after..usize::MAX, last),
+        ]
     }
 }
 

@@ -98,24 +98,13 @@ impl Spans {
 fn outside(part: &Part, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
     let [at_end, from_before, from_after] = part.at_ends();
     if time < begin {
-        let source = source_beyond(part.before, from_before, begin);
+        let source = RunSource::outside(part.before, from_before, begin, 1.0);
         (f64::NEG_INFINITY..begin, source)
     } else if time == part.end && at_end != NONE {
-        (time..time.next_up(), Some(RunSource::Constant(at_end)))
+        (time..time.next_up(), RunSource::held(at_end))
     } else {
-        let source = source_beyond(part.after, from_after, part.end);
+        let source = RunSource::outside(part.after, from_after, part.end, 1.0);
         (part.end..f64::INFINITY, source)
-    }
-}
-
-/// A constant, or a curve whose parameter is seconds from `end`; `None` if there is neither.
-fn source_beyond(constant: u32, index: u32, end: f64) -> Option<RunSource> {
-    let (start, length) = (end, 1.0);
-    let parameter = Parameter { start, length };
-    match (constant, index) {
-        (NONE, NONE) => None,
-        (NONE, index) => Some(RunSource::Exact { index, parameter }),
-        (constant, _) => Some(RunSource::Constant(constant)),
     }
 }
 
