@@ -285,10 +285,10 @@ impl Engine {
 
 /// Refuses memory of a type that does not hold what is asked for.
 pub(crate) fn check_rows<R: Row>(quantity: Quantity) -> Result<(), Error> {
-    match (R::holds(quantity), quantity) {
-        (true, _) => Ok(()),
-        (false, Quantity::Rotation) => Err(Error::NotRates),
-        (false, _) => Err(Error::NotRotations),
+    match quantity == Quantity::Rotation {
+        true if !R::HOLDS_ROTATIONS => Err(Error::NotRates),
+        false if !R::HOLDS_RATES => Err(Error::NotRotations),
+        _ => Ok(()),
     }
 }
 
