@@ -7,6 +7,7 @@ use glam::Quat;
 use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
+use crate::method::slerp::SLERP;
 use crate::output::rotations::Layout;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
@@ -15,49 +16,29 @@ use crate::tracks::set::TrackSet;
 /// ms; see [`Engine::auto`].
 const FEW_FOR_A_DEVICE: usize = 1 << 20;
 
-/// A workload that measures how fast a device is.
-struct Probe {
-    set: TrackSet,
-    frames: Frames,
-    rotations: usize,
+const PROBE_TRACKS: usize = 512;
+const PROBE_FRAMES: usize = 1024;
+
+/// A workload that measures how fast a device is: 2^19 rotations.
+fn probe() -> Result<TrackSet, Error> {
+    let last = (PROBE_FRAMES - 1) as f64;
+    let times = (0..18u8).map(|i| last * f64::from(i) / 17.0).collect();
+    let keys = (0..18u8).map(|i| Quat::from_rotation_y(f32::from(i) * 0.7));
+    let keys = keys.collect::<Vec<_>>().repeat(PROBE_TRACKS);
+    Ok(TrackSet::from_shared_times(times, keys)?)
 }
 
-impl Probe {
-    const TRACKS: usize = 512;
-    const FRAMES: usize = 1024;
-
-    fn new() -> Self {
-        let mut set = TrackSet::new();
-        let keys: Vec<Quat> = (0..18u8)
-            .map(|i| Quat::from_rotation_y(f32::from(i) * 0.7))
-            .collect();
-        let last = (Self::FRAMES - 1) as f64;
-        let times: Vec<f64> = (0..18u8).map(|i| last * f64::from(i) / 17.0).collect();
-        for _ in 0..Self::TRACKS {
-            set.push("", &times, &keys)
-                .expect("unit keys at increasing times");
-        }
-        Self {
-            set,
-            frames: Frames::fps(1),
-            rotations: Self::TRACKS * Self::FRAMES,
-        }
-    }
-
-    /// The shortest time of three evaluations, after one that does not count.
-    fn time(&self, engine: &Engine) -> Result<Duration, Error> {
-        let clip = engine.upload(&self.set, crate::method::slerp::SLERP)?;
-        let mut output = vec![Quat::IDENTITY; self.rotations];
-        let mut shortest = Duration::MAX;
-        for round in 0..4 {
-            let started = Instant::now();
-            clip.evaluate_into(&self.frames, Layout::TrackMajor, &mut output)?;
-            if round > 0 {
-                shortest = shortest.min(started.elapsed());
-            }
-        }
-        Ok(shortest)
-    }
+/// The shortest time of three evaluations of the probe, after one that does not count.
+fn shortest_time(engine: &Engine, probe: &TrackSet) -> Result<Duration, Error> {
+    let clip = engine.upload(probe, SLERP)?;
+    let mut output = vec![Quat::IDENTITY; PROBE_TRACKS * PROBE_FRAMES];
+    let mut time = || {
+        let started = Instant::now();
+        clip.evaluate_into(&Frames::fps(1), Layout::TrackMajor, &mut output)?;
+        Ok::<_, Error>(started.elapsed())
+    };
+    time()?;
+    Ok(time()?.min(time()?).min(time()?))
 }
 
 impl Engine {
@@ -102,11 +83,11 @@ impl Engine {
         if others.peek().is_none() {
             return Ok(cpu);
         }
-        let probe = Probe::new();
-        let mut best = (probe.time(&cpu)?, cpu);
+        let probe = probe()?;
+        let mut best = (shortest_time(&cpu, &probe)?, cpu);
         for engine in others {
             // One that fails is not chosen.
-            if let Ok(time) = probe.time(&engine)
+            if let Ok(time) = shortest_time(&engine, &probe)
                 && time < best.0
             {
                 best = (time, engine);
@@ -136,6 +117,7 @@ mod tests {
     #[test]
     fn the_probe_can_be_evaluated() {
         let cpu = Engine::new(Device::Cpu).unwrap();
-        assert!(Probe::new().time(&cpu).unwrap() > Duration::ZERO);
+        let time = shortest_time(&cpu, &probe().unwrap()).unwrap();
+        assert!(time > Duration::ZERO);
     }
 }

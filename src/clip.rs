@@ -1,6 +1,6 @@
 //! A clip: a set prepared for one method, on a device, ready for any frames.
 
-use glam::Quat;
+use glam::{Quat, Vec4};
 
 use crate::curve::options::Quantity;
 use crate::engine::{Engine, check_rows, in_quats};
@@ -60,7 +60,7 @@ impl Clip {
     /// # Errors
     /// As [`Clip::evaluate`].
     pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
-        check_rows::<Quat>(self.uploaded.data.interpolation.quantity)?;
+        check_rows::<Quat>(self.quantity())?;
         self.samples(frames, layout)
     }
 
@@ -70,10 +70,12 @@ impl Clip {
     /// # Errors
     /// As [`Clip::evaluate`]; also when the clip is of rotations.
     pub fn rates(&self, frames: &Frames, layout: Layout) -> Result<Vectors, Error> {
-        if self.uploaded.data.interpolation.quantity == Quantity::Rotation {
-            return Err(Error::NotRates);
-        }
+        check_rows::<Vec4>(self.quantity())?;
         self.samples(frames, layout)
+    }
+
+    pub(crate) fn quantity(&self) -> Quantity {
+        self.uploaded.data.interpolation.quantity
     }
 
     /// The stored values, whatever they are.
@@ -85,7 +87,7 @@ impl Clip {
     }
 
     /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory: [`Quat`] takes
-    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
+    /// rotations, [`Vec4`] velocities and accelerations, `[f32; 4]` either. It is faster
     /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
     /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
     /// without a copy.
@@ -99,47 +101,34 @@ impl Clip {
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        check_rows::<R>(self.uploaded.data.interpolation.quantity)?;
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let (given, needed) = (output.len(), whole.len());
-        if given != needed {
-            return Err(Error::OutputLength { given, needed });
-        }
-        let timeline = self.uploaded.data.folded(&timeline)?;
-        in_quats(output, |quats| {
-            self.evaluate_window_into(&timeline, &whole, quats)
+        in_quats(output, self.quantity(), whole.len(), |quats| {
+            let timeline = self.uploaded.data.folded(&timeline)?;
+            Ok((self.uploaded).evaluate_window(&self.engine.backend, &timeline, &whole, quats)?)
         })
     }
 
-    /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
-    /// must be folded into the keys already, as the wrap mode has it.
-    pub(crate) fn evaluate_window_into(
-        &self,
-        timeline: &Timeline,
-        window: &Window,
-        output: &mut [Quat],
-    ) -> Result<(), Error> {
-        let backend = &self.engine.backend;
-        (self.uploaded).evaluate_window(backend, timeline, window, output)?;
-        Ok(())
-    }
-
-    fn evaluate_bytes_into(
+    /// Evaluates a window of the result into `output`, encoded, if both fit the result.
+    pub(crate) fn encode_window_into(
         &self,
         timeline: &Timeline,
         window: &Window,
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), Error> {
-        self.check_encoding(encoding)?;
-        let backend = &self.engine.backend;
-        (self.uploaded).evaluate_encoded(backend, timeline, window, encoding, output)?;
-        Ok(())
-    }
-
-    pub(crate) fn check_encoding(&self, encoding: Encoding) -> Result<(), Error> {
-        encoding.check(self.uploaded.data.interpolation.quantity)
+        encoding.check(self.quantity())?;
+        window.check(self.track_count(), timeline.len(), encoding, output)?;
+        if output.is_empty() {
+            return Ok(());
+        }
+        let (backend, timeline) = (&self.engine.backend, self.uploaded.data.folded(timeline)?);
+        if encoding == Encoding::F32
+            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
+        {
+            return Ok((self.uploaded).evaluate_window(backend, &timeline, window, quats)?);
+        }
+        Ok((self.uploaded).evaluate_encoded(backend, &timeline, window, encoding, output)?)
     }
 
     /// The rotation of every track at every sample, encoded where it is evaluated. The bytes are
@@ -158,8 +147,7 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let bytes = whole.len().saturating_mul(encoding.bytes());
         let mut output = zeroed(bytes, "a result")?;
-        let timeline = self.uploaded.data.folded(&timeline)?;
-        self.evaluate_bytes_into(&timeline, &whole, encoding, &mut output)?;
+        self.encode_window_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
     }
 
@@ -176,13 +164,7 @@ impl Clip {
     ) -> Result<(), Error> {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let needed = whole.len().saturating_mul(encoding.bytes());
-        let given = output.len();
-        if given != needed {
-            return Err(Error::OutputBytes { given, needed });
-        }
-        let timeline = self.uploaded.data.folded(&timeline)?;
-        self.evaluate_bytes_into(&timeline, &whole, encoding, output)
+        self.encode_window_into(&timeline, &whole, encoding, output)
     }
 }
 

@@ -46,43 +46,39 @@ impl Device {
     /// # Errors
     /// Also when the layer is not installed.
     pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
+        let vulkan = |physical| {
+            let physical = Box::new(physical);
+            Self::Vulkan(VulkanDevice { physical })
+        };
         let devices = gpu::physical::list(validation)?;
-        Ok(devices
-            .into_iter()
-            .map(|physical| {
-                Self::Vulkan(VulkanDevice {
-                    physical: Box::new(physical),
-                })
-            })
-            .collect())
+        Ok(devices.into_iter().map(vulkan).collect())
+    }
+
+    /// What is known of a Vulkan device; `None` for the CPU.
+    fn info(&self) -> Option<&DeviceInfo> {
+        match self {
+            Self::Cpu => None,
+            Self::Vulkan(device) => Some(device.info()),
+        }
     }
 
     /// Whether it is a Vulkan driver that computes on the CPU (Mesa's lavapipe).
     #[must_use]
     pub fn is_software(&self) -> bool {
-        match self {
-            Self::Cpu => false,
-            Self::Vulkan(device) => device.info().kind == DeviceKind::Cpu,
-        }
+        (self.info()).is_some_and(|info| info.kind == DeviceKind::Cpu)
     }
 
     /// Vulkan's `deviceUUID`, as 32 hexadecimal digits with dashes: the same in every process on the
     /// machine, and for NVIDIA's cards the one that NVML tells. Nothing for the CPU.
     #[must_use]
     pub fn uuid(&self) -> Option<String> {
-        match self {
-            Self::Cpu => None,
-            Self::Vulkan(device) => Some(device.info().uuid.clone()),
-        }
+        self.info().map(|info| info.uuid.clone())
     }
 
     /// Its name: the driver's, or `CPU`.
     #[must_use]
     pub fn name(&self) -> &str {
-        match self {
-            Self::Cpu => "CPU",
-            Self::Vulkan(device) => &device.info().name,
-        }
+        self.info().map_or("CPU", |info| &info.name)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Quat;
+use glam::{Quat, Vec4};
 
 use crate::clip::Clip;
 use crate::cpu::engine::CpuEngine;
@@ -219,9 +219,7 @@ impl Engine {
         frames: &Frames,
         layout: Layout,
     ) -> Result<Vectors, Error> {
-        if interpolation.quantity == Quantity::Rotation {
-            return Err(Error::NotRates);
-        }
+        check_rows::<Vec4>(interpolation.quantity)?;
         self.samples(set, interpolation, frames, layout)
     }
 
@@ -240,7 +238,7 @@ impl Engine {
     }
 
     /// As [`Engine::evaluate_as`], or as [`Engine::rates`], into the caller's memory: [`Quat`] takes
-    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
+    /// rotations, [`Vec4`] velocities and accelerations, `[f32; 4]` either. It is faster
     /// when it is used again ([`OutputBuffer`]): the first touch
     /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
     /// without a copy.
@@ -257,16 +255,10 @@ impl Engine {
         output: &mut [R],
     ) -> Result<(), Error> {
         let interpolation = interpolation.into();
-        check_rows::<R>(interpolation.quantity)?;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let tracks = set.track_count();
-        let needed = tracks * timeline.len(); // which `resolve` found to fit
-        if output.len() != needed {
-            let given = output.len();
-            return Err(Error::OutputLength { given, needed });
-        }
         let request = Request::whole(set, &interpolation, &timeline);
-        in_quats(output, |quats| {
+        let needed = set.track_count() * timeline.len(); // which `resolve` found to fit
+        in_quats(output, interpolation.quantity, needed, |quats| {
             Ok((self.backend).evaluate_tracks(&request, layout, quats)?)
         })
     }
@@ -293,19 +285,26 @@ impl Engine {
 
 /// Refuses memory of a type that does not hold what is asked for.
 pub(crate) fn check_rows<R: Row>(quantity: Quantity) -> Result<(), Error> {
-    match (R::holds(quantity), quantity) {
-        (true, _) => Ok(()),
-        (false, Quantity::Rotation) => Err(Error::NotRates),
-        (false, _) => Err(Error::NotRotations),
+    match quantity == Quantity::Rotation {
+        true if !R::HOLDS_ROTATIONS => Err(Error::NotRates),
+        false if !R::HOLDS_RATES => Err(Error::NotRotations),
+        _ => Ok(()),
     }
 }
 
-/// Fills the caller's memory as quaternions. Where it is not aligned as they are, memory that is gets
-/// the result first.
+/// Fills the caller's memory as quaternions, if it is of the result's type and length. Where it is
+/// not aligned as they are, memory that is gets the result first.
 pub(crate) fn in_quats<R: Row>(
     output: &mut [R],
+    quantity: Quantity,
+    needed: usize,
     fill: impl FnOnce(&mut [Quat]) -> Result<(), Error>,
 ) -> Result<(), Error> {
+    check_rows::<R>(quantity)?;
+    let given = output.len();
+    if given != needed {
+        return Err(Error::OutputLength { given, needed });
+    }
     if let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output) {
         return fill(quats);
     }

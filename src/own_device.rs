@@ -60,7 +60,7 @@ impl Clip {
         let Backend::Vulkan(opened) = &*self.engine().backend else {
             return Err(Error::BufferOnCpu);
         };
-        self.check_encoding(encoding)?;
+        encoding.check(self.quantity())?;
         let timeline = self.timeline(frames)?;
         let timeline = self.uploaded.data.folded(&timeline)?;
         let rotation = encoding.bytes() as u64;

@@ -11,7 +11,6 @@ use crate::clip::Clip;
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
@@ -107,10 +106,14 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let timeline = self.uploaded.data.folded(&timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
-            self.evaluate_window_into(&timeline, window, output)
+            Ok((self.uploaded).evaluate_window(
+                &self.engine().backend,
+                &timeline,
+                window,
+                output,
+            )?)
         };
-        let quantity = self.uploaded.data.interpolation.quantity;
-        run(whole.cut(chunk), quantity, fill, sink)
+        run(whole.cut(chunk), self.quantity(), fill, sink)
     }
 }
 
@@ -218,11 +221,9 @@ impl Engine {
             only_for: Some(&timeline),
             ..Wanted::all(set)
         };
-        let uploaded = Uploaded::new(&self.backend, set, interpolation, wanted, None)?;
+        let clip = self.upload_wanted(set, interpolation, wanted)?;
         let whole = Window::whole(tracks.len(), timeline.len(), Layout::TrackMajor);
-        let timeline = uploaded.data.folded(&timeline)?;
-        uploaded.evaluate_encoded(&self.backend, &timeline, &whole, encoding, output)?;
-        Ok(())
+        clip.encode_window_into(&timeline, &whole, encoding, output)
     }
 }
 
@@ -241,7 +242,6 @@ impl Clip {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), Error> {
-        self.check_encoding(encoding)?;
         let timeline = self.timeline(frames)?;
         let part = Window {
             start: 0,
@@ -249,25 +249,13 @@ impl Clip {
             samples,
             layout,
         };
-        part.check(self.track_count(), timeline.len(), encoding, output)?;
-        if output.is_empty() {
-            return Ok(());
-        }
-        let timeline = self.uploaded.data.folded(&timeline)?;
-        if encoding == Encoding::F32
-            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
-        {
-            return self.evaluate_window_into(&timeline, &part, quats);
-        }
-        let backend = &self.engine().backend;
-        (self.uploaded).evaluate_encoded(backend, &timeline, &part, encoding, output)?;
-        Ok(())
+        self.encode_window_into(&timeline, &part, encoding, output)
     }
 }
 
 impl Window {
     /// Refuses a window that a result has not, and memory of another size than the window's.
-    fn check(
+    pub(crate) fn check(
         &self,
         tracks: usize,
         samples: usize,
@@ -331,21 +319,21 @@ fn fill_all(
     empty: &Receiver<OutputBuffer>,
     hand_over: &SyncSender<Filled>,
 ) {
+    let fill_one = |window: Window, used: OutputBuffer| -> Filled {
+        let mut rotations = match used.len() < window.len() {
+            true => OutputBuffer::new(window.len())?,
+            false => used,
+        };
+        fill(&window, &mut rotations[..window.len()])?;
+        Ok((window, rotations))
+    };
     for window in windows {
         let Ok(used) = empty.recv() else {
             return;
         };
-        let large_enough = match used.len() < window.len() {
-            true => OutputBuffer::new(window.len()),
-            false => Ok(used),
-        };
-        let result = large_enough.map_err(Error::from).and_then(|mut rotations| {
-            fill(&window, &mut rotations[..window.len()])?;
-            Ok((window, rotations))
-        });
-        let failed = result.is_err();
-        let taken = hand_over.send(result);
-        if failed || taken.is_err() {
+        let filled = fill_one(window, used);
+        let failed = filled.is_err();
+        if hand_over.send(filled).is_err() || failed {
             return;
         }
     }

@@ -10,7 +10,7 @@ use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
-use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource, runs_after, runs_before};
+use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::TrackCopy;
 use crate::twin::evaluate::Evaluate;
@@ -49,14 +49,12 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_own()) {
             let clock = FrameClock::new(rate, start, part.end);
             if self.spans::<L, O>(clock, output) {
-                let mut outside = OneByOne {
-                    row: self,
-                    output: output.samples(),
-                };
                 let starts = &prepared.spans.starts[part.spans.clone()];
                 let begin = starts.first().copied().unwrap_or(part.end);
-                runs_before(part, begin, clock, &self.copy.samples, &mut outside);
-                runs_after(part, clock, &self.copy.samples, &mut outside);
+                let runs = part.runs_outside(begin, clock, &self.copy.samples);
+                for run in runs.into_iter().flatten() {
+                    self.outside(&run, output.samples());
+                }
                 return Ok(());
             }
         }
@@ -105,7 +103,7 @@ impl<S: Evaluate> Row<'_, S> {
                         output.made(start..start + count);
                     }
                     Source::Exact(index) => {
-                        let parameter = block.parameter::<FrameClock>(j);
+                        let parameter = block.parameter(j, clock);
                         let own = &mut output.samples()[start..][..count];
                         self.exact(last - count, index, parameter, own);
                         output.made(start..start + count);
@@ -160,23 +158,10 @@ struct OneByOne<'a, 'r, S> {
 }
 
 impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
-    #[inline(always)]
+    // Not inlined, because runs come from many places.
+    #[inline(never)]
     fn run(&mut self, run: Run) {
         self.row.evaluate_run::<Vec4>(&run, self.output);
-    }
-
-    #[inline(always)]
-    fn constant(&mut self, sample: usize, count: usize, constant: u32) {
-        let constant = self.row.part.prepared.constants[constant as usize];
-        self.row
-            .samples_of(sample, count, self.output)
-            .fill(constant);
-    }
-
-    #[inline(always)]
-    fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
-        let output = self.row.samples_of(sample, count, self.output);
-        self.row.exact(sample, index, parameter, output);
     }
 }
 
@@ -218,6 +203,19 @@ impl<S: Evaluate> Row<'_, S> {
         output: &'o mut [[f32; 4]],
     ) -> &'o mut [[f32; 4]] {
         &mut output[sample - self.copy.samples.start..][..count]
+    }
+
+    /// Stores a run outside the keys; `output` starts at the first sample of the track copy.
+    #[inline(never)]
+    fn outside(&self, run: &Run, output: &mut [[f32; 4]]) {
+        let output = self.samples_of(run.sample, run.count, output);
+        match run.source {
+            RunSource::Constant(index) => output.fill(self.part.prepared.constants[index as usize]),
+            RunSource::Exact { index, parameter } => {
+                self.exact(run.sample, index, parameter, output);
+            }
+            RunSource::Segment(..) => {} // lies between keys
+        }
     }
 
     /// Evaluates samples from `first` on in f64.

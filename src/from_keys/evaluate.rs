@@ -16,7 +16,7 @@ use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
-use crate::time::times::TimePlan;
+use crate::time::times::key_sample;
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 use crate::tracks::track_keys::TrackKeys;
@@ -26,7 +26,6 @@ pub(crate) struct KeyEvaluator<'a> {
     interpolation: &'a Interpolation,
     block: Block<'a>,
     plan: FramePlan<'a>,
-    time_plan: TimePlan,
 }
 
 enum Block<'a> {
@@ -48,7 +47,6 @@ impl<'a> KeyEvaluator<'a> {
             interpolation,
             block,
             plan: FramePlan::new(),
-            time_plan: TimePlan::new(),
         }
     }
 
@@ -130,9 +128,9 @@ impl<'a> KeyEvaluator<'a> {
     }
 
     fn times(&mut self, keys: TrackKeys<'a>, times: &[f64], output: &mut Output<'_>) {
-        let (mut near, plan) = (0, &mut self.time_plan);
+        let mut near = 0;
         let mut next = |time: f64| {
-            let sample = plan.sample(keys.times, time, near);
+            let sample = key_sample(keys.times, time, near);
             near = (sample.key & !IS_KEY) as usize;
             sample
         };

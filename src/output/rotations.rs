@@ -160,8 +160,7 @@ impl<T> Samples<T> {
 
     /// Where the value of one track at one sample lies; `None` out of range.
     fn place(&self, track: usize, sample: usize) -> Option<usize> {
-        let inside = track < self.tracks && sample < self.samples;
-        inside.then(|| (self.layout).place(track, sample, self.tracks, self.samples))
+        (self.layout).index(track, sample, self.tracks, self.samples)
     }
 }
 

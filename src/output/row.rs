@@ -2,39 +2,23 @@
 
 use glam::{Quat, Vec4};
 
-use crate::curve::options::Quantity;
+use crate::tracks::rotation::sealed::Sealed;
 
 /// A value of a result in the caller's memory, 16 bytes: [`Quat`] holds rotations, [`Vec4`] velocities
 /// and accelerations (`x y z 0`), `[f32; 4]` either.
-pub trait Row: bytemuck::Pod + Send + Sync + sealed::Sealed {
-    /// Whether it may hold such values.
+pub trait Row: bytemuck::Pod + Send + Sync + Sealed {
     #[doc(hidden)]
-    fn holds(quantity: Quantity) -> bool;
+    const HOLDS_ROTATIONS: bool = true;
+    #[doc(hidden)]
+    const HOLDS_RATES: bool = true;
 }
 
 impl Row for Quat {
-    fn holds(quantity: Quantity) -> bool {
-        quantity == Quantity::Rotation
-    }
+    const HOLDS_RATES: bool = false;
 }
 
 impl Row for Vec4 {
-    fn holds(quantity: Quantity) -> bool {
-        quantity != Quantity::Rotation
-    }
+    const HOLDS_ROTATIONS: bool = false;
 }
 
-impl Row for [f32; 4] {
-    fn holds(_: Quantity) -> bool {
-        true
-    }
-}
-
-mod sealed {
-    /// Types whose layout this crate knows.
-    pub trait Sealed {}
-
-    impl Sealed for glam::Quat {}
-    impl Sealed for glam::Vec4 {}
-    impl Sealed for [f32; 4] {}
-}
+impl Row for [f32; 4] {}

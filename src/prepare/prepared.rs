@@ -6,7 +6,7 @@ use crate::curve::segment::Segments;
 use crate::fit::double::curve::Curve;
 use crate::math::canonical::round_quat;
 use crate::method::interpolation::Interpolation;
-use crate::time::frames::Timeline;
+use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::Parameter;
 use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
 use crate::time::wrap::{TrackCopy, Wrap};
@@ -104,14 +104,12 @@ impl Prepared {
         track: usize,
         sample: usize,
     ) -> [f32; 4] {
-        let t = match parameter {
-            Parameter::Frames { start, frames } => (sample as f64 - start) / frames,
-            Parameter::Seconds { start, seconds } => {
-                // At times beyond those allowed for keys, a curve's powers would overflow.
-                let time = timeline.time_at(track, sample).clamp(-LATEST, LATEST);
-                (time - start) / seconds
-            }
+        let at = match &timeline.ticks {
+            Ticks::Frames { .. } => sample as f64,
+            // At times beyond those allowed for keys, a curve's powers would overflow.
+            Ticks::Times { .. } => timeline.time_at(track, sample).clamp(-LATEST, LATEST),
         };
+        let t = (at - parameter.start) / parameter.length;
         round_quat(self.exact[index as usize].value(t))
     }
 

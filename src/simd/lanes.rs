@@ -85,21 +85,6 @@ pub(crate) trait Lanes: Number + Pod {
     /// The same for rotations that lie at the first [`Lanes::COUNT`] of the `places`.
     fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
 
-    /// The inner products of the first [`Lanes::COUNT`] pairs of rotations.
-    #[inline(always)]
-    fn inner(from: &[[f32; 4]], to: &[[f32; 4]]) -> Self {
-        let (from, to) = (&from[..Self::COUNT], &to[..Self::COUNT]);
-        let each = Self::COUNT / 4;
-        // Multiplied before the transposition, so that only the products are transposed.
-        let [x, y, z, w] = Self::transposed([
-            Self::load_side_by_side(from) * Self::load_side_by_side(to),
-            Self::load_side_by_side(&from[each..]) * Self::load_side_by_side(&to[each..]),
-            Self::load_side_by_side(&from[2 * each..]) * Self::load_side_by_side(&to[2 * each..]),
-            Self::load_side_by_side(&from[3 * each..]) * Self::load_side_by_side(&to[3 * each..]),
-        ]);
-        x + y + z + w
-    }
-
     /// Loads the first of some rotations, a quarter of [`Lanes::COUNT`]: `x y z w x y z w …`.
     #[inline(always)]
     fn load_side_by_side(rotations: &[[f32; 4]]) -> Self {
@@ -338,17 +323,6 @@ mod tests {
         L::store_rotations(gathered, &mut again);
         again.reverse();
         assert_eq!(bits(again.as_flattened()), bits(found.as_flattened()));
-        let (numbers, ones) = (
-            vec![[1.0, 20.0, 300.0, 4000.0]; L::COUNT],
-            vec![[1.0; 4]; L::COUNT],
-        );
-        for k in 0..L::COUNT {
-            let mut from = numbers.clone();
-            from[k][0] = -4321.0;
-            assert!(L::inner(&from, &ones).any_at_most(-1.0));
-            assert!(L::inner(&ones, &from).any_at_most(-1.0));
-        }
-        assert!(!L::inner(&numbers, &ones).any_at_most(4320.0));
         for c in 0..4 {
             let mut stored = vec![9.0; L::COUNT];
             loaded[c].store(&mut stored);

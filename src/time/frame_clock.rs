@@ -36,11 +36,15 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
     round_f32(if scale < largest { scale } else { largest })
 }
 
-/// Converts key times to frame coordinates, in f64 and by an exact frame rate.
+/// Converts the key times of a track, or of one of its copies, to frame coordinates, in f64 and by an
+/// exact frame rate.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct FrameClock {
     rate: FrameRate,
     start: f64,
+    /// As in [`TrackCopy`]; 1 and 0 for the track itself.
+    sign: f64,
+    offset: f64,
     /// How far the rounding of a time to f64 may move a key, in frames.
     rounding: f64,
 }
@@ -61,15 +65,43 @@ impl FrameClock {
         Self {
             rate,
             start,
+            sign: 1.0,
+            offset: 0.0,
             rounding,
         }
+    }
+
+    /// The same in a copy of the track.
+    #[inline]
+    pub(crate) fn in_copy(self, copy: &TrackCopy) -> Self {
+        Self {
+            sign: copy.sign,
+            offset: copy.offset,
+            rounding: self.rounding + 4.0 * f64::EPSILON * copy.offset.abs(),
+            ..self
+        }
+    }
+
+    /// Whether frames run against the track's own time: intervals are met from the last to the
+    /// first, and the parameter falls.
+    #[inline]
+    pub(crate) fn is_reversed(self) -> bool {
+        self.sign < 0.0
     }
 
     /// A time that is within its rounding of a whole frame counts as that frame, so that a sample
     /// on a key returns the key even at hour 24.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
-        settled(self.rate.frames_in(time - self.start), self.rounding)
+        let exact = self.rate.frames_in(time - self.start) * self.sign + self.offset;
+        let whole = nearest_whole(exact);
+        let frame = if (exact - whole).abs() <= self.rounding {
+            whole
+        } else {
+            exact
+        };
+        let first = if whole < frame { whole + 1.0 } else { whole };
+        Boundary { frame, first }
     }
 
     /// The first frame not before a time.
@@ -79,86 +111,15 @@ impl FrameClock {
         if first > 0.0 { first } else { 0.0 }
     }
 
-    fn time(self, frame: usize) -> f64 {
-        self.start + self.rate.time_of(frame as u64)
-    }
-}
-
-/// The boundary at a frame coordinate, moved to a whole frame that is within `rounding` of it.
-#[inline(always)]
-fn settled(exact: f64, rounding: f64) -> Boundary {
-    let whole = nearest_whole(exact);
-    let frame = if (exact - whole).abs() <= rounding {
-        whole
-    } else {
-        exact
-    };
-    let first = if whole < frame { whole + 1.0 } else { whole };
-    Boundary { frame, first }
-}
-
-/// Converts the times of a track, or of a track copy, to frame coordinates.
-pub(crate) trait Clock: Copy {
-    /// Whether frames run against the track's own time: intervals are met from the last to the
-    /// first, and the parameter falls.
-    const IS_REVERSED: bool = false;
-
-    /// Where a time of the track lies among the frames.
-    fn boundary(self, time: f64) -> Boundary;
-
-    /// The track's time at a frame; `None` in a track copy.
-    fn own_time(self, frame: usize) -> Option<f64>;
-
-    /// Frames per second.
-    fn rate(self) -> f64;
-}
-
-impl Clock for FrameClock {
-    #[inline(always)]
-    fn boundary(self, time: f64) -> Boundary {
-        Self::boundary(self, time)
+    /// The track's time at a frame; `None` in a copy.
+    #[inline]
+    pub(crate) fn own_time(self, frame: usize) -> Option<f64> {
+        let is_own = self.sign == 1.0 && self.offset == 0.0;
+        is_own.then(|| self.start + self.rate.time_of(frame as u64))
     }
 
-    #[inline(always)]
-    fn own_time(self, frame: usize) -> Option<f64> {
-        Some(self.time(frame))
-    }
-
-    #[inline(always)]
-    fn rate(self) -> f64 {
+    /// Frames per second, as f64 has it.
+    pub(crate) fn rate(self) -> f64 {
         self.rate.frames_in(1.0)
-    }
-}
-
-/// The clock of a track copy that runs forwards or, if `IS_REVERSED`, backwards.
-#[derive(Clone, Copy)]
-pub(crate) struct CopyClock<const IS_REVERSED: bool> {
-    own: FrameClock,
-    offset: f64,
-}
-
-impl<const IS_REVERSED: bool> CopyClock<IS_REVERSED> {
-    pub(crate) fn new(own: FrameClock, copy: &TrackCopy) -> Self {
-        let offset = copy.offset;
-        Self { own, offset }
-    }
-}
-
-impl<const IS_REVERSED: bool> Clock for CopyClock<IS_REVERSED> {
-    const IS_REVERSED: bool = IS_REVERSED;
-
-    fn boundary(self, time: f64) -> Boundary {
-        let own = self.own.rate.frames_in(time - self.own.start);
-        let rounding = self.own.rounding + 4.0 * f64::EPSILON * self.offset.abs();
-        let along = if IS_REVERSED { -own } else { own };
-        settled(along + self.offset, rounding)
-    }
-
-    fn own_time(self, _: usize) -> Option<f64> {
-        None
-    }
-
-    fn rate(self) -> f64 {
-        Clock::rate(self.own)
     }
 }

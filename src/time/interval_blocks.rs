@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::math::canonical::whole_number;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::time::frame_clock::{Clock, in_frames};
+use crate::time::frame_clock::{FrameClock, in_frames};
 use crate::time::runs::{Affine, COUNTABLE, Parameter};
 
 /// The frame coordinates of consecutive intervals, and the constants from which the parameters of
@@ -50,13 +50,13 @@ impl IntervalBlock {
 
     /// Where the `j`th interval starts and how long it is, for a curve evaluated in f64. The length
     /// is negative if frames run backwards.
-    pub(crate) fn parameter<C: Clock>(&self, j: usize) -> Parameter {
+    pub(crate) fn parameter(&self, j: usize, clock: FrameClock) -> Parameter {
         let (mut start, mut end) = (self.frame[j], self.frame[j + 1]);
-        if C::IS_REVERSED {
+        if clock.is_reversed() {
             (start, end) = (end, start);
         }
-        let frames = end - start;
-        Parameter::Frames { start, frames }
+        let length = end - start;
+        Parameter { start, length }
     }
 
     /// How the parameters in the `j`th interval follow from distances.
@@ -99,8 +99,8 @@ impl Iterator for Occupied {
 }
 
 /// Consecutive intervals, a block at a time.
-pub(crate) struct IntervalBlocks<'a, C> {
-    clock: C,
+pub(crate) struct IntervalBlocks<'a> {
+    clock: FrameClock,
     starts: &'a [f64],
     /// Where the last interval ends.
     end: f64,
@@ -110,8 +110,14 @@ pub(crate) struct IntervalBlocks<'a, C> {
     done: usize,
 }
 
-impl<'a, C: Clock> IntervalBlocks<'a, C> {
-    pub(crate) fn new(starts: &'a [f64], end: f64, clock: C, samples: Range<usize>) -> Self {
+impl<'a> IntervalBlocks<'a> {
+    #[inline]
+    pub(crate) fn new(
+        starts: &'a [f64],
+        end: f64,
+        clock: FrameClock,
+        samples: Range<usize>,
+    ) -> Self {
         // Intervals before that of the first sample are skipped. The one before it is kept, because
         // rounding may put the sample there.
         let mut done = 0;
@@ -145,7 +151,7 @@ impl<'a, C: Clock> IntervalBlocks<'a, C> {
         let to = (from + IntervalBlock::LEN).min(count);
         self.done = to;
         let mut reversed = [0.0; IntervalBlock::LEN];
-        let (starts, next) = if C::IS_REVERSED {
+        let (starts, next) = if self.clock.is_reversed() {
             let times = (self.starts[count - to..].iter().copied().chain([self.end])).rev();
             let times = times.skip(from);
             for (place, time) in reversed[..to - from].iter_mut().zip(times) {
@@ -167,8 +173,8 @@ impl<'a, C: Clock> IntervalBlocks<'a, C> {
     }
 }
 
-struct Fill<'a, C> {
-    clock: C,
+struct Fill<'a> {
+    clock: FrameClock,
     /// At most [`IntervalBlock::LEN`].
     starts: &'a [f64],
     /// Where the last of them ends.
@@ -177,7 +183,7 @@ struct Fill<'a, C> {
     block: &'a mut IntervalBlock,
 }
 
-impl<C: Clock> InLanes for Fill<'_, C> {
+impl InLanes for Fill<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (clock, samples, starts) = (self.clock, self.samples, self.starts);
@@ -202,7 +208,7 @@ impl<C: Clock> InLanes for Fill<'_, C> {
         let distance = &mut block.distance[..count];
         let scale = &mut block.scale[..count];
         let offset = &mut block.offset[..count];
-        let extent = if C::IS_REVERSED { -1.0 } else { 1.0 };
+        let extent = if clock.is_reversed() { -1.0 } else { 1.0 };
         let mut far = 0;
         for j in 0..count {
             let span = in_frames(frame[j], next_frame[j], extent);
@@ -239,7 +245,6 @@ fn within(sample: f64, [start, end]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::frame_clock::FrameClock;
     use crate::time::frame_rate::FrameRate;
 
     /// Steps of one frame add up without rounding only while f32 exactly holds every distance, also

@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use crate::math::canonical::round_f32;
-use crate::time::frame_clock::{Clock, CopyClock, FrameClock};
+use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::time::spans::{NONE, Part, Source, Spans};
@@ -42,6 +42,24 @@ pub(crate) enum RunSource {
     Exact { index: u32, parameter: Parameter },
 }
 
+impl RunSource {
+    /// A constant, if it is not [`NONE`].
+    #[inline]
+    pub(crate) fn held(constant: u32) -> Option<Self> {
+        (constant != NONE).then_some(Self::Constant(constant))
+    }
+
+    /// What gives samples outside the keys: a constant, or a curve whose parameter is seconds from
+    /// the outermost key; `None` if another part has them. In the unit of the timeline that key lies
+    /// at `start`, and a second is `length` long.
+    #[inline]
+    pub(crate) fn outside(constant: u32, index: u32, start: f64, length: f64) -> Option<Self> {
+        let parameter = Parameter { start, length };
+        let curve = (index != NONE).then_some(Self::Exact { index, parameter });
+        Self::held(constant).or(curve)
+    }
+}
+
 /// How a run's parameter follows from the distance to the segment's middle:
 /// `distance × scale + offset`.
 #[derive(Debug, Clone, Copy)]
@@ -76,31 +94,18 @@ impl Distance {
     }
 }
 
-/// Where the interval of a cubic that is evaluated in f64 starts, and its length.
+/// Where the interval of a curve that is evaluated in f64 starts, and its length: in frames, or in
+/// seconds if samples have explicit times.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Parameter {
-    Frames { start: f64, frames: f64 },
-    Seconds { start: f64, seconds: f64 },
+pub(crate) struct Parameter {
+    pub(crate) start: f64,
+    pub(crate) length: f64,
 }
 
 /// Takes runs. A trait rather than a closure: a closure's body is not compiled for
 /// the vector width of the function that it is inlined into.
 pub(crate) trait Emit {
     fn run(&mut self, run: Run);
-
-    /// Takes samples with a constant. Most places that emit know that they have one; what evaluates
-    /// segments is not compiled for them.
-    #[inline(always)]
-    fn constant(&mut self, sample: usize, count: usize, constant: u32) {
-        self.run(Run::new(sample, count, RunSource::Constant(constant)));
-    }
-
-    /// Takes samples of a curve that is evaluated in f64, likewise.
-    #[inline(always)]
-    fn exact(&mut self, sample: usize, count: usize, index: u32, parameter: Parameter) {
-        let source = RunSource::Exact { index, parameter };
-        self.run(Run::new(sample, count, source));
-    }
 }
 
 impl Emit for Vec<Run> {
@@ -121,12 +126,8 @@ impl Spans {
     ) -> Result<(), FramesError> {
         match &timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let clock = FrameClock::new(*rate, *start, part.end);
-                if copy.is_own() {
-                    self.runs_of_frames(part, clock, &copy.samples, emit)
-                } else {
-                    self.runs_of_copy(part, clock, copy, emit)
-                }
+                let clock = FrameClock::new(*rate, *start, part.end).in_copy(copy);
+                self.runs_of_frames(part, clock, &copy.samples, emit)
             }
             Ticks::Times { times, stride } => {
                 let own = &times[part.track as usize * stride..];
@@ -136,56 +137,34 @@ impl Spans {
         }
     }
 
-    /// The runs in a copy other than the track itself. Not inlined, so that the usual path stays
-    /// small.
-    #[inline(never)]
-    fn runs_of_copy(
+    /// Emits the runs of one part among frames, in order.
+    #[inline(always)]
+    fn runs_of_frames(
         &self,
         part: &Part,
         clock: FrameClock,
-        copy: &TrackCopy,
-        emit: &mut impl Emit,
-    ) -> Result<(), FramesError> {
-        if copy.sign < 0.0 {
-            let clock = CopyClock::<true>::new(clock, copy);
-            return self.runs_of_frames(part, clock, &copy.samples, emit);
-        }
-        let clock = CopyClock::<false>::new(clock, copy);
-        self.runs_of_frames(part, clock, &copy.samples, emit)
-    }
-
-    /// Emits the runs of one part among frames, in order.
-    #[inline(always)]
-    pub(crate) fn runs_of_frames<C: Clock>(
-        &self,
-        part: &Part,
-        clock: C,
         samples: &Range<usize>,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
         let starts = &self.starts[part.spans.clone()];
         let begin = starts.first().copied().unwrap_or(part.end);
-        if C::IS_REVERSED {
-            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
-            // never a copy.
-            let end = clock.boundary(part.end);
-            emit_constant(0, end.first as usize, samples, part.after, emit);
-        } else {
-            runs_before(part, begin, clock, samples, emit);
+        let [first, at_end, last] = part.runs_outside(begin, clock, samples);
+        if let Some(run) = first {
+            emit.run(run);
         }
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
         let mut block = IntervalBlock::new();
         while let Some(own) = intervals.fill(&mut block) {
             for j in block.occupied {
                 let met = own.start + j;
-                let (span, key) = match (C::IS_REVERSED, met) {
+                let (span, key) = match (clock.is_reversed(), met) {
                     (false, _) => (part.spans.start + met, self.keys[part.spans.start + met]),
                     (true, 0) => (part.spans.end - 1, part.after),
                     (true, _) => (part.spans.end - 1 - met, self.keys[part.spans.end - met]),
                 };
                 let (mut first, last) = (block.first[j], block.first[j + 1]);
                 if key != NONE && block.is_held[j] == 1 {
-                    emit.constant(first, 1, key);
+                    emit.run(Run::new(first, 1, RunSource::Constant(key)));
                     first += 1;
                     if first == last {
                         continue;
@@ -209,107 +188,61 @@ impl Spans {
                         let source = RunSource::Segment(index, distance, block.affine(j));
                         emit.run(Run::new(first, count, source));
                     }
-                    Source::Constant(constant) => emit.constant(first, count, constant),
+                    Source::Constant(constant) => {
+                        emit.run(Run::new(first, count, RunSource::Constant(constant)));
+                    }
                     Source::Exact(index) => {
-                        emit.exact(first, count, index, block.parameter::<C>(j));
+                        let parameter = block.parameter(j, clock);
+                        let source = RunSource::Exact { index, parameter };
+                        emit.run(Run::new(first, count, source));
                     }
                 }
             }
         }
-        if C::IS_REVERSED {
-            let end = clock.boundary(begin);
-            emit_constant(end.first as usize, usize::MAX, samples, part.before, emit);
-        } else {
-            runs_after(part, clock, samples, emit);
+        for run in [at_end, last].into_iter().flatten() {
+            emit.run(run);
         }
         Ok(())
     }
 }
 
-/// Emits the runs before the first key, if the part is the track's first.
-#[inline(always)]
-pub(crate) fn runs_before(
-    part: &Part,
-    begin: f64,
-    clock: impl Clock,
-    samples: &Range<usize>,
-    emit: &mut impl Emit,
-) {
-    if part.before != NONE {
-        let begin = clock.boundary(begin);
-        emit_constant(0, begin.first as usize, samples, part.before, emit);
-    }
-    if let Some(from) = part.beyond.as_ref().map(|beyond| beyond.from_before)
-        && from != NONE
-    {
-        let begin = clock.boundary(begin);
-        let before = 0..begin.first as usize;
-        extrapolate(before, samples, from, clock, begin.frame, emit);
-    }
-}
-
-/// Emits the runs from the last key on, if the part is the track's last.
-#[inline(always)]
-pub(crate) fn runs_after(
-    part: &Part,
-    clock: impl Clock,
-    samples: &Range<usize>,
-    emit: &mut impl Emit,
-) {
-    let Some(beyond) = &part.beyond else {
-        if part.after != NONE {
-            let end = clock.boundary(part.end);
-            emit_constant(end.first as usize, usize::MAX, samples, part.after, emit);
+impl Part {
+    /// The runs outside its keys, those of the requested samples that it has: before the first key,
+    /// at exactly the last one, and from there on. `begin` is when its first span starts, in seconds.
+    pub(crate) fn runs_outside(
+        &self,
+        begin: f64,
+        clock: FrameClock,
+        samples: &Range<usize>,
+    ) -> [Option<Run>; 3] {
+        let [at_end, from_before, from_after] = self.at_ends();
+        let (begin, end) = (clock.boundary(begin), clock.boundary(self.end));
+        let (from, to) = (begin.first as usize, end.first as usize);
+        let run = |outside: Range<usize>, source: Option<RunSource>| {
+            let (first, last) = (
+                outside.start.max(samples.start),
+                outside.end.min(samples.end),
+            );
+            source
+                .filter(|_| first < last)
+                .map(|source| Run::new(first, last - first, source))
+        };
+        if clock.is_reversed() {
+            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
+            // never a copy.
+            let (first, last) = (RunSource::held(self.after), RunSource::held(self.before));
+            return [run(0..to, first), None, run(from..usize::MAX, last)];
         }
-        return;
-    };
-    let end = clock.boundary(part.end);
-    let mut first = end.first as usize;
-    if beyond.at_end != NONE && first as f64 == end.frame {
-        emit_constant(first, first + 1, samples, beyond.at_end, emit);
-        first += 1;
-    }
-    emit_constant(first, usize::MAX, samples, part.after, emit);
-    if beyond.from_after != NONE {
-        let after = first..usize::MAX;
-        extrapolate(after, samples, beyond.from_after, clock, end.frame, emit);
-    }
-}
-
-/// Emits the requested samples among `outside`, on the extrapolating curve `index`, whose parameter
-/// is seconds from the frame coordinate `end`.
-#[inline(never)]
-fn extrapolate(
-    outside: Range<usize>,
-    samples: &Range<usize>,
-    index: u32,
-    clock: impl Clock,
-    end: f64,
-    emit: &mut impl Emit,
-) {
-    let (first, last) = (
-        outside.start.max(samples.start),
-        outside.end.min(samples.end),
-    );
-    if first < last {
-        let (start, frames) = (end, clock.rate());
-        let parameter = Parameter::Frames { start, frames };
-        emit.exact(first, last - first, index, parameter);
-    }
-}
-
-/// Emits the requested samples from `from` to `to` with a constant; nothing if it is [`NONE`].
-#[inline(always)]
-fn emit_constant(
-    from: usize,
-    to: usize,
-    samples: &Range<usize>,
-    constant: u32,
-    emit: &mut impl Emit,
-) {
-    let (sample, to) = (from.max(samples.start), to.min(samples.end));
-    if sample < to && constant != NONE {
-        emit.constant(sample, to - sample, constant);
+        let is_key = at_end != NONE && to as f64 == end.frame;
+        let after = to.saturating_add(usize::from(is_key));
+        let second = clock.rate();
+        let first = RunSource::outside(self.before, from_before, begin.frame, second);
+        let last = RunSource::outside(self.after, from_after, end.frame, second);
+        [
+            run(0..from, first),
+            run(to..after, RunSource::held(at_end)),
+            run(after..usize::MAX, last),
+        ]
     }
 }
 

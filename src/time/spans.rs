@@ -71,6 +71,15 @@ impl Beyond {
 }
 
 impl Part {
+    /// The constant at exactly the last key, and the curves that extrapolate before the first key
+    /// and after the last; [`NONE`] for what there is not.
+    #[inline]
+    pub(crate) fn at_ends(&self) -> [u32; 3] {
+        (self.beyond.as_ref()).map_or([NONE; 3], |beyond| {
+            [beyond.at_end, beyond.from_before, beyond.from_after]
+        })
+    }
+
     /// Its [`Beyond`], which is created if it has none. `times` are when the whole track starts and
     /// ends, seconds.
     pub(crate) fn beyond(&mut self, times: (f64, f64)) -> &mut Beyond {
@@ -114,6 +123,7 @@ impl Spans {
         self.sources.clear();
         self.keys.clear();
     }
+
     /// The error for a part's span with too many frames to count, with the keys around it.
     #[cold]
     pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {

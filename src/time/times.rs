@@ -7,7 +7,7 @@ use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
 use crate::time::runs::{Affine, Distance, Emit, Parameter, Run, RunSource};
-use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
+use crate::time::spans::{NONE, Part, Source, Spans};
 
 impl Spans {
     /// Emits the runs of one part among samples with explicit times.
@@ -20,31 +20,23 @@ impl Spans {
         emit: &mut impl Emit,
     ) {
         let starts = &self.starts[part.spans.clone()];
-        let mut sample = samples.start;
-        let mut i = 0;
+        let begin = starts.first().copied().unwrap_or(part.end);
+        let (mut sample, mut i) = (samples.start, 0);
         while sample < samples.end {
             let time = times[sample];
-            i = interval_at(starts, time, i);
-            let begin = starts.first().copied().unwrap_or(part.end);
             let (covered, source) = if begin <= time && time < part.end {
+                i = interval_at(starts, time, i);
+                let (start, span) = (starts[i], part.spans.start + i);
                 let end = starts.get(i + 1).copied().unwrap_or(part.end);
-                let start = starts[i];
-                let key = self.keys[part.spans.start + i];
+                let key = self.keys[span];
                 if time == start && key != NONE {
                     (start..time.next_up(), Some(RunSource::Constant(key)))
                 } else {
                     let open = if key == NONE { start } else { start.next_up() };
-                    let source = self.time_source(part.spans.start + i, end);
-                    (open..end, Some(source))
+                    (open..end, Some(self.time_source(span, end)))
                 }
-            } else if let Some(beyond) = &part.beyond {
-                let rest = &times[sample..samples.end];
-                sample += outside(part, (begin, beyond), rest, sample, emit);
-                continue;
-            } else if time >= part.end {
-                (part.end..f64::INFINITY, constant_source(part.after))
             } else {
-                (f64::NEG_INFINITY..begin, constant_source(part.before))
+                outside(part, begin, time)
             };
             let run = times[sample..samples.end].iter();
             let count = run.take_while(|time| covered.contains(time)).count();
@@ -85,10 +77,11 @@ impl Spans {
         let seconds = end - start;
         match self.sources[span] {
             Source::Constant(constant) => RunSource::Constant(constant),
-            Source::Exact(index) => RunSource::Exact {
-                index,
-                parameter: Parameter::Seconds { start, seconds },
-            },
+            Source::Exact(index) => {
+                let length = seconds;
+                let parameter = Parameter { start, length };
+                RunSource::Exact { index, parameter }
+            }
             Source::Segment(index) => {
                 let middle = start + seconds * 0.5;
                 let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
@@ -99,108 +92,39 @@ impl Spans {
     }
 }
 
-/// Emits the run of the first of `times`, which lies outside a part's keys, and returns its number
-/// of samples. Not inlined, so that the usual path stays small.
+/// The source of a sample outside a part's keys, `None` if another part has it, and the times that
+/// have the same source. Not inlined, so that the usual path stays small.
 #[inline(never)]
-fn outside(
-    part: &Part,
-    (begin, beyond): (f64, &Beyond),
-    times: &[f64],
-    sample: usize,
-    emit: &mut impl Emit,
-) -> usize {
-    let time = times[0];
-    let (covered, source) = if time < begin {
-        let source = source_beyond(part.before, beyond.from_before, begin);
+fn outside(part: &Part, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
+    let [at_end, from_before, from_after] = part.at_ends();
+    if time < begin {
+        let source = RunSource::outside(part.before, from_before, begin, 1.0);
         (f64::NEG_INFINITY..begin, source)
-    } else if time == part.end && beyond.at_end != NONE {
-        (time..time.next_up(), constant_source(beyond.at_end))
+    } else if time == part.end && at_end != NONE {
+        (time..time.next_up(), RunSource::held(at_end))
     } else {
-        let source = source_beyond(part.after, beyond.from_after, part.end);
+        let source = RunSource::outside(part.after, from_after, part.end, 1.0);
         (part.end..f64::INFINITY, source)
+    }
+}
+
+/// The key before a time and the time's parameter after it; `near` is the key to look at first.
+#[inline(always)]
+pub(crate) fn key_sample(times: &[f64], time: f64, near: usize) -> KeySample {
+    let key = key_before(times, time, near);
+    let parameter = match key & IS_KEY {
+        0 => parameter(times[key as usize], times[key as usize + 1], time),
+        _ => 0.0,
     };
-    let count = times
-        .iter()
-        .take_while(|time| covered.contains(time))
-        .count();
-    match source {
-        Some(RunSource::Constant(constant)) => emit.constant(sample, count, constant),
-        Some(RunSource::Exact { index, parameter }) => emit.exact(sample, count, index, parameter),
-        Some(RunSource::Segment(..)) | None => {}
-    }
-    count
+    KeySample { key, parameter }
 }
 
-/// The source of samples outside the keys: a constant, or a curve whose parameter is seconds from
-/// `end`; `None` if another part has it.
-fn source_beyond(constant: u32, curve: u32, end: f64) -> Option<RunSource> {
-    match (constant_source(constant), curve) {
-        (None, NONE) => None,
-        (None, index) => Some(RunSource::Exact {
-            index,
-            parameter: Parameter::Seconds {
-                start: end,
-                seconds: 1.0,
-            },
-        }),
-        (held, _) => held,
-    }
-}
-
-fn constant_source(constant: u32) -> Option<RunSource> {
-    (constant != NONE).then_some(RunSource::Constant(constant))
-}
-
-/// Finds where times lie among keys. The constants of the last interval are kept, because many
-/// tracks share their times, and a comparison is cheaper than a division.
-pub(crate) struct TimePlan {
-    start: f64,
-    end: f64,
-    middle: f64,
-    scale: f32,
-}
-
-impl TimePlan {
-    pub(crate) fn new() -> Self {
-        Self {
-            start: f64::NAN,
-            end: f64::NAN,
-            middle: 0.0,
-            scale: 0.0,
-        }
-    }
-
-    /// The key and the parameter of a time; `near` is the key to look at first.
-    #[inline(always)]
-    pub(crate) fn sample(&mut self, starts: &[f64], time: f64, near: usize) -> KeySample {
-        let key = key_before(starts, time, near);
-        if key & IS_KEY != 0 {
-            return KeySample {
-                key,
-                parameter: 0.0,
-            };
-        }
-        let (start, end) = (starts[key as usize], starts[key as usize + 1]);
-        KeySample {
-            key,
-            parameter: self.parameter(start, end, time),
-        }
-    }
-
-    /// The parameter of a time between two keys.
-    #[inline(always)]
-    fn parameter(&mut self, start: f64, end: f64, time: f64) -> f32 {
-        if self.start != start || self.end != end {
-            let seconds = end - start;
-            *self = Self {
-                start,
-                end,
-                middle: start + seconds * 0.5,
-                scale: finite_scale(1.0 / seconds),
-            };
-        }
-        round_f32(time - self.middle) * self.scale + 0.0
-    }
+/// The parameter of a time in the interval from `start` to `end`.
+#[inline(always)]
+fn parameter(start: f64, end: f64, time: f64) -> f32 {
+    let seconds = end - start;
+    let middle = start + seconds * 0.5;
+    round_f32(time - middle) * finite_scale(1.0 / seconds) + 0.0
 }
 
 /// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is
@@ -271,14 +195,9 @@ impl TimeLanes {
         self.count = lane + 1;
     }
 
-    /// The parameter of each time in its interval, by the operations of `TimePlan::parameter`.
+    /// The parameter of each time in its interval.
     #[inline(always)]
     pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
-        std::array::from_fn(|lane| {
-            let seconds = self.ends[lane] - self.starts[lane];
-            let middle = self.starts[lane] + seconds * 0.5;
-            let scale = finite_scale(1.0 / seconds);
-            round_f32(self.times[lane] - middle) * scale + 0.0
-        })
+        std::array::from_fn(|lane| parameter(self.starts[lane], self.ends[lane], self.times[lane]))
     }
 }

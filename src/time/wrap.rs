@@ -200,23 +200,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn times_are_folded_into_the_keys() {
-        let wrap = Wrap {
-            before: WrapMode::Loop,
-            after: WrapMode::Mirror,
-        };
-        for (time, expected) in [
-            (1.5, 1.5),
-            (3.5, 2.5),
-            (5.25, 1.25),
-            (0.5, 2.5),
-            (-1.75, 2.25),
-        ] {
-            assert_eq!(wrap.folded((1.0, 3.0), time), expected, "{time}");
-        }
-        let held = Wrap::default();
-        assert_eq!(held.folded((1.0, 3.0), 9.0), 9.0);
-    }
 }

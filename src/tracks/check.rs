@@ -4,7 +4,6 @@ use glam::{DQuat, Quat};
 
 use crate::math::canonical::{canonical, unit_f32};
 use crate::tracks::error::TrackError;
-use crate::tracks::rotation::Rotation;
 
 /// A key whose norm differs from 1 by more than this is refused by
 /// [`TrackSet::push`](crate::tracks::set::TrackSet::push): it is more likely a mistake than a
@@ -58,45 +57,43 @@ pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
     }
 }
 
+/// Refuses data beside the rotations of which there is not one value for each key.
+pub(crate) fn check_length(
+    track: usize,
+    what: &'static str,
+    keys: usize,
+    given: usize,
+) -> Result<(), TrackError> {
+    match given == keys {
+        true => Ok(()),
+        false => Err(TrackError::DataLength {
+            track,
+            what,
+            keys,
+            given,
+        }),
+    }
+}
+
+/// Refuses data that is NaN or infinite at a key.
+pub(crate) fn check_finite<T>(
+    track: usize,
+    what: &'static str,
+    values: &[T],
+    is_finite: impl Fn(&T) -> bool,
+) -> Result<(), TrackError> {
+    match values.iter().position(|value| !is_finite(value)) {
+        Some(key) => Err(TrackError::DataNotFinite { track, key, what }),
+        None => Ok(()),
+    }
+}
+
 /// A key whose norm differs from 1 by at most this is kept bit for bit, so that results which are
 /// written and loaded again do not change. Rounding to f32 moves the norm of a unit quaternion by
 /// at most about 2 × 2^-24.
 pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
-/// Appends the keys of a track as [`unit_key`] makes them.
-///
-/// # Errors
-/// The first key that is refused; there are no more keys then than before.
-pub(crate) fn append_keys<R: Rotation>(
-    all: &mut Vec<Quat>,
-    track: usize,
-    keys: &[R],
-) -> Result<(), TrackError> {
-    let first = all.len();
-    // Mostly all of them are unit quaternions. |n² - 1| is about twice |n - 1|.
-    let mut are_unit = true;
-    all.extend(keys.iter().map(|key| {
-        let quat = key.quat();
-        let [x, y, z, w] = quat.to_array().map(f64::from);
-        are_unit &= (x * x + y * y + z * z + w * w - 1.0).abs() <= 1.9 * UNIT_TOLERANCE;
-        Quat::from_array(quat.to_array().map(canonical))
-    }));
-    if are_unit {
-        return Ok(());
-    }
-    all.truncate(first);
-    for (key, rotation) in keys.iter().enumerate() {
-        match unit_key(track, key, rotation.quat()) {
-            Ok(unit) => all.push(unit),
-            Err(error) => {
-                all.truncate(first);
-                return Err(error);
-            }
-        }
-    }
-    Ok(())
-}
-
+/// A key as it is kept: unit, and with its tiny components at +0.
 pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = quat.as_dquat();
     let norm = exact.length();
@@ -114,38 +111,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_together_are_what_each_of_them_is() {
-        let turned = Quat::from_xyzw(0.6, -0.0, 1e-30, 0.8);
-        let bits = |q: &Quat| q.to_array().map(f32::to_bits);
-        for off in [1.0, 1.000_000_3, 1.000_001, 0.95] {
-            let keys = [turned, turned * off, -turned];
-            let mut all = vec![Quat::IDENTITY];
-            append_keys(&mut all, 0, &keys).unwrap();
-            let each = keys.map(|key| unit_key(0, 0, key).unwrap());
-            assert_eq!(
-                all[1..].iter().map(bits).collect::<Vec<_>>(),
-                each.each_ref().map(bits)
-            );
-        }
-        for off in [0.5, f32::NAN] {
-            let mut all = vec![Quat::IDENTITY];
-            let error = append_keys(&mut all, 3, &[turned, turned * off, turned]).unwrap_err();
-            assert!(matches!(
-                error,
-                TrackError::NotUnit {
-                    track: 3,
-                    key: 1,
-                    ..
-                }
-            ));
-            assert_eq!(all, [Quat::IDENTITY]);
-        }
-    }
-
-    #[test]
     fn times_are_refused_wherever_they_do_not_increase() {
         let good: Vec<f64> = (0..9).map(f64::from).collect();
         assert!(check_times(0, &good, 9).is_ok());
+        assert_eq!(
+            check_times(1, &good, 8).unwrap_err().to_string(),
+            "track 1 has 8 keys but 9 times; give one time for each key"
+        );
+        assert_eq!(check_times(1, &[], 0), Err(TrackError::Empty { track: 1 }));
         assert!(check_times(0, &[-LATEST, LATEST], 2).is_ok());
         for place in 0..9 {
             for bad in [

@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Quat};
 
+use crate::tracks::check::{check_finite, check_length};
 use crate::tracks::error::TrackError;
 use crate::tracks::set::TrackSet;
 
@@ -18,44 +19,25 @@ pub struct Tcb {
     pub bias: f64,
 }
 
-impl Tcb {
-    pub(crate) fn is_finite(self) -> bool {
-        [self.tension, self.continuity, self.bias]
-            .iter()
-            .all(|value| value.is_finite())
-    }
-}
-
-/// One kind of data for a set: a track has a value for each of its keys, or none at all.
+/// One kind of data for a set: a track has a value for each of its keys, or none at all. The list
+/// may be shorter than the set.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct KeyData<T> {
-    values: Vec<T>,
-    /// For each track, where its values start; `None` if it has none.
-    starts: Vec<Option<usize>>,
-}
+pub(crate) struct KeyData<T>(Vec<Vec<T>>);
 
 impl<T: Clone> KeyData<T> {
-    /// The values of a track with `keys` keys; empty if it has none.
-    pub(crate) fn of(&self, track: usize, keys: usize) -> &[T] {
-        match self.starts.get(track) {
-            Some(&Some(start)) => &self.values[start..start + keys],
-            _ => &[],
-        }
+    /// The values of a track; empty if it has none.
+    pub(crate) fn of(&self, track: usize) -> &[T] {
+        self.0.get(track).map_or(&[], Vec::as_slice)
     }
 
     pub(crate) fn set(&mut self, track: usize, values: &[T]) {
         if values.is_empty() {
             return;
         }
-        if self.starts.len() <= track {
-            self.starts.resize(track + 1, None);
+        if self.0.len() <= track {
+            self.0.resize(track + 1, Vec::new());
         }
-        if let Some(start) = self.starts[track] {
-            self.values[start..start + values.len()].clone_from_slice(values);
-        } else {
-            self.starts[track] = Some(self.values.len());
-            self.values.extend_from_slice(values);
-        }
+        self.0[track] = values.to_vec();
     }
 }
 
@@ -66,7 +48,7 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite velocity for each of its keys.
     pub fn set_velocities(&mut self, track: usize, velocities: &[DVec3]) -> Result<(), TrackError> {
-        self.check_data(track, velocities, "velocity", |velocity| {
+        self.check_data(track, "velocity", velocities, |velocity| {
             velocity.is_finite()
         })?;
         self.velocities.set(track, velocities);
@@ -79,7 +61,7 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite pair for each of its keys.
     pub fn set_tangents(&mut self, track: usize, tangents: &[[Quat; 2]]) -> Result<(), TrackError> {
-        self.check_data(track, tangents, "tangent", |[arriving, leaving]| {
+        self.check_data(track, "tangent", tangents, |[arriving, leaving]| {
             arriving.is_finite() && leaving.is_finite()
         })?;
         self.tangents.set(track, tangents);
@@ -92,8 +74,10 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite triple for each of its keys.
     pub fn set_tcb(&mut self, track: usize, tcb: &[Tcb]) -> Result<(), TrackError> {
-        self.check_data(track, tcb, "tension, continuity or bias", |tcb| {
-            tcb.is_finite()
+        self.check_data(track, "tension, continuity or bias", tcb, |tcb| {
+            [tcb.tension, tcb.continuity, tcb.bias]
+                .iter()
+                .all(|value| value.is_finite())
         })?;
         self.tcb.set(track, tcb);
         Ok(())
@@ -102,27 +86,13 @@ impl TrackSet {
     fn check_data<T>(
         &self,
         track: usize,
-        values: &[T],
         what: &'static str,
+        values: &[T],
         is_finite: impl Fn(&T) -> bool,
     ) -> Result<(), TrackError> {
-        let tracks = self.track_count();
-        if track >= tracks {
-            return Err(TrackError::NoSuchTrack { track, tracks });
-        }
-        let keys = self.track(track).keys.len();
-        if values.len() != keys {
-            return Err(TrackError::DataLength {
-                track,
-                what,
-                keys,
-                given: values.len(),
-            });
-        }
-        match values.iter().position(|value| !is_finite(value)) {
-            Some(key) => Err(TrackError::DataNotFinite { track, key, what }),
-            None => Ok(()),
-        }
+        self.check_track(track)?;
+        check_length(track, what, self.track(track).keys.len(), values.len())?;
+        check_finite(track, what, values, is_finite)
     }
 }
 

@@ -3,30 +3,24 @@
 use glam::Quat;
 
 /// A rotation as callers have it: [`Quat`], or its numbers `x y z w`.
-pub trait Rotation: Copy + sealed::Sealed {
+pub trait Rotation: bytemuck::Pod + sealed::Sealed {
     /// As a quaternion.
     #[doc(hidden)]
-    fn quat(self) -> Quat;
-}
-
-impl Rotation for Quat {
     #[inline]
     fn quat(self) -> Quat {
-        self
+        bytemuck::cast(self)
     }
 }
 
-impl Rotation for [f32; 4] {
-    #[inline]
-    fn quat(self) -> Quat {
-        Quat::from_array(self)
-    }
-}
+impl Rotation for Quat {}
+impl Rotation for [f32; 4] {}
 
-mod sealed {
-    /// Types of which it is known what their numbers are.
+pub(crate) mod sealed {
+    /// Types of which it is known how their four numbers lie in memory. Keys come in as some of
+    /// them, and [`Row`](crate::Row)s of results lie in any.
     pub trait Sealed {}
 
     impl Sealed for glam::Quat {}
+    impl Sealed for glam::Vec4 {}
     impl Sealed for [f32; 4] {}
 }

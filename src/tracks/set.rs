@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Quat};
 
-use crate::tracks::check::{append_keys, check_times, unit_key};
+use crate::tracks::check::{check_times, unit_key};
 use crate::tracks::error::TrackError;
 use crate::tracks::key_data::{KeyData, Tcb};
 use crate::tracks::rotation::Rotation;
@@ -38,10 +38,10 @@ pub struct TrackSet {
     pub(crate) velocities: KeyData<DVec3>,
     pub(crate) tangents: KeyData<[Quat; 2]>,
     pub(crate) tcb: KeyData<Tcb>,
-    pub(crate) translations: VectorTracks,
-    pub(crate) scales: VectorTracks,
+    /// Translations and scales, in the order of [`Channel`](crate::tracks::vectors::Channel).
+    pub(crate) vectors: [VectorTracks; 2],
     /// First and last key time over all tracks.
-    pub(crate) span: Option<(f64, f64)>,
+    span: Option<(f64, f64)>,
     /// Number of keys of the longest track.
     longest: usize,
     signs: SignBits,
@@ -106,22 +106,15 @@ impl TrackSet {
         let track = self.tracks.len();
         check_times(track, times, keys.len())?;
         let first_key = self.keys.len();
-        append_keys(&mut self.keys, track, keys)?;
-        let own = bytemuck::cast_slice(&self.keys[first_key..]);
-        self.signs.push_track(first_key, own);
-        let first_time = self.share_or_append(times);
-        self.tracks.push(TrackRange {
-            first_key,
-            first_time,
-            len: keys.len(),
+        let added = keys.iter().enumerate().try_for_each(|(key, rotation)| {
+            self.keys.push(unit_key(track, key, rotation.quat())?);
+            Ok(())
         });
-        self.longest = self.longest.max(keys.len());
-        let name = name.into();
-        if !name.is_empty() {
-            self.names.resize(track, String::new());
-            self.names.push(name);
+        match added {
+            Ok(()) => self.add_track(name.into(), times, first_key),
+            Err(_) => self.keys.truncate(first_key),
         }
-        Ok(())
+        added
     }
 
     /// A set whose tracks all have the same key times, as in a `.dat` file.
@@ -151,24 +144,14 @@ impl TrackSet {
         for (place, key) in keys.iter_mut().enumerate() {
             *key = unit_key(place / len, place % len, *key)?;
         }
-        let mut signs = SignBits::default();
-        for (track, keys) in keys.chunks(len).enumerate() {
-            signs.push_track(track * len, bytemuck::cast_slice(keys));
-        }
-        let range = |track| TrackRange {
-            first_key: track * len,
-            first_time: 0,
-            len,
-        };
-        Ok(Self {
-            tracks: (0..keys.len() / len).map(range).collect(),
-            longest: if keys.is_empty() { 0 } else { len },
-            span: (!keys.is_empty()).then(|| (times[0], times[len - 1])),
+        let mut set = Self {
             keys,
-            times,
-            signs,
             ..Self::default()
-        })
+        };
+        for first_key in (0..set.keys.len()).step_by(len) {
+            set.add_track(String::new(), &times, first_key);
+        }
+        Ok(set)
     }
 
     /// Number of tracks.
@@ -191,7 +174,7 @@ impl TrackSet {
     /// Whether every two neighbouring keys of a track are less than half a turn apart as they
     /// were given: then the shortest path and the path as authored are the same.
     pub(crate) fn arcs_are_short(&self) -> bool {
-        self.signs.arcs_are_short()
+        !self.signs.any_long
     }
 
     /// The signs of the keys of consecutive tracks along the shortest path.
@@ -213,6 +196,15 @@ impl TrackSet {
         self.tracks.is_empty()
     }
 
+    /// Refuses a track that there is not.
+    pub(crate) fn check_track(&self, track: usize) -> Result<(), TrackError> {
+        let tracks = self.track_count();
+        match track < tracks {
+            true => Ok(()),
+            false => Err(TrackError::NoSuchTrack { track, tracks }),
+        }
+    }
+
     /// The track at `index`; `None` out of range.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<Track<'_>> {
@@ -227,16 +219,12 @@ impl TrackSet {
     pub fn track(&self, index: usize) -> Track<'_> {
         let (times, keys) = self.times_and_keys(index);
         Track {
-            name: self
-                .names
-                .get(index)
-                .map(String::as_str)
-                .filter(|name| !name.is_empty()),
+            name: (self.names.get(index).map(String::as_str)).filter(|name| !name.is_empty()),
             times,
             keys,
-            velocities: self.velocities.of(index, keys.len()),
-            tangents: self.tangents.of(index, keys.len()),
-            tcb: self.tcb.of(index, keys.len()),
+            velocities: self.velocities.of(index),
+            tangents: self.tangents.of(index),
+            tcb: self.tcb.of(index),
         }
     }
 
@@ -263,16 +251,8 @@ impl TrackSet {
     /// keys.
     pub(crate) fn tracks_within(&self, tracks: Range<usize>, keys: usize) -> usize {
         let most = self.first_key(tracks.start).saturating_add(keys);
-        let (mut low, mut high) = (tracks.start, tracks.end);
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.first_key(middle + 1) <= most {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        let fits = |own: &TrackRange| own.first_key + own.len <= most;
+        tracks.start + self.tracks[tracks].partition_point(fits)
     }
 
     /// The index of a track's first key among all keys; the number of keys for `track_count()`.
@@ -307,53 +287,52 @@ impl TrackSet {
     pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Result<Self, TrackError> {
         let mut set = Self::default();
         for index in tracks {
-            let Some(track) = self.get(index) else {
-                let tracks = self.track_count();
-                return Err(TrackError::NoSuchTrack {
-                    track: index,
-                    tracks,
-                });
-            };
-            let first_time = set.share_or_append(track.times);
-            let first_key = set.keys.len();
+            self.check_track(index)?;
+            let track = self.track(index);
+            let (own, first_key) = (set.track_count(), set.keys.len());
             set.keys.extend_from_slice(track.keys);
-            let keys = bytemuck::cast_slice(track.keys);
-            set.signs.push_track(first_key, keys);
-            let own = set.tracks.len();
+            let name = track.name.unwrap_or_default().to_owned();
+            set.add_track(name, track.times, first_key);
             set.velocities.set(own, track.velocities);
             set.tangents.set(own, track.tangents);
             set.tcb.set(own, track.tcb);
-            set.translations
-                .push(self.translations.get(index).cloned().flatten());
-            set.scales.push(self.scales.get(index).cloned().flatten());
-            if let Some(name) = track.name {
-                set.names.resize(set.tracks.len(), String::new());
-                set.names.push(name.to_owned());
+            for (to, from) in set.vectors.iter_mut().zip(&self.vectors) {
+                to.push(from.get(index).cloned().flatten());
             }
-            set.tracks.push(TrackRange {
-                first_key,
-                first_time,
-                len: track.keys.len(),
-            });
-            set.longest = set.longest.max(track.keys.len());
         }
         Ok(set)
     }
 
-    /// Where a track's times start. They are shared with the track before if they are equal,
-    /// because in many files all tracks have the same times.
-    fn share_or_append(&mut self, times: &[f64]) -> usize {
+    /// Adds a track whose keys lie in the list already, from `first_key` on. Its times are shared
+    /// with the track before if they are equal, because in many files all tracks have the same.
+    fn add_track(&mut self, name: String, times: &[f64], first_key: usize) {
+        let len = times.len();
+        let keys = &self.keys[first_key..first_key + len];
+        (self.signs).push_track(first_key, bytemuck::cast_slice(keys));
+        let before = self.tracks.last().map(|last| last.first_time);
+        let shared = before.filter(|&first| self.times[first..] == *times);
+        let first_time = shared.unwrap_or(self.times.len());
+        if shared.is_none() {
+            self.times.extend_from_slice(times);
+        }
+        if !name.is_empty() {
+            self.names.resize(self.tracks.len(), String::new());
+            self.names.push(name);
+        }
+        self.tracks.push(TrackRange {
+            first_key,
+            first_time,
+            len,
+        });
+        self.longest = self.longest.max(len);
+        self.widen_span(times);
+    }
+
+    /// Widens the time span to these times.
+    pub(crate) fn widen_span(&mut self, times: &[f64]) {
         let own = (times[0], times[times.len() - 1]);
         let (first, last) = self.span.unwrap_or(own);
         self.span = Some((first.min(own.0), last.max(own.1)));
-        if let Some(last) = self.tracks.last()
-            && self.times[last.first_time..last.first_time + last.len] == *times
-        {
-            return last.first_time;
-        }
-        let first = self.times.len();
-        self.times.extend_from_slice(times);
-        first
     }
 }
 

@@ -5,8 +5,6 @@
 use std::ops::Range;
 
 use crate::math::quaternion::{dot, unit};
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
 
 /// If the inner product of two keys is within this of zero, they may be exactly half a turn apart,
 /// and its sign may be due to the rounding of f32. Such keys keep the signs given.
@@ -16,9 +14,6 @@ const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
 /// magnitude exceeds this.
 const IN_DOUBT: f32 = 1e-5;
 
-/// For this number of keys or fewer, a plain loop is faster than vectors.
-const FEW: usize = 4;
-
 const BITS: usize = u64::BITS as usize;
 
 /// For each key of a set, whether it counts with the other sign than it was given; a track's
@@ -27,31 +22,27 @@ const BITS: usize = u64::BITS as usize;
 pub(crate) struct SignBits {
     bits: Vec<u64>,
     /// Whether any two neighbouring keys are about half a turn apart or more as they were given.
-    any_long: bool,
+    /// If none are, the shortest path and the path as authored are the same.
+    pub(crate) any_long: bool,
 }
 
 impl SignBits {
     /// Adds a track whose first key has the index `first` among all keys of the set.
     pub(crate) fn push_track(&mut self, first: usize, keys: &[[f32; 4]]) {
-        if !any_is_long(keys) {
-            return;
-        }
-        self.any_long = true;
         let mut is_turned = false;
         for (key, pair) in (first + 1..).zip(keys.windows(2)) {
-            is_turned ^= turns(pair[0], pair[1]);
+            let inner = dot(pair[0], pair[1]);
+            if inner <= IN_DOUBT {
+                self.any_long = true;
+                let exact = || dot(unit(pair[0]), unit(pair[1]));
+                is_turned ^= inner < -IN_DOUBT || exact() < -DOT_NOISE;
+            }
             if is_turned {
                 let words = self.bits.len().max(key / BITS + 1);
                 self.bits.resize(words, 0);
                 self.bits[key / BITS] |= 1 << (key % BITS);
             }
         }
-    }
-
-    /// Whether every two neighbouring keys are less than half a turn apart as they were given:
-    /// then the shortest path and the path as authored are the same.
-    pub(crate) fn arcs_are_short(&self) -> bool {
-        !self.any_long
     }
 
     /// The signs of consecutive keys, by their indices in the set.
@@ -107,7 +98,7 @@ impl Signs<'_> {
     /// Whether any key is turned.
     #[inline]
     pub(crate) fn any(self) -> bool {
-        !self.bits.is_empty() && self.bits_of(|word, mask| word & mask != 0).any(|any| any)
+        !self.bits.is_empty() && self.words().any(|(word, mask)| word & mask != 0)
     }
 
     /// The sign of all keys, or `None` if they differ.
@@ -116,17 +107,14 @@ impl Signs<'_> {
             return Some(1.0);
         }
         let end = self.first.saturating_add(self.count);
-        let all = end <= self.bits.len() * BITS
-            && self
-                .bits_of(|word, mask| word & mask == mask)
-                .all(|all| all);
+        let all =
+            end <= self.bits.len() * BITS && self.words().all(|(word, mask)| word & mask == mask);
         all.then_some(-1.0)
     }
 
-    /// Calls `look` for each stored word that has bits of these keys, with the word and the mask of
-    /// these bits.
+    /// The stored words that have bits of these keys, each with the mask of these bits.
     #[inline]
-    fn bits_of<R>(self, look: impl Fn(u64, u64) -> R) -> impl Iterator<Item = R> {
+    fn words(self) -> impl Iterator<Item = (u64, u64)> {
         let end = (self.first.saturating_add(self.count)).min(self.bits.len() * BITS);
         let start = self.first.min(end);
         let words = start / BITS..end.div_ceil(BITS);
@@ -134,7 +122,7 @@ impl Signs<'_> {
             let from = start.saturating_sub(place * BITS);
             let to = (end - place * BITS).min(BITS);
             let mask = (u64::MAX << from) & (u64::MAX >> (BITS - to));
-            look(self.bits[place], mask)
+            (self.bits[place], mask)
         })
     }
 
@@ -149,53 +137,6 @@ impl Signs<'_> {
             let sign = self.sign(i);
             *to = key.map(|component| component * sign);
         }
-    }
-}
-
-/// Whether the second key is nearer to the first with the opposite sign.
-fn turns(from: [f32; 4], to: [f32; 4]) -> bool {
-    let inner = dot(from, to);
-    if inner.abs() <= IN_DOUBT {
-        dot(unit(from), unit(to)) < -DOT_NOISE
-    } else {
-        inner < 0.0
-    }
-}
-
-/// Whether any two neighbouring keys are half a turn apart or more, or so close to it that f32
-/// cannot tell.
-fn any_is_long(keys: &[[f32; 4]]) -> bool {
-    if keys.len() <= FEW {
-        return keys.windows(2).any(is_long);
-    }
-    let mut look = Look { keys, found: false };
-    in_lanes(&mut look);
-    look.found
-}
-
-#[inline(always)]
-fn is_long(pair: &[[f32; 4]]) -> bool {
-    dot(pair[0], pair[1]) <= IN_DOUBT
-}
-
-struct Look<'a> {
-    keys: &'a [[f32; 4]],
-    found: bool,
-}
-
-impl InLanes for Look<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let mut first = 0;
-        while first + L::COUNT < self.keys.len() {
-            let inner = L::inner(&self.keys[first..], &self.keys[first + 1..]);
-            if inner.any_at_most(IN_DOUBT) {
-                self.found = true;
-                return;
-            }
-            first += L::COUNT;
-        }
-        self.found = self.keys[first..].windows(2).any(is_long);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 
-use crate::tracks::check::check_times;
+use crate::tracks::check::{check_finite, check_length, check_times};
 use crate::tracks::error::TrackError;
 use crate::tracks::set::TrackSet;
 
@@ -95,13 +95,8 @@ impl TrackSet {
         let track = self.track_count();
         check_times(track, times, points.len())?;
         let points: Vec<Vec3> = points.iter().map(|&point| point.into()).collect();
-        if !ups.is_empty() && ups.len() != points.len() {
-            return Err(TrackError::DataLength {
-                track,
-                what: "upward directions",
-                keys: points.len(),
-                given: ups.len(),
-            });
+        if !ups.is_empty() {
+            check_length(track, "upward directions", points.len(), ups.len())?;
         }
         let has_no_length = |up: &Option<Vec3>| {
             up.is_some_and(|up| !up.is_finite() || up.as_dvec3().length() == 0.0)
@@ -109,16 +104,12 @@ impl TrackSet {
         if let Some(key) = ups.iter().position(has_no_length) {
             return Err(TrackError::NoUp { track, key });
         }
-        if let Some(key) = points.iter().position(|point| !point.is_finite()) {
-            return Err(TrackError::DataNotFinite {
-                track,
-                key,
-                what: "point of the path",
-            });
-        }
+        check_finite(track, "point of the path", &points, |point| {
+            point.is_finite()
+        })?;
         self.push(name, &times[..1], &[Quat::IDENTITY])?;
         self.set_translations(track, times, &points, &[])?;
-        if let Some(Some(path)) = self.translations.get_mut(track) {
+        if let Some(path) = &mut self.vectors[Channel::Translation as usize][track] {
             Arc::make_mut(path).ups = ups.to_vec();
         }
         Ok(track)
@@ -146,43 +137,20 @@ impl TrackSet {
         keys: &[V],
         tangents: &[[Vec3; 2]],
     ) -> Result<(), TrackError> {
-        let tracks = self.track_count();
-        if track >= tracks {
-            return Err(TrackError::NoSuchTrack { track, tracks });
-        }
+        self.check_track(track)?;
         check_times(track, times, keys.len())?;
         let keys: Vec<Vec3> = keys.iter().map(|&key| key.into()).collect();
-        let not_finite = |key| TrackError::DataNotFinite {
-            track,
-            key,
-            what: "vector or its tangent",
-        };
-        if !tangents.is_empty() && tangents.len() != keys.len() {
-            return Err(TrackError::DataLength {
-                track,
-                what: "tangents",
-                keys: keys.len(),
-                given: tangents.len(),
-            });
+        if !tangents.is_empty() {
+            check_length(track, "tangents", keys.len(), tangents.len())?;
         }
-        // The first loop goes to the end in any case, so that it is compiled to vectors.
-        let numbers: &[f32] = bytemuck::cast_slice(&keys);
-        let are_finite = numbers.iter().fold(true, |all, n| all & n.is_finite());
-        let bad_key = match are_finite {
-            true => None,
-            false => keys.iter().position(|key| !key.is_finite()),
-        };
-        let is_bad = |both: &[Vec3; 2]| !both[0].is_finite() || !both[1].is_finite();
-        if let Some(key) = bad_key.or(tangents.iter().position(is_bad)) {
-            return Err(not_finite(key));
-        }
-        let own = (times[0], times[times.len() - 1]);
-        let (first, last) = self.span.unwrap_or(own);
-        self.span = Some((first.min(own.0), last.max(own.1)));
-        let vectors = match channel {
-            Channel::Translation => &mut self.translations,
-            Channel::Scale => &mut self.scales,
-        };
+        let what = "vector or its tangent";
+        check_finite(track, what, &keys, |key| key.is_finite())?;
+        check_finite(track, what, tangents, |[arriving, leaving]| {
+            arriving.is_finite() && leaving.is_finite()
+        })?;
+        self.widen_span(times);
+        let tracks = self.track_count();
+        let vectors = &mut self.vectors[channel as usize];
         if vectors.len() < tracks {
             vectors.resize(tracks, None);
         }
@@ -208,10 +176,6 @@ impl TrackSet {
 
     /// A track's translations or scales, if it has any.
     pub(crate) fn vectors(&self, channel: Channel, track: usize) -> Option<&VectorTrack> {
-        let vectors = match channel {
-            Channel::Translation => &self.translations,
-            Channel::Scale => &self.scales,
-        };
-        vectors.get(track)?.as_deref()
+        (self.vectors[channel as usize].get(track)?).as_deref()
     }
 }
