@@ -3,9 +3,7 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes::{self, LANES as ARC_LANES, whole};
 use crate::fit::constant_velocity::arc_component;
-use crate::math::canonical::canonical;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{self, Lanes, Number};
@@ -14,7 +12,7 @@ use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
 /// Samples that are evaluated together.
-pub(crate) const LANES: usize = ARC_LANES;
+pub(crate) const LANES: usize = 64;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
 pub(crate) struct TwoKeyBlock {
@@ -74,27 +72,17 @@ impl TwoKeyBlock {
 
     #[inline(always)]
     fn polynomials<L: Lanes>(&mut self) {
-        let arcs = arc_lanes::arcs::<L>(&self.from, &self.to, self.count);
-        let squares = arcs.squares();
-        let mut found = [[0.0; LANES]; 4];
-        for c in 0..4 {
-            let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
-            for j in 0..LANES {
-                let own = arc_component(middle[j], tangent[j], squares[j]);
-                lanes[j] = canonical(polynomial(own, self.parameters[j]));
+        for j in (0..self.count).step_by(L::COUNT) {
+            let from = L::load_rotations(&self.from[j..]);
+            let (middle, tangent) = arc_between(from, L::load_rotations(&self.to[j..]));
+            let (square, parameter) = (norm_squared(tangent), L::load(&self.parameters[j..]));
+            let mut found = middle;
+            for c in 0..4 {
+                let own = arc_component(middle[c], tangent[c], square);
+                found[c] = polynomial(own, parameter).canonical();
             }
+            L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
         }
-        self.keep(&found);
-    }
-
-    /// Turns arrays of components into rotations.
-    #[inline(always)]
-    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
-        let mut rotations = [[0.0; 4]; LANES];
-        for j in 0..whole(self.count) {
-            rotations[j] = [x[j], y[j], z[j], w[j]];
-        }
-        self.rotations = rotations;
     }
 }
 

@@ -2,7 +2,6 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes::whole;
 use crate::fit::tangent_weights::UNKNOWN;
 use crate::from_keys::arcs::LANES;
 use crate::math::canonical::canonical;
@@ -48,9 +47,11 @@ impl InLanes for CubicBlock {
     fn run<L: Lanes>(&mut self) {
         let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
         let mut unresolved = 0;
+        // The lanes of a partly filled vector would be computed one by one.
+        let whole = self.count.next_multiple_of(16).min(LANES);
         let [before, start, end, after] = &self.keys;
         let [first, last] = &self.weights;
-        for j in 0..whole(self.count) {
+        for j in 0..whole {
             let keys = [before[j], start[j], end[j], after[j]];
             let curve = small_angle_cubic(keys, first[j], last[j]);
             let c = &curve.powers;
@@ -71,7 +72,7 @@ impl InLanes for CubicBlock {
             (x[j], y[j], z[j], w[j]) = (component!(0), component!(1), component!(2), component!(3));
             unresolved += u32::from(found + self.held[j] == 0.0);
         }
-        for j in 0..whole(self.count) {
+        for j in 0..whole {
             self.rotations[j] = [x[j], y[j], z[j], w[j]];
         }
         self.unresolved += unresolved as usize;

@@ -4,7 +4,6 @@
 use std::ops::Range;
 
 use crate::curve::options::{Ends, InterpolationError, Path};
-use crate::fit::arc_lanes::LANES;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
 use crate::method::interpolation::Interpolation;
@@ -17,6 +16,9 @@ use crate::time::spans::{NONE, Source};
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
+
+/// The most arcs that are computed together.
+const LANES: usize = 64;
 
 /// Intervals that wait for their block, and the arcs that they become.
 struct ArcBlock {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 
 use crate::curve::options::Quantity;
-use crate::fit::constant_velocity::SteadyBlock;
+use crate::fit::constant_velocity::SteadyArcs;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::cut::{Cutter, Subcurve};
 use crate::fit::double::fit::{FitBlock, Tier, tier};
@@ -14,7 +14,6 @@ use crate::fit::double::intervals::{Intervals, LANES};
 use crate::fit::double::shape::Shape;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
-use crate::simd::dispatch::in_lanes;
 use crate::time::spans::{NONE, Part, Source, Spans};
 
 /// Fits curves in blocks, whose memory is kept. A curve that is taken belongs to the next span,
@@ -24,8 +23,8 @@ pub(crate) struct Fitting {
     quantity: Quantity,
     small_angle: Queue,
     full: Queue,
-    /// Made for the first track of two keys.
-    steady: Option<Box<SteadyBlock>>,
+    /// Tracks of two keys.
+    steady: SteadyArcs,
     cutter: Cutter,
     /// The spans as they were before the curves among them were cut.
     uncut: Spans,
@@ -60,7 +59,7 @@ impl Fitting {
             quantity,
             small_angle: Queue::new(Tier::SmallAngle),
             full: Queue::new(Tier::Full),
-            steady: None,
+            steady: SteadyArcs::default(),
             cutter: Cutter::new(shape, quantity),
             uncut: Spans::default(),
         }
@@ -129,13 +128,7 @@ impl Fitting {
     /// Takes the only two keys of a track, which are joined at constant velocity.
     pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
         let (source, segment) = new_segment(prepared);
-        let new = || Box::new(SteadyBlock::new());
-        let block = self.steady.get_or_insert_with(new);
-        block.push(keys, segment as u32);
-        if block.is_full() {
-            in_lanes(&mut **block);
-            block.write(&mut prepared.segments.polynomials);
-        }
+        self.steady.push(keys, segment);
         source
     }
 
@@ -154,10 +147,7 @@ impl Fitting {
                 run(block, &mut queue.spans, &mut self.cutter, prepared);
             }
         }
-        if let Some(block) = &mut self.steady {
-            in_lanes(&mut **block);
-            block.write(&mut prepared.segments.polynomials);
-        }
+        self.steady.fit(&mut prepared.segments.polynomials);
         self.cutter.cut(&mut prepared.segments.polynomials);
         prepared.put_subcurves(&self.cutter, &mut self.uncut);
         self.cutter.clear();
