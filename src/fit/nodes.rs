@@ -74,6 +74,16 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
         nodes
     }
 
+    /// The `i`th of all nodes: the middle, then those before it, then those after it.
+    #[inline(always)]
+    pub(crate) fn offset(&self, i: usize) -> f64 {
+        match i {
+            0 => 0.0,
+            _ if i <= PAIRS => f64::from(-self.at[i - 1]),
+            _ => f64::from(self.at[i - 1 - PAIRS]),
+        }
+    }
+
     /// The coefficients of s, s³, … and of s², s⁴, … of component `c`. Divided differences give
     /// Newton's polynomials in s² through the samples; these are then expanded in powers.
     #[inline(always)]

@@ -15,9 +15,9 @@ use crate::curve::formula::product::Product;
 use crate::curve::options::Quantity;
 use crate::fit::double::curve::{Curve, Piece};
 use crate::fit::double::intervals::{Intervals, LANES, Lane};
-use crate::fit::double::shape::Shape;
+use crate::fit::double::shape::{self, Shape};
 use crate::fit::motion::arc_length::Pace;
-use crate::fit::motion::derivatives as motion;
+use crate::fit::motion::derivatives::Motion;
 use crate::fit::nodes::{Nodes, tail};
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::lanes::{Lanes, canonical};
@@ -81,7 +81,7 @@ pub(crate) struct FitBlock {
     rates: Lane64,
     /// The arc lengths of curves traversed at constant speed; either every curve of a block has
     /// them or none.
-    paces: Vec<Option<Arc<Pace>>>,
+    paces: Vec<Arc<Pace>>,
     pub(crate) quantity: Quantity,
     /// How many curves it has.
     pub(crate) count: usize,
@@ -113,7 +113,7 @@ impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
     }
 }
 
-impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
+impl<const PAIRS: usize> Samples<Lane32, PAIRS> {
     /// The samples of one vector's lanes, from `lane` on.
     #[inline(always)]
     pub(crate) fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
@@ -169,20 +169,6 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
             self.odd[PAIRS - 1][c] = (after[c] + before[c]) - odd;
         }
     }
-
-    /// The samples with each vector's lanes in an array.
-    #[inline(always)]
-    pub(crate) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {
-        let mut lanes = Samples::all([0.0; MOST]);
-        for c in 0..4 {
-            self.middle[c].store(&mut lanes.middle[c][..L::COUNT]);
-            for k in 0..PAIRS {
-                self.even[k][c].store(&mut lanes.even[k][c][..L::COUNT]);
-                self.odd[k][c].store(&mut lanes.odd[k][c][..L::COUNT]);
-            }
-        }
-        lanes
-    }
 }
 
 impl FitBlock {
@@ -227,9 +213,7 @@ impl FitBlock {
             lanes[lane] = number;
         }
         self.rates[lane] = curve.rate;
-        if curve.pace.is_some() {
-            self.paces.push(curve.pace.clone());
-        }
+        self.paces.extend(curve.pace.clone());
         let (start, width) = piece.extent();
         self.widths[lane] = width;
         self.middles[lane] = start + 0.5 * width;
@@ -263,21 +247,20 @@ impl FitBlock {
         self.count = own.end;
     }
 
-    /// The own numbers of the curve in a lane, followed by zeros.
+    /// All numbers of the curve in a lane.
     pub(crate) fn numbers_of(&self, lane: usize) -> Numbers {
-        let own = &self.numbers[..];
-        array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
+        self.shape.with(|i| self.numbers[i][lane])
     }
 
     /// The whole curve in a lane.
     pub(crate) fn curve(&self, lane: usize) -> Curve {
         Curve {
             shape: self.shape,
-            numbers: self.shape.with(|i| self.numbers[i][lane]),
+            numbers: self.numbers_of(lane),
             piece: Piece::WHOLE,
             quantity: self.quantity,
             rate: self.rates[lane],
-            pace: self.paces.get(lane).cloned().flatten(),
+            pace: self.paces.get(lane).cloned(),
         }
     }
 
@@ -297,7 +280,7 @@ impl FitBlock {
         match self.quantity {
             _ if self.count == 0 => {}
             Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self, segments),
-            _ => motion::fit(self, segments),
+            _ => shape::fit::<Motion>(self, segments),
         }
         segments.pop();
     }

@@ -18,7 +18,7 @@ use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles as _, Lanes};
+use crate::simd::lanes::{Doubles, Lanes};
 
 /// A formula, and how its curves are sampled.
 pub(crate) struct Shape {
@@ -103,7 +103,7 @@ pub(crate) trait Sampling: 'static {
 }
 
 /// Fits the curves of a block.
-fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+pub(crate) fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
     in_lanes(&mut Fit::<S>(block, segments, PhantomData));
 }
 
@@ -149,14 +149,16 @@ impl<F: Formula> Sampling for Directly<F> {
             let mut found = [[L::Doubles::all(0.0); 4]; 2 * MOST_PAIRS + 1];
             let mut doubt = L::Doubles::all(0.0);
             for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-                let node = match i {
-                    0 => 0.0,
-                    _ if i <= PAIRS => -nodes.at[i - 1],
-                    _ => nodes.at[i - 1 - PAIRS],
-                };
-                let t = at + L::Doubles::all(f64::from(node)) * width;
+                let t = at + L::Doubles::all(nodes.offset(i)) * width;
                 *found = rotation::<F, _>(&numbers, t);
                 doubt = doubt + self::doubt(*found);
+            }
+            if !doubt.are_at_most(0.0) {
+                let mut doubts = [0.0; MOST];
+                doubt.store(&mut doubts);
+                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
+                    sample_full_range::<F, _, PAIRS>(block, lane + j, nodes, j, &mut found);
+                }
             }
             let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
@@ -168,15 +170,6 @@ impl<F: Formula> Sampling for Directly<F> {
                     samples.even[k][c] = L::rounded(sum);
                     samples.odd[k][c] = L::rounded(after[c] - before[c]);
                 }
-            }
-            if !doubt.are_at_most(0.0) {
-                let mut doubts = [0.0; MOST];
-                doubt.store(&mut doubts);
-                let mut lanes = samples.lanes();
-                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
-                    sample_full_range::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
-                }
-                samples = lanes.at(0);
             }
             block.interpolate(lane, nodes, &samples, segments);
         }
@@ -196,28 +189,24 @@ fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
 }
 
 /// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
-/// into the `j`th place of the sample arrays.
+/// into the `j`th lane of the vectors found.
 #[inline(never)]
-fn sample_full_range<F: Formula, const PAIRS: usize>(
+fn sample_full_range<F: Formula, D: Doubles, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<[f32; MOST], PAIRS>,
     j: usize,
+    found: &mut [[D; 4]],
 ) {
     let numbers = block.numbers_of(lane);
-    let between: Quaternion = F::rotation(&numbers, block.middles[lane]);
-    for c in 0..4 {
-        middle[c][j] = between[c] as f32;
-    }
-    for (k, &node) in nodes.at.iter().enumerate() {
-        let reach = f64::from(node) * block.widths[lane];
-        let before: Quaternion = F::rotation(&numbers, block.middles[lane] - reach);
-        let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
-        for c in 0..4 {
-            let sum = (after[c] - between[c]) + (before[c] - between[c]);
-            even[k][c][j] = sum as f32;
-            odd[k][c][j] = (after[c] - before[c]) as f32;
+    let (at, width) = (block.middles[lane], block.widths[lane]);
+    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
+        let own: Quaternion = F::rotation(&numbers, at + nodes.offset(i) * width);
+        for (found, own) in found.iter_mut().zip(own) {
+            let mut lanes = [0.0; MOST];
+            found.store(&mut lanes);
+            lanes[j] = own;
+            *found = D::load(&lanes);
         }
     }
 }

@@ -2,13 +2,13 @@
 //! second order, and the results are fitted like the rotations themselves.
 
 use crate::curve::options::{Axes, Quantity};
-use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
+use crate::fit::double::fit::{FitBlock, Lane32, Samples};
 use crate::fit::double::intervals::LANES;
-use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
+use crate::fit::double::shape::Sampling;
+use crate::fit::nodes::Nodes;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, rotated, step};
 use crate::shader::PolynomialSegment;
-use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
@@ -38,37 +38,26 @@ fn finite(value: f64) -> f64 {
     value.clamp(-largest, largest)
 }
 
-/// Fits a block's velocities or accelerations.
-pub(crate) fn fit(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
-    in_lanes(&mut Fit(block, segments));
-}
+/// Samples velocities or accelerations, curve by curve.
+pub(crate) struct Motion;
 
-struct Fit<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
-
-impl InLanes for Fit<'_> {
+impl Sampling for Motion {
     #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        match self.0.tier {
-            Tier::SmallAngle => self.fit::<L, _>(&SMALL_ANGLE_NODES),
-            Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
-        }
-    }
-}
-
-impl Fit<'_> {
-    #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
-        let count = self.0.whole();
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
+        let count = block.whole();
         let mut samples = Samples::all([0.0; LANES]);
         let mut scales = [1.0; LANES];
         for (lane, scale) in scales[..count].iter_mut().enumerate() {
-            *scale = sample(self.0, lane, nodes, &mut samples);
+            *scale = sample(block, lane, nodes, &mut samples);
         }
         for lane in (0..count).step_by(L::COUNT) {
-            self.0
-                .interpolate(lane, nodes, &samples.at::<L>(lane), self.1);
+            block.interpolate(lane, nodes, &samples.at::<L>(lane), segments);
         }
-        self.0.scale(&scales, self.1);
+        block.scale(&scales, segments);
     }
 }
 
