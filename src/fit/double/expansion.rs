@@ -139,33 +139,22 @@ fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     if squared.are_at_most(limit) {
         return turn;
     }
-    let mut lanes = Turns {
-        vectors: lanes(vector),
-        turns: lanes(turn),
-    };
-    lanes.beyond(limit);
-    let [x, y, z, w] = &lanes.turns;
+    let mut turns = lanes(turn);
+    exp_beyond(limit, &lanes(vector), &mut turns);
+    let [x, y, z, w] = &turns;
     [D::load(x), D::load(y), D::load(z), D::load(w)]
 }
 
-/// Half-rotation vectors and their exponentials.
-struct Turns {
-    vectors: [[f64; MOST]; 3],
-    turns: [[f64; MOST]; 4],
-}
-
-impl Turns {
-    /// Computes the exponentials of vectors whose squares exceed `limit`, over the full range.
-    #[inline(never)]
-    fn beyond(&mut self, limit: f64) {
-        for lane in 0..MOST {
-            let vector = self.vectors.map(|lanes| lanes[lane]);
-            let squared = square(vector);
-            if squared > limit || squared.is_nan() {
-                let turn = quaternion::exp(vector);
-                for (lanes, component) in self.turns.iter_mut().zip(turn) {
-                    lanes[lane] = component;
-                }
+/// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full
+/// range.
+#[inline(never)]
+fn exp_beyond(limit: f64, vectors: &[[f64; MOST]; 3], turns: &mut [[f64; MOST]; 4]) {
+    for lane in 0..MOST {
+        let vector = vectors.map(|lanes| lanes[lane]);
+        let squared = square(vector);
+        if squared > limit || squared.is_nan() {
+            for (lanes, component) in turns.iter_mut().zip(quaternion::exp(vector)) {
+                lanes[lane] = component;
             }
         }
     }
