@@ -5,16 +5,14 @@
 //! enter as differences from it, for which f32 is precise enough. Divided differences come first
 //! and powers last, which keeps the rounding errors of f32 small.
 
-use std::array;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
 use crate::curve::formula::Numbers;
-use crate::curve::formula::product::Product;
 use crate::curve::options::Quantity;
 use crate::fit::double::curve::{Curve, Piece};
-use crate::fit::double::intervals::{Intervals, LANES, Lane};
+use crate::fit::double::intervals::{Intervals, LANES};
 use crate::fit::double::shape::{self, Shape};
 use crate::fit::motion::arc_length::Pace;
 use crate::fit::motion::derivatives::Motion;
@@ -223,19 +221,9 @@ impl FitBlock {
     /// Adds the curves in some lanes of `intervals`; the block must have room for them.
     pub(crate) fn push_from(&mut self, intervals: &Intervals, lanes: &[u8]) {
         let own = self.count..self.count + lanes.len();
-        let (to, from) = (&mut self.numbers[..], &intervals.numbers[..]);
-        // With a count known at compile time all numbers of a lane are copied at once, which takes
-        // half the instructions.
-        if let (Ok(to), Ok(from)) = (to.try_into(), from.try_into()) {
-            copy::<{ Product::BASIS }>(to, own.start, from, lanes);
-        } else {
-            for (numbers, all) in self.numbers.iter_mut().zip(&intervals.numbers) {
-                copy(
-                    array::from_mut(numbers),
-                    own.start,
-                    array::from_ref(all),
-                    lanes,
-                );
+        for (numbers, all) in self.numbers.iter_mut().zip(&intervals.numbers) {
+            for (number, &lane) in numbers[own.clone()].iter_mut().zip(lanes) {
+                *number = all[usize::from(lane) % LANES];
             }
         }
         for (rate, &lane) in self.rates[own.clone()].iter_mut().zip(lanes) {
@@ -369,14 +357,4 @@ pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
         }
     }
     (powers, tails)
-}
-
-/// Copies the numbers of some lanes to consecutive lanes from `start` on.
-#[inline(always)]
-fn copy<const N: usize>(to: &mut [Lane64; N], start: usize, from: &[Lane; N], lanes: &[u8]) {
-    for (place, &lane) in (start..).zip(lanes) {
-        for c in 0..N {
-            to[c][place % LANES] = from[c][usize::from(lane) % LANES];
-        }
-    }
 }
