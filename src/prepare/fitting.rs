@@ -98,7 +98,7 @@ impl Fitting {
             Tier::Piece => {
                 let curve = curves.curve(lane, self.shape, self.quantity);
                 if let Source::Segment(place) = prepared.spans.sources[span] {
-                    self.cutter.push(span, curve, place as usize);
+                    self.cutter.push(span, curve, Some(place as usize));
                 }
                 return;
             }
@@ -135,7 +135,7 @@ impl Fitting {
     /// Takes a curve of any length as the next span. [`Fitting::finish`] fits it, and cuts it if
     /// necessary.
     pub(crate) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
-        self.cutter.push_whole(prepared.spans.sources.len(), curve);
+        self.cutter.push(prepared.spans.sources.len(), curve, None);
         UNTRIED
     }
 
@@ -167,7 +167,7 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     if !block.is_trusted() {
         for (lane, &span) in own.iter().enumerate() {
             if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), block.places[lane]);
+                cutter.push(span, block.curve(lane), Some(block.places[lane]));
             }
         }
     }
