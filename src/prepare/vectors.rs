@@ -5,7 +5,7 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
 use crate::curve::options::Quantity;
-use crate::fit::double::curve::{Curve, Piece};
+use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
 use crate::math::canonical::{canonical, round_f32, round_quat};
 use crate::math::quaternion::ratio;
@@ -128,12 +128,5 @@ fn line(from: DVec3, slope: DVec3) -> Curve {
     let mut numbers = shape.shared;
     numbers[..3].copy_from_slice(&from.to_array());
     numbers[4..7].copy_from_slice(&slope.to_array());
-    Curve {
-        shape,
-        numbers,
-        piece: Piece::WHOLE,
-        quantity: Quantity::Rotation,
-        rate: 1.0,
-        pace: None,
-    }
+    Curve::new(shape, numbers, Quantity::Rotation, 1.0)
 }

@@ -242,13 +242,10 @@ impl FitBlock {
 
     /// The whole curve in a lane.
     pub(crate) fn curve(&self, lane: usize) -> Curve {
+        let (numbers, rate) = (self.numbers_of(lane), self.rates[lane]);
         Curve {
-            shape: self.shape,
-            numbers: self.numbers_of(lane),
-            piece: Piece::WHOLE,
-            quantity: self.quantity,
-            rate: self.rates[lane],
             pace: self.paces.get(lane).cloned(),
+            ..Curve::new(self.shape, numbers, self.quantity, rate)
         }
     }
 

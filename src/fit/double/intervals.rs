@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use crate::curve::options::Quantity;
-use crate::fit::double::curve::{Curve, Piece};
+use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{self, Arithmetic, Quaternion, Vector, square};
 use crate::simd::lanes::{Doubles, Lanes};
@@ -252,14 +252,8 @@ impl Intervals {
 
     /// The curve of an interval.
     pub(crate) fn curve(&self, lane: usize, shape: &'static Shape, quantity: Quantity) -> Curve {
-        Curve {
-            shape,
-            numbers: shape.with(|i| self.numbers[i][lane]),
-            piece: Piece::WHOLE,
-            quantity,
-            rate: self.rate(lane),
-            pace: None,
-        }
+        let numbers = shape.with(|i| self.numbers[i][lane]);
+        Curve::new(shape, numbers, quantity, self.rate(lane))
     }
 
     /// The keys at both ends of an interval.

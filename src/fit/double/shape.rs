@@ -21,6 +21,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
 
 /// A formula, and how its curves are sampled.
+#[derive(Debug)]
 pub(crate) struct Shape {
     /// The count of numbers that differ from curve to curve.
     pub(crate) own: usize,
@@ -58,9 +59,7 @@ impl Shape {
         }
         numbers
     }
-}
 
-impl Shape {
     /// [`Product`] with Bernstein's basis.
     pub(crate) const BERNSTEIN: &'static Self = &Self {
         own: Product::BASIS,
@@ -75,20 +74,14 @@ impl Shape {
         fit: fit::<Expansion<true>>,
         ..Self::of::<Product>(NUMBERS)
     };
-    /// [`DeCasteljau`].
     pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
-    /// [`Squad`].
     pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16);
-    /// [`Linear`].
     pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16);
-    /// [`Hermite`].
     pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16);
-    /// [`Line`].
     pub(crate) const LINE: &'static Self = &Self {
         is_unit: false,
         ..Self::of::<Line>(8)
     };
-    /// [`RotationVector`].
     pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
 }
 
