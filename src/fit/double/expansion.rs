@@ -3,7 +3,7 @@
 use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
-use crate::fit::double::intervals::{LANES, load, load3, load4, rounded};
+use crate::fit::double::intervals::{load, rounded};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
 use crate::math::quaternion::{
@@ -49,7 +49,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
         let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
-        let base = load4::<L, LANES>(from(&block.numbers, 0), lane);
+        let base = load::<L, _, _>(from(&block.numbers, 0), lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
         block.interpolate(lane, nodes, &samples, segments);
     }
@@ -80,7 +80,7 @@ impl<L: Lanes> Factor<L> {
     ) -> Self {
         let place = Product::BASIS + 4 * j;
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load4::<L, LANES>(from(&block.numbers, place), lane)
+            load::<L, _, _>(from(&block.numbers, place), lane)
         } else {
             [
                 all::<L>(shared[place]),
@@ -93,11 +93,11 @@ impl<L: Lanes> Factor<L> {
             (all::<L>(0.5), all::<L>(1.0))
         } else {
             (
-                load::<L>(&block.middles, lane),
-                load::<L>(&block.widths, lane),
+                L::Doubles::load(&block.middles[lane..]),
+                L::Doubles::load(&block.widths[lane..]),
             )
         };
-        let vector = load3::<L, LANES>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let vector = load::<L, _, _>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
         let squared = square(vector);
         let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
         // B_j(middle + s width) - B_j(middle), in powers of s.

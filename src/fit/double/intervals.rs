@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::curve::options::Quantity;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{self, Arithmetic, Quaternion, Vector, square};
+use crate::math::quaternion::{self, Arithmetic, Quaternion, Real as _, Vector, square};
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::time::spans::NONE;
 use crate::tracks::set::Track;
@@ -275,11 +275,13 @@ impl Intervals {
     }
 }
 
+/// The numbers of a lane.
 #[inline(always)]
 pub(crate) fn at<const N: usize>(lanes: &[Lane; N], lane: usize) -> [f64; N] {
     std::array::from_fn(|i| lanes[i][lane])
 }
 
+/// Sets the numbers of a lane.
 #[inline(always)]
 pub(crate) fn put<const N: usize>(lanes: &mut [Lane; N], lane: usize, value: [f64; N]) {
     for (lanes, value) in lanes.iter_mut().zip(value) {
@@ -295,30 +297,16 @@ pub(crate) fn squared_extent<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
 
 /// The numbers of a vector's lanes from `lane` on.
 #[inline(always)]
-pub(crate) fn load<L: Lanes>(numbers: &[f64], lane: usize) -> L::Doubles {
-    L::Doubles::load(&numbers[lane..])
-}
-
-// Written out: closures are not always inlined.
-#[inline(always)]
-pub(crate) fn load3<L: Lanes, const WIDTH: usize>(
-    [x, y, z]: &[[f64; WIDTH]; 3],
+pub(crate) fn load<L: Lanes, const N: usize, const WIDTH: usize>(
+    lanes: &[[f64; WIDTH]; N],
     lane: usize,
-) -> [L::Doubles; 3] {
-    [load::<L>(x, lane), load::<L>(y, lane), load::<L>(z, lane)]
-}
-
-#[inline(always)]
-pub(crate) fn load4<L: Lanes, const WIDTH: usize>(
-    [x, y, z, w]: &[[f64; WIDTH]; 4],
-    lane: usize,
-) -> [L::Doubles; 4] {
-    [
-        load::<L>(x, lane),
-        load::<L>(y, lane),
-        load::<L>(z, lane),
-        load::<L>(w, lane),
-    ]
+) -> [L::Doubles; N] {
+    // A loop: closures are not always inlined.
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::Doubles::load(&lanes[c][lane..]);
+    }
+    own
 }
 
 #[inline(always)]

@@ -12,7 +12,7 @@ use crate::curve::formula::squad::Squad;
 use crate::curve::formula::{Formula, NUMBERS, Numbers};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
-use crate::fit::double::intervals::{load, rounded};
+use crate::fit::double::intervals::rounded;
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
@@ -133,10 +133,10 @@ impl<F: Formula> Sampling for Directly<F> {
         for lane in (0..block.whole()).step_by(L::COUNT) {
             let mut numbers = [L::Doubles::all(0.0); NUMBERS];
             for (own, lanes) in numbers.iter_mut().zip(&block.numbers) {
-                *own = load::<L>(lanes, lane);
+                *own = L::Doubles::load(&lanes[lane..]);
             }
-            let at = load::<L>(&block.middles, lane);
-            let width = load::<L>(&block.widths, lane);
+            let at = L::Doubles::load(&block.middles[lane..]);
+            let width = L::Doubles::load(&block.widths[lane..]);
             // One loop over all nodes: the formula is compiled once, and what does not change along
             // a curve is computed once.
             let mut found = [[L::Doubles::all(0.0); 4]; 2 * MOST_PAIRS + 1];
