@@ -8,9 +8,8 @@ use crate::curve::options::Ends;
 use crate::fit::double::handles::Steps;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
-use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
+use crate::fit::single::handles::{FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT};
 use crate::fit::single::hermite_fit::Halves;
-use crate::fit::single::key_steps::{FindSteps, KeySteps};
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
@@ -30,7 +29,6 @@ const SPANS: usize = 2 * LANES;
 
 /// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
-    steps: KeySteps,
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     whole: HandlesF32,
@@ -60,7 +58,6 @@ pub(crate) struct Direct {
 impl Direct {
     pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends) -> Self {
         Self {
-            steps: KeySteps::new(),
             weights: KeyWeights::new(how.weights, ends),
             small_angle: SmallAngleLanes::new(),
             whole: HandlesF32::new(),
@@ -83,27 +80,20 @@ impl Direct {
     /// Finds the steps, handles and curves of a block's intervals, and the small-angle cubics.
     pub(crate) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         in_lanes(&mut FindSteps {
-            steps: &mut self.steps,
+            lanes: &mut self.whole,
             intervals,
         });
         self.weights.bring(intervals, stretches);
-        self.small_angle.look(&self.steps, stretches);
+        self.small_angle.look(&self.whole.chords, stretches);
         if self.small_angle.may_hold() {
             (self.small_angle).prepare(intervals, &self.weights, stretches);
         }
         self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
-        in_lanes(&mut FindHandles {
+        in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
-            steps: &self.steps,
             weights: &self.weights,
             intervals,
             find_long: self.find_long,
-        });
-        in_lanes(&mut FindCurves {
-            lanes: &mut self.whole,
-            steps: &self.steps,
-            weights: &self.weights,
-            intervals,
         });
     }
 

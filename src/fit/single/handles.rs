@@ -1,5 +1,5 @@
-//! Handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then fits
-//! them whole or in two halves.
+//! Steps, handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then
+//! fits the curves whole or in two halves.
 //!
 //! Steps come from the differences of neighbouring keys, which are as exact in f32 as the keys,
 //! and rotations are stored as their difference from the identity: rounding errors are then small
@@ -8,9 +8,8 @@
 
 use crate::fit::double::intervals::{Intervals, ROOM, squared_extent};
 use crate::fit::single::exp_log::{
-    LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
+    LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
 };
-use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
@@ -18,7 +17,7 @@ use crate::math::ranges::MEDIUM_SQUARE;
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
-use crate::twin::small_angle::composed;
+use crate::twin::small_angle::{FromIdentity, chord_of, composed, step_vector};
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
 /// [`LARGEST_COSINE_MINUS_ONE`]; from Chebyshev nodes, within 5e-10.
@@ -37,6 +36,19 @@ const MEDIUM_LOG: [f64; 8] = [
 /// a squared extent of at most [`LONGEST_DIRECT`].
 const LARGEST_COSINE_MINUS_ONE: f32 = 0.5645;
 
+/// The largest squared chord between keys for which [`LOG`] holds.
+const LONGEST_CHORD: f32 = 1.0;
+
+/// The largest squared extent of a curve whose f32 numbers hold.
+pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
+
+/// Added to the squared extent of a curve whose numbers may not hold.
+const IN_DOUBT: f64 = 2.0;
+const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
+
+const THIRD: f32 = 1.0 / 3.0;
+const TWO_THIRDS: f32 = 2.0 / 3.0;
+
 /// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
 /// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
 const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
@@ -44,8 +56,12 @@ const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 /// The first key of each curve, its three half-rotation vectors, and its last key.
 pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
-/// The handles and curves of a block's intervals, in f32.
+/// The steps, handles and curves of a block's intervals, in f32.
 pub(crate) struct HandlesF32 {
+    /// The squares of the differences of keys.
+    pub(crate) chords: Row,
+    /// The steps' logarithms.
+    logs: [Row; 3],
     /// The lanes whose curves are asked for.
     pub(crate) wanted: [bool; ROOM],
     /// Handles at the key that the interval starts with, towards the interval before it
@@ -63,6 +79,8 @@ pub(crate) struct HandlesF32 {
 impl HandlesF32 {
     pub(crate) fn new() -> Self {
         Self {
+            chords: [0.0; ROOM],
+            logs: [[0.0; ROOM]; 3],
             wanted: [false; ROOM],
             incoming: [[0.0; ROOM]; 3],
             outgoing: [[0.0; ROOM]; 3],
@@ -73,20 +91,52 @@ impl HandlesF32 {
     }
 }
 
-/// Finds the handles of the keys between intervals.
-pub(crate) struct FindHandles<'a> {
+/// Finds the steps between keys.
+pub(crate) struct FindSteps<'a> {
     pub(crate) lanes: &'a mut HandlesF32,
-    pub(crate) steps: &'a KeySteps,
+    pub(crate) intervals: &'a Intervals,
+}
+
+impl InLanes for FindSteps<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Intervals { from, to, .. } = self.intervals;
+        let own = &mut *self.lanes;
+        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+            let start = L::load_rotations(&from[lane..]);
+            let chord = chord_of(start, L::load_rotations(&to[lane..]));
+            let chord_square = dot(chord, chord);
+            let step = FromIdentity {
+                vector: step_vector(start, chord),
+                cosm1: chord_square * L::all(-0.5),
+            };
+            chord_square.store(&mut own.chords[lane..lane + L::COUNT]);
+            store(&mut own.logs, lane, log(step, &LOG));
+        }
+    }
+}
+
+/// Finds the handles of the keys between intervals, and the curves between handles.
+pub(crate) struct FindCurves<'a> {
+    pub(crate) lanes: &'a mut HandlesF32,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
     /// Finds the handles for which the range of f32's formulas is too short, in f64.
     pub(crate) find_long: fn(&mut LongTangents),
 }
 
-impl InLanes for FindHandles<'_> {
+impl InLanes for FindCurves<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let (steps, weights, intervals) = (self.steps, self.weights, self.intervals);
+        self.handles::<L>();
+        self.curves::<L>();
+    }
+}
+
+impl FindCurves<'_> {
+    #[inline(always)]
+    fn handles<L: Lanes>(&mut self) {
+        let (weights, intervals) = (self.weights, self.intervals);
         let own = &mut *self.lanes;
         let (mut long_tangents, mut far_count) = ([0; ROOM], 0);
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
@@ -97,8 +147,8 @@ impl InLanes for FindHandles<'_> {
             let before = L::load(&weights.before[key..]);
             let after = L::load(&weights.after[key..]);
             let to_end = L::load(&weights.outgoing[key..]);
-            let left = scaled(load3::<L>(&steps.logs, lane), before);
-            let right = scaled(load3::<L>(&steps.logs, key), after);
+            let left = scaled(load3::<L>(&own.logs, lane), before);
+            let right = scaled(load3::<L>(&own.logs, key), after);
             let turn = composed(long_exp(left), long_exp(right));
             let tangent = log(turn, &LONG_LOG);
             let to_start = L::all(THIRD) - to_end;
@@ -122,37 +172,17 @@ impl InLanes for FindHandles<'_> {
             own.set_far(keys, intervals, self.find_long);
         }
     }
-}
 
-/// The largest squared extent of a curve whose f32 numbers hold.
-pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
-
-/// Added to the squared extent of a curve whose numbers may not hold.
-const IN_DOUBT: f64 = 2.0;
-const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
-
-const THIRD: f32 = 1.0 / 3.0;
-const TWO_THIRDS: f32 = 2.0 / 3.0;
-
-/// Finds the curves between handles.
-pub(crate) struct FindCurves<'a> {
-    pub(crate) lanes: &'a mut HandlesF32,
-    pub(crate) steps: &'a KeySteps,
-    pub(crate) weights: &'a KeyWeights,
-    pub(crate) intervals: &'a Intervals,
-}
-
-impl InLanes for FindCurves<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let (steps, kinds, intervals) = (self.steps, &self.weights.kinds, self.intervals);
+    fn curves<L: Lanes>(&mut self) {
+        let (kinds, intervals) = (&self.weights.kinds, self.intervals);
         let whole = &mut *self.lanes;
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let (own, next) = (lane + 1, lane + 2);
             if !whole.wanted[own..own + L::COUNT].contains(&true) {
                 continue;
             }
-            let log = load3::<L>(&steps.logs, own);
+            let log = load3::<L>(&whole.logs, own);
             let outgoing = load3::<L>(&whole.outgoing, own);
             let incoming = load3::<L>(&whole.incoming, next);
             // At a track's ends the handle is 0 so far; there it becomes the parabola's.
@@ -164,9 +194,9 @@ impl InLanes for FindCurves<'_> {
             let start = L::load_rotations(&intervals.from[own..]);
             let end = L::load_rotations(&intervals.to[own..]);
             let (w2, cosine_minus_one) = between::<L>(w1, [start, end], w3);
-            let chord = L::load(&steps.chords[own..]);
-            let before = L::load(&steps.chords[lane..]);
-            let after = L::load(&steps.chords[next..]);
+            let chord = L::load(&whole.chords[own..]);
+            let before = L::load(&whole.chords[lane..]);
+            let after = L::load(&whole.chords[next..]);
             let chords = before.larger(chord.larger(after)) * L::all(1.0 / LONGEST_CHORD);
             let far = L::load(&whole.far[own..]).larger(L::load(&whole.far[next..]));
             let far = far

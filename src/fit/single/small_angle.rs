@@ -4,7 +4,6 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::key_steps::KeySteps;
 use crate::fit::single::key_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -42,12 +41,11 @@ impl SmallAngleLanes {
     }
 
     /// Finds the intervals whose steps are short enough.
-    pub(crate) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) {
+    pub(crate) fn look(&mut self, chords: &[f32; ROOM], stretches: &[Stretch]) {
         for j in 1..LANES {
-            let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
-            self.near[j] = (chords[0] <= LONGEST_STEP)
-                & (chords[1] <= LONGEST_STEP)
-                & (chords[2] <= LONGEST_STEP);
+            self.near[j] = (chords[j - 1] <= LONGEST_STEP)
+                & (chords[j] <= LONGEST_STEP)
+                & (chords[j + 1] <= LONGEST_STEP);
         }
         self.holds = [false; ROOM];
         let mut last = None;
