@@ -84,10 +84,8 @@ impl Direct {
             intervals,
         });
         self.weights.bring(intervals, stretches);
-        self.small_angle.look(&self.whole.chords, stretches);
-        if self.small_angle.may_hold() {
-            (self.small_angle).prepare(intervals, &self.weights, stretches);
-        }
+        let chords = &self.whole.chords;
+        (self.small_angle).find(chords, intervals, &self.weights, stretches);
         self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
@@ -106,20 +104,16 @@ impl Direct {
         lanes: Range<usize>,
         key: u32,
     ) {
-        if self.small_angle.may_hold() {
-            for lane in lanes.clone().filter(|&lane| self.small_angle.holds[lane]) {
-                // A negative squared extent puts the lane on no list.
-                self.whole.energies[lane] = -1.0;
-            }
+        for lane in lanes.clone().filter(|&lane| self.small_angle.holds[lane]) {
+            // A negative squared extent puts the lane on no list.
+            self.whole.energies[lane] = -1.0;
         }
         self.list(lanes.clone());
         self.begin(prepared, intervals, lanes.clone(), key);
-        if self.small_angle.may_hold() {
-            for lane in lanes.filter(|&lane| self.small_angle.holds[lane]) {
-                let place = self.places[lane] as usize;
-                self.small_angle
-                    .write(lane, &mut prepared.segments.polynomials[place]);
-            }
+        for lane in lanes.filter(|&lane| self.small_angle.holds[lane]) {
+            let place = self.places[lane] as usize;
+            self.small_angle
+                .write(lane, &mut prepared.segments.polynomials[place]);
         }
     }
 
