@@ -4,8 +4,6 @@ use crate::curve::options::Ends;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::tangent_weights::{UNKNOWN, WeightRule};
 use crate::shader::TangentWeights;
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
 
 /// A [`TangentWeights`] for the key that each interval of a block starts with.
 pub(crate) struct KeyWeights {
@@ -51,10 +49,10 @@ impl KeyWeights {
 
     /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
-        in_lanes(&mut Between {
-            weights: self,
-            durations: &intervals.durations,
-        });
+        for lane in 0..LANES {
+            let [before, after] = [lane, lane + 1].map(|lane| intervals.durations[lane]);
+            self.set(lane + 1, self.rule.between(before, after));
+        }
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
             let end = match stretch.all {
@@ -68,34 +66,6 @@ impl KeyWeights {
             if let Some(lane) = stretch.last() {
                 self.set(lane + 1, end);
             }
-        }
-    }
-}
-
-struct Between<'a> {
-    weights: &'a mut KeyWeights,
-    durations: &'a [f64; ROOM],
-}
-
-impl InLanes for Between<'_> {
-    // The compiler vectorises this loop.
-    #[allow(clippy::needless_range_loop)]
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let KeyWeights {
-            rule,
-            before,
-            after,
-            outgoing,
-            kinds,
-            ..
-        } = &mut *self.weights;
-        for j in 0..LANES {
-            let tangent_weights = rule.between(self.durations[j], self.durations[j + 1]);
-            before[j + 1] = tangent_weights.before;
-            after[j + 1] = tangent_weights.after;
-            outgoing[j + 1] = tangent_weights.outgoing;
-            kinds[j + 1] = tangent_weights.kind;
         }
     }
 }
