@@ -53,15 +53,11 @@ impl HandlesF32 {
         find: fn(&mut LongTangents),
     ) {
         let mut far = LongTangents {
-            before: Side::none(),
-            after: Side::none(),
+            before: Side::new(intervals, keys.iter().map(|key| key - 1)),
+            after: Side::new(intervals, keys.iter().copied()),
             incoming: [[0.0; AT_ONCE]; 3],
             outgoing: [[0.0; AT_ONCE]; 3],
         };
-        for (i, &key) in keys.iter().enumerate() {
-            far.before.set(i, intervals, key - 1);
-            far.after.set(i, intervals, key);
-        }
         find(&mut far);
         for (i, &key) in keys.iter().enumerate() {
             for c in 0..3 {
@@ -74,21 +70,21 @@ impl HandlesF32 {
 }
 
 impl Side {
-    fn none() -> Self {
-        Self {
+    fn new(intervals: &Intervals, lanes: impl Iterator<Item = usize>) -> Self {
+        let mut side = Self {
             from: [[0.0; AT_ONCE]; 4],
             to: [[0.0; AT_ONCE]; 4],
             durations: [1.0; AT_ONCE],
+        };
+        for (i, lane) in lanes.enumerate() {
+            let [from, to] = intervals.keys(lane);
+            for c in 0..4 {
+                side.from[c][i] = f64::from(from[c]);
+                side.to[c][i] = f64::from(to[c]);
+            }
+            side.durations[i] = intervals.durations[lane];
         }
-    }
-
-    fn set(&mut self, i: usize, intervals: &Intervals, lane: usize) {
-        let [from, to] = intervals.keys(lane);
-        for c in 0..4 {
-            self.from[c][i] = f64::from(from[c]);
-            self.to[c][i] = f64::from(to[c]);
-        }
-        self.durations[i] = intervals.durations[lane];
+        side
     }
 
     #[inline(always)]
