@@ -275,15 +275,20 @@ impl Intervals {
     }
 }
 
-/// The numbers of a lane.
 #[inline(always)]
-pub(crate) fn at<const N: usize>(lanes: &[Lane; N], lane: usize) -> [f64; N] {
+pub(crate) fn at<const N: usize, const WIDTH: usize>(
+    lanes: &[[f64; WIDTH]; N],
+    lane: usize,
+) -> [f64; N] {
     std::array::from_fn(|i| lanes[i][lane])
 }
 
-/// Sets the numbers of a lane.
 #[inline(always)]
-pub(crate) fn put<const N: usize>(lanes: &mut [Lane; N], lane: usize, value: [f64; N]) {
+pub(crate) fn put<const N: usize, const WIDTH: usize>(
+    lanes: &mut [[f64; WIDTH]; N],
+    lane: usize,
+    value: [f64; N],
+) {
     for (lanes, value) in lanes.iter_mut().zip(value) {
         lanes[lane] = value;
     }
@@ -316,7 +321,11 @@ pub(crate) fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
 
 /// Stores numbers to the lanes from `lane` on.
 #[inline(always)]
-pub(crate) fn store<D: Doubles, const N: usize>(lanes: &mut [Lane; N], lane: usize, own: [D; N]) {
+pub(crate) fn store<D: Doubles, const N: usize, const WIDTH: usize>(
+    lanes: &mut [[f64; WIDTH]; N],
+    lane: usize,
+    own: [D; N],
+) {
     for c in 0..N {
         own[c].store(&mut lanes[c][lane..]);
     }
