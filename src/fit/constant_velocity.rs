@@ -35,6 +35,9 @@ pub(crate) fn arc_component<N: Number>(middle: N, tangent: N, square: N) -> [N; 
     coefficients
 }
 
+/// The most arcs that wait to be fitted together.
+const MOST_WAITING: usize = 64;
+
 /// Pairs of keys whose arcs wait to become polynomials.
 #[derive(Default)]
 pub(crate) struct SteadyArcs {
@@ -45,11 +48,19 @@ pub(crate) struct SteadyArcs {
 }
 
 impl SteadyArcs {
-    /// Adds two keys; the second has the sign nearer to the first.
-    pub(crate) fn push(&mut self, [from, to]: [[f32; 4]; 2], place: usize) {
+    /// Adds two keys, the second with the sign nearer to the first, and the place of their segment.
+    pub(crate) fn push(
+        &mut self,
+        [from, to]: [[f32; 4]; 2],
+        place: usize,
+        segments: &mut Vec<PolynomialSegment>,
+    ) {
         self.from.push(from);
         self.to.push(to);
         self.places.push(place);
+        if self.places.len() == MOST_WAITING {
+            self.fit(segments);
+        }
     }
 
     /// Writes the polynomials to their segments, and forgets the keys.
@@ -65,7 +76,9 @@ impl SteadyArcs {
         segments.push(PolynomialSegment::zeroed());
         in_lanes(&mut Fit(self, segments));
         segments.pop();
-        *self = Self::default();
+        self.from.clear();
+        self.to.clear();
+        self.places.clear();
     }
 }
 

@@ -46,15 +46,15 @@ impl InLanes for TwoKeyBlock {
         // Smooth methods join a track's only two keys by an arc, which is evaluated as a
         // polynomial like their other curves.
         match self.form {
-            Form::Arc => self.arcs::<L>(),
-            Form::Polynomial => self.polynomials::<L>(),
+            Form::Arc => self.evaluate::<L, false>(),
+            Form::Polynomial => self.evaluate::<L, true>(),
         }
     }
 }
 
 impl TwoKeyBlock {
     #[inline(always)]
-    fn arcs<L: Lanes>(&mut self) {
+    fn evaluate<L: Lanes, const AS_POLYNOMIALS: bool>(&mut self) {
         let mut arcs = Arcs::<L>::new();
         for first in (0..self.count).step_by(VECTORS * L::COUNT) {
             let end = self.count.min(first + VECTORS * L::COUNT);
@@ -64,24 +64,13 @@ impl TwoKeyBlock {
             }
             for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
                 let parameter = L::load(&self.parameters[j..]);
-                let rotations = &mut self.rotations[j..j + L::COUNT];
-                L::store_rotations(arcs.at(vector, L::all(1.0), parameter), rotations);
+                let found = if AS_POLYNOMIALS {
+                    arcs.at_as_polynomials(vector, parameter)
+                } else {
+                    arcs.at(vector, L::all(1.0), parameter)
+                };
+                L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
             }
-        }
-    }
-
-    #[inline(always)]
-    fn polynomials<L: Lanes>(&mut self) {
-        for j in (0..self.count).step_by(L::COUNT) {
-            let from = L::load_rotations(&self.from[j..]);
-            let (middle, tangent) = arc_between(from, L::load_rotations(&self.to[j..]));
-            let (square, parameter) = (norm_squared(tangent), L::load(&self.parameters[j..]));
-            let mut found = middle;
-            for c in 0..4 {
-                let own = arc_component(middle[c], tangent[c], square);
-                found[c] = polynomial(own, parameter).canonical();
-            }
-            L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
         }
     }
 }
@@ -121,6 +110,21 @@ impl<L: Lanes> Arcs<L> {
             self.tangents[vector % VECTORS],
         );
         at(middle, tangent, sign, parameter)
+    }
+
+    /// The same by the arcs' polynomials.
+    #[inline(always)]
+    fn at_as_polynomials(&self, vector: usize, parameter: L) -> [L; 4] {
+        let (mut found, tangent) = (
+            self.middles[vector % VECTORS],
+            self.tangents[vector % VECTORS],
+        );
+        let square = norm_squared(tangent);
+        for c in 0..4 {
+            let own = arc_component(found[c], tangent[c], square);
+            found[c] = polynomial(own, parameter).canonical();
+        }
+        found
     }
 }
 

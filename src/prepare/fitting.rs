@@ -128,7 +128,8 @@ impl Fitting {
     /// Takes the only two keys of a track, which are joined at constant velocity.
     pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
         let (source, segment) = new_segment(prepared);
-        self.steady.push(keys, segment);
+        let segments = &mut prepared.segments.polynomials;
+        self.steady.push(keys, segment, segments);
         source
     }
 
