@@ -1,6 +1,5 @@
 //! Samples cubics in cumulative form at the nodes, in vector lanes: the first half of a fit.
 
-use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use crate::fit::double::intervals::{load, rounded};
@@ -16,7 +15,7 @@ use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{FromIdentity, inverse_rotated};
 
 /// Samples a cubic by its expansion about the middle, in f32. With `OWN_BASIS` each curve has basis
-/// functions of its own; without it all share those of their shape.
+/// functions of its own; without it all have Bernstein's.
 pub(crate) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
@@ -41,12 +40,10 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
     nodes: &Nodes<PAIRS>,
     segments: &mut [PolynomialSegment],
 ) {
-    // A copy, as the compiler could not rule out that the writes below change a referenced value.
-    let shared = block.shape.shared;
     for lane in (0..block.whole()).step_by(L::COUNT) {
-        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
-        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 1);
-        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
+        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 0);
+        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 1);
+        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
         let base = load::<L, _, _>(from(&block.numbers, 0), lane);
@@ -74,20 +71,14 @@ impl<L: Lanes> Factor<L> {
     #[inline(always)]
     fn new<const OWN_BASIS: bool, const WHOLE: bool>(
         block: &FitBlock,
-        shared: &Numbers,
         lane: usize,
         j: usize,
     ) -> Self {
-        let place = Product::BASIS + 4 * j;
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load::<L, _, _>(from(&block.numbers, place), lane)
+            load::<L, _, _>(from(&block.numbers, Product::BASIS + 4 * j), lane)
         } else {
-            [
-                all::<L>(shared[place]),
-                all::<L>(shared[place + 1]),
-                all::<L>(shared[place + 2]),
-                all::<L>(shared[place + 3]),
-            ]
+            let [c0, c1, c2, c3] = Product::BERNSTEIN[j];
+            [all::<L>(c0), all::<L>(c1), all::<L>(c2), all::<L>(c3)]
         };
         let (middle, width) = if WHOLE {
             (all::<L>(0.5), all::<L>(1.0))

@@ -63,7 +63,7 @@ impl Shape {
     /// [`Product`] with Bernstein's basis.
     pub(crate) const BERNSTEIN: &'static Self = &Self {
         own: Product::BASIS,
-        shared: Product::BERNSTEIN,
+        shared: Product::WITH_BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
         ..Self::of::<Product>(NUMBERS)
