@@ -249,7 +249,6 @@ impl Intervals {
     }
 }
 
-
 /// `log(a⁻¹ b)`.
 #[inline(always)]
 fn between<A: Algebra>(
