@@ -144,9 +144,7 @@ impl FindCurves<'_> {
             if !own.wanted[lane..key + L::COUNT].contains(&true) {
                 continue;
             }
-            let before = L::load(&weights.before[key..]);
-            let after = L::load(&weights.after[key..]);
-            let to_end = L::load(&weights.outgoing[key..]);
+            let [before, after, to_end, kind] = weights.load::<L>(key);
             let left = scaled(load3::<L>(&own.logs, lane), before);
             let right = scaled(load3::<L>(&own.logs, key), after);
             let turn = composed(long_exp(left), long_exp(right));
@@ -155,14 +153,14 @@ impl FindCurves<'_> {
             store(&mut own.incoming, key, scaled(tangent, to_start));
             store(&mut own.outgoing, key, scaled(tangent, to_end));
             // `KEY_UNKNOWN` becomes 4/3, which is beyond the limit of 1.
-            let kind = L::load(&weights.kinds[key..]) * L::all(2.0 / 3.0);
+            let kind = kind * L::all(2.0 / 3.0);
             let parts = square(left).larger(square(right).larger(square(sum(left, right))));
             let far = parts * L::all(1.0 / LONGEST_TANGENT_PART);
             let far = far.larger(kind).larger(-turn.cosm1);
             far.store(&mut own.far[key..key + L::COUNT]);
             if (-far).any_at_most(-1.0) {
                 for key in key..key + L::COUNT {
-                    let is_far = own.far[key] >= 1.0 && weights.kinds[key] == KEY_INNER;
+                    let is_far = own.far[key] >= 1.0 && weights.keys[key].kind == KEY_INNER;
                     long_tangents[far_count] = key;
                     far_count += usize::from(is_far);
                 }
@@ -175,7 +173,7 @@ impl FindCurves<'_> {
 
     #[inline(always)]
     fn curves<L: Lanes>(&mut self) {
-        let (kinds, intervals) = (&self.weights.kinds, self.intervals);
+        let (weights, intervals) = (self.weights, self.intervals);
         let whole = &mut *self.lanes;
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let (own, next) = (lane + 1, lane + 2);
@@ -187,8 +185,9 @@ impl FindCurves<'_> {
             let incoming = load3::<L>(&whole.incoming, next);
             // At a track's ends the handle is 0 so far; there it becomes the parabola's.
             let parabola = scaled(log, L::all(TWO_THIRDS));
-            let at_first = at_end(L::load(&kinds[own..]));
-            let at_last = at_end(L::load(&kinds[next..]));
+            let [_, _, _, first] = weights.load::<L>(own);
+            let [_, _, _, last] = weights.load::<L>(next);
+            let (at_first, at_last) = (at_end(first), at_end(last));
             let w1 = sum(outgoing, scaled(minus(parabola, incoming), at_first));
             let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
             let start = L::load_rotations(&intervals.from[own..]);

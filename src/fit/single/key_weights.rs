@@ -1,9 +1,10 @@
-//! The tangent weights of the keys of a block, as a structure of arrays.
+//! The tangent weights of the keys of a block.
 
 use crate::curve::options::Ends;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::tangent_weights::{UNKNOWN, WeightRule};
 use crate::shader::TangentWeights;
+use crate::simd::lanes::Lanes;
 
 /// A [`TangentWeights`] for the key that each interval of a block starts with.
 pub(crate) struct KeyWeights {
@@ -11,10 +12,7 @@ pub(crate) struct KeyWeights {
     /// The weights at a track's ends.
     end: TangentWeights,
     is_loop: bool,
-    pub(crate) before: [f32; ROOM],
-    pub(crate) after: [f32; ROOM],
-    pub(crate) outgoing: [f32; ROOM],
-    pub(crate) kinds: [f32; ROOM],
+    pub(crate) keys: [TangentWeights; ROOM],
 }
 
 impl KeyWeights {
@@ -23,35 +21,21 @@ impl KeyWeights {
             rule,
             end: WeightRule::end(ends),
             is_loop: ends == Ends::Loop,
-            before: [UNKNOWN.before; ROOM],
-            after: [UNKNOWN.after; ROOM],
-            outgoing: [UNKNOWN.outgoing; ROOM],
-            kinds: [UNKNOWN.kind; ROOM],
+            keys: [UNKNOWN; ROOM],
         }
     }
 
+    /// A vector for each field of the weights, from `lane` on.
     #[inline(always)]
-    pub(crate) fn at(&self, lane: usize) -> TangentWeights {
-        TangentWeights {
-            before: self.before[lane],
-            after: self.after[lane],
-            outgoing: self.outgoing[lane],
-            kind: self.kinds[lane],
-        }
-    }
-
-    fn set(&mut self, lane: usize, tangent_weights: TangentWeights) {
-        self.before[lane] = tangent_weights.before;
-        self.after[lane] = tangent_weights.after;
-        self.outgoing[lane] = tangent_weights.outgoing;
-        self.kinds[lane] = tangent_weights.kind;
+    pub(crate) fn load<L: Lanes>(&self, lane: usize) -> [L; 4] {
+        L::load_rotations(bytemuck::cast_slice(&self.keys[lane..]))
     }
 
     /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         for lane in 0..LANES {
             let [before, after] = [lane, lane + 1].map(|lane| intervals.durations[lane]);
-            self.set(lane + 1, self.rule.between(before, after));
+            self.keys[lane + 1] = self.rule.between(before, after);
         }
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
@@ -61,10 +45,10 @@ impl KeyWeights {
                 _ => self.end,
             };
             if let Some(lane) = stretch.first() {
-                self.set(lane, end);
+                self.keys[lane] = end;
             }
             if let Some(lane) = stretch.last() {
-                self.set(lane + 1, end);
+                self.keys[lane + 1] = end;
             }
         }
     }

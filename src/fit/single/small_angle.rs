@@ -94,7 +94,7 @@ impl Curves<'_> {
     #[inline(always)]
     fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic {
         let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
         small_angle_cubic([before, from[j + 1], to[j + 1], after], first, last)
     }
 
@@ -102,7 +102,7 @@ impl Curves<'_> {
     #[inline(always)]
     fn neighbours(&self, j: usize) -> [[f32; 4]; 2] {
         let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
         [
             either(first.kind == KEY_INNER, from[j], from[j + 1]),
             either(last.kind == KEY_INNER, to[j + 2], to[j + 1]),
