@@ -49,7 +49,7 @@ use std::str::FromStr;
 use crate::fit::double::handles::HandleRule;
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::fit::single::long_tangents::LongTangents;
+use crate::fit::single::handles::HandlesF32;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
 use crate::reference;
@@ -173,8 +173,8 @@ pub(crate) struct Smooth {
 pub(crate) struct FromKeys {
     /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
-    /// Finds, in f64, the handles of keys whose tangents are too long for f32's formulas.
-    pub(crate) find_long: fn(&mut LongTangents),
+    /// Sets, in f64, the handles of keys whose tangents are too long for f32's formulas.
+    pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
 }
 
 /// The numbers that a method has for an interval beside its keys.
@@ -203,7 +203,7 @@ impl Smooth {
         Self {
             direct: Some(FromKeys {
                 weights,
-                find_long: LongTangents::find::<R>,
+                set_long: HandlesF32::set_long::<R>,
             }),
             ..self
         }

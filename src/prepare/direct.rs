@@ -11,7 +11,6 @@ use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, W
 use crate::fit::single::handles::{FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT};
 use crate::fit::single::hermite_fit::Halves;
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
@@ -50,7 +49,7 @@ pub(crate) struct Direct {
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
-    find_long: fn(&mut LongTangents),
+    set_long: fn(&mut HandlesF32, &[usize], &Intervals),
     smooth: Smooth,
     ends: Ends,
 }
@@ -71,7 +70,7 @@ impl Direct {
             keys: [NONE; SPANS],
             left_over: List::new(),
             rest: None,
-            find_long: how.find_long,
+            set_long: how.set_long,
             smooth,
             ends,
         }
@@ -91,7 +90,7 @@ impl Direct {
             lanes: &mut self.whole,
             weights: &self.weights,
             intervals,
-            find_long: self.find_long,
+            set_long: self.set_long,
         });
     }
 

@@ -11,7 +11,7 @@ use crate::fit::single::exp_log::{
     LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
 };
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
+use crate::fit::single::long_tangents::AT_ONCE;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
 use crate::math::ranges::MEDIUM_SQUARE;
 use crate::shader::KEY_INNER;
@@ -121,8 +121,9 @@ pub(crate) struct FindCurves<'a> {
     pub(crate) lanes: &'a mut HandlesF32,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
-    /// Finds the handles for which the range of f32's formulas is too short, in f64.
-    pub(crate) find_long: fn(&mut LongTangents),
+    /// Sets the handles for which the range of f32's formulas is too short, in f64:
+    /// [`HandlesF32::set_long`].
+    pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
 }
 
 impl InLanes for FindCurves<'_> {
@@ -167,7 +168,7 @@ impl FindCurves<'_> {
             }
         }
         for keys in long_tangents[..far_count].chunks(AT_ONCE) {
-            own.set_far(keys, intervals, self.find_long);
+            (self.set_long)(own, keys, intervals);
         }
     }
 

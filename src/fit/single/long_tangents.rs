@@ -17,13 +17,14 @@ pub(crate) const AT_ONCE: usize = 8;
 /// One number for each key.
 type Row = [f64; AT_ONCE];
 
-/// Keys with long tangents, and their handles.
-pub(crate) struct LongTangents {
+/// Keys with long tangents, and their handles by a rule.
+struct LongTangents<R> {
     /// The intervals on both sides.
     before: Side,
     after: Side,
     incoming: [Row; 3],
     outgoing: [Row; 3],
+    rule: PhantomData<R>,
 }
 
 /// The intervals on one side of the keys.
@@ -33,32 +34,18 @@ struct Side {
     durations: Row,
 }
 
-impl LongTangents {
-    /// Finds their handles by a rule.
-    pub(crate) fn find<R: HandleRule>(&mut self) {
-        in_lanes(&mut Find::<R> {
-            keys: self,
-            rule: PhantomData,
-        });
-    }
-}
-
 impl HandlesF32 {
-    /// Sets the handles of a few keys, as `find` finds them.
+    /// Sets the handles of at most [`AT_ONCE`] keys by a rule.
     #[inline(never)]
-    pub(crate) fn set_far(
-        &mut self,
-        keys: &[usize],
-        intervals: &Intervals,
-        find: fn(&mut LongTangents),
-    ) {
-        let mut far = LongTangents {
+    pub(crate) fn set_long<R: HandleRule>(&mut self, keys: &[usize], intervals: &Intervals) {
+        let mut far = LongTangents::<R> {
             before: Side::new(intervals, keys.iter().map(|key| key - 1)),
             after: Side::new(intervals, keys.iter().copied()),
             incoming: [[0.0; AT_ONCE]; 3],
             outgoing: [[0.0; AT_ONCE]; 3],
+            rule: PhantomData,
         };
-        find(&mut far);
+        in_lanes(&mut far);
         for (i, &key) in keys.iter().enumerate() {
             for c in 0..3 {
                 self.incoming[c][key] = far.incoming[c][i] as f32;
@@ -103,21 +90,17 @@ impl Side {
     }
 }
 
-struct Find<'a, R> {
-    keys: &'a mut LongTangents,
-    rule: PhantomData<R>,
-}
-
-impl<R: HandleRule> InLanes for Find<'_, R> {
+impl<R: HandleRule> InLanes for LongTangents<R> {
     // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let LongTangents {
+        let Self {
             before,
             after,
             incoming,
             outgoing,
-        } = &mut *self.keys;
+            ..
+        } = self;
         for i in 0..AT_ONCE {
             let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
             let Handles {
