@@ -4,8 +4,7 @@
 use std::marker::PhantomData;
 
 use crate::curve::formula::de_casteljau::DeCasteljau;
-use crate::curve::formula::hermite::{Hermite, Linear};
-use crate::curve::formula::line::Line;
+use crate::curve::formula::hermite::{Hermite, Line, Linear};
 use crate::curve::formula::product::Product;
 use crate::curve::formula::rotation_vector::RotationVector;
 use crate::curve::formula::squad::Squad;
