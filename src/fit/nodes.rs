@@ -204,8 +204,8 @@ mod tests {
                     let derivative = 2.0 * n * libm::sin(angle);
                     // From Chebyshev's differential equation.
                     let second = -4.0 * n * n * libm::cos(angle);
-                    let halves = of_components(0.5 * second);
-                    samples.set_middle(of_components(derivative), halves);
+                    samples.odd[0] = of_components(derivative);
+                    samples.even[0] = of_components(0.5 * second);
                 } else if comes_again {
                     samples.set_slopes(before, after);
                 } else {

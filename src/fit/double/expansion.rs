@@ -104,11 +104,7 @@ impl<L: Lanes> Factor<L> {
         let far = (before * before).larger(after * after);
         Self {
             turn: exp_in_lanes::<L::Doubles, WHOLE>(scaled(vector, weight)),
-            vector: [
-                L::rounded(vector[0]),
-                L::rounded(vector[1]),
-                L::rounded(vector[2]),
-            ],
+            vector: rounded(vector),
             square: L::rounded(squared),
             powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
             reach: squared * far,
@@ -233,7 +229,7 @@ impl<L: Lanes> Expanded<L> {
         let v1 = inverse_rotated(inverse_rotated(first.vector, r2), r3);
         let v2 = inverse_rotated(second.vector, r3);
         Self {
-            curve: AboutMiddle::new(rounded::<L>(middle), [v1, v2, third.vector]),
+            curve: AboutMiddle::new(rounded(middle), [v1, v2, third.vector]),
             squares: [first.square, second.square, third.square],
             powers: [first.powers, second.powers, third.powers],
         }

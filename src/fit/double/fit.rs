@@ -146,14 +146,6 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Sets the first derivative by s at the middle, and half of the second. The first node of
-    /// these fits is s = 0.
-    #[inline(always)]
-    pub(crate) fn set_middle(&mut self, derivative: [L; 4], half_second: [L; 4]) {
-        self.odd[0] = derivative;
-        self.even[0] = half_second;
-    }
-
     /// Sets the derivatives by s at the ends, which are the last pair of nodes and are there twice.
     /// Each is stored as a second sample, whose difference from the first is the derivative by s²
     /// that the divided differences of [`Nodes::powers`] need there.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{
-    Intervals, LANES, Lane, ROOM, Stretch, at, load, put, squared_extent, store,
+    Intervals, LANES, Lane, ROOM, Stretch, at, load, put, squared_extent, store, widened,
 };
 use crate::math::quaternion::{self, Real, Vector, normalised, product, scaled, sum};
 use crate::math::ranges::{Algebra, FullRange, PrincipalRange};
@@ -56,8 +56,7 @@ impl<D: Doubles> PrincipalRange<D> {
 /// Keys in f64, normalised.
 #[inline(always)]
 fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
-    let [x, y, z, w] = L::load_rotations(&keys[lane..]);
-    normalised([x.widened(), y.widened(), z.widened(), w.widened()])
+    normalised(widened(L::load_rotations(&keys[lane..])))
 }
 
 /// Finds for each interval of some lanes whether a frame lies in it.

@@ -315,8 +315,21 @@ pub(crate) fn load<L: Lanes, const N: usize, const WIDTH: usize>(
 }
 
 #[inline(always)]
-pub(crate) fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
-    [L::rounded(x), L::rounded(y), L::rounded(z), L::rounded(w)]
+pub(crate) fn rounded<L: Lanes, const N: usize>(numbers: [L::Doubles; N]) -> [L; N] {
+    let mut own = [L::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::rounded(numbers[c]);
+    }
+    own
+}
+
+#[inline(always)]
+pub(crate) fn widened<L: Lanes, const N: usize>(numbers: [L; N]) -> [L::Doubles; N] {
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = numbers[c].widened();
+    }
+    own
 }
 
 /// Stores numbers to the lanes from `lane` on.

@@ -154,7 +154,7 @@ impl<F: Formula> Sampling for Directly<F> {
             }
             let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
-            samples.middle = rounded::<L>(middle);
+            samples.middle = rounded(middle);
             for k in 0..PAIRS {
                 let (before, after) = (found[1 + k], found[1 + PAIRS + k]);
                 for c in 0..4 {

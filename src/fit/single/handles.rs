@@ -6,14 +6,12 @@
 //! where the curve turns little. Only the vector between the handles is computed in f64, because
 //! the rounding errors of all others would add up in it.
 
-use crate::fit::double::intervals::{Intervals, ROOM, squared_extent};
-use crate::fit::single::exp_log::{
-    LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
-};
+use crate::fit::double::intervals::{Intervals, ROOM, rounded, squared_extent, widened};
+use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store};
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::AT_ONCE;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
-use crate::math::ranges::MEDIUM_SQUARE;
+use crate::math::ranges::{MEDIUM_SQUARE, one_plus};
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
@@ -233,18 +231,8 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 
     let step = [x * scale, y * scale, z * scale, w * scale];
     let [x, y, z, w] = product(product(medium_exp(w1, -1.0), step), medium_exp(w3, -1.0));
     let u = all(1.0) - w;
-    let [c0, c1, c2, c3, c4, c5, c6, c7] = MEDIUM_LOG;
-    let uu = u * u;
-    let (first, second) = (all(c1) * u + all(c0), all(c3) * u + all(c2));
-    let (third, fourth) = (all(c5) * u + all(c4), all(c7) * u + all(c6));
-    let tail = (fourth * uu + third) * (uu * uu) + (second * uu + first);
-    let scale = tail * u + all(1.0);
-    let vector = [
-        L::rounded(x * scale),
-        L::rounded(y * scale),
-        L::rounded(z * scale),
-    ];
-    (vector, L::rounded(-u))
+    let vector = scaled([x, y, z], one_plus(&MEDIUM_LOG, u));
+    (rounded(vector), L::rounded(-u))
 }
 
 /// 1 for `KEY_AT_END`, 0 for `KEY_INNER` and `KEY_UNKNOWN`.

@@ -4,8 +4,8 @@
 
 use crate::fit::double::expansion::{AboutMiddle, SineCosm1};
 use crate::fit::double::fit::{MOST, Samples, interpolate};
-use crate::fit::double::intervals::rounded;
-use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp, widened};
+use crate::fit::double::intervals::{rounded, widened};
+use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp};
 use crate::fit::single::fit_range::{FitRange, HALF, LAST_HALF, Place, SEAM};
 use crate::math::quaternion::{
     cross3, normalised, product, product_with_vector, scaled, square, sum,
@@ -132,7 +132,7 @@ impl<L: Lanes> Moment<L> {
             // Curves that are halved turn farther; f32 would round too much in this product.
             let turn = product(medium_exp(w1, b1), medium_exp(w2, b2));
             let turn = product(turn, medium_exp(w3, b3));
-            rounded::<L>(product(normalised(widened(start)), turn))
+            rounded(product(normalised(widened(start)), turn))
         } else {
             let turn = composed(short_exp(scaled(w1, L::all(b1))), second_turn);
             let [x, y, z] = turn.vector;
@@ -218,13 +218,14 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     let turning = sum(cross3(u1, rate), cross3(u2, u3));
     let [x, y, z, w] = product_with_vector(m, sum(bend, turning));
     let half = square(rate) * L::all(0.5);
-    let half_second = [
+    // The first node of these fits is s = 0.
+    samples.odd[0] = product_with_vector(m, rate);
+    samples.even[0] = [
         x - m[0] * half,
         y - m[1] * half,
         z - m[2] * half,
         w - m[3] * half,
     ];
-    samples.set_middle(product_with_vector(m, rate), half_second);
 }
 
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
