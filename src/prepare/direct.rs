@@ -85,11 +85,11 @@ impl Direct {
         self.weights.bring(intervals, stretches);
         let chords = &self.whole.chords;
         (self.small_angle).find(chords, intervals, &self.weights, stretches);
-        self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
             weights: &self.weights,
             intervals,
+            known: &self.small_angle.holds,
             set_long: self.set_long,
         });
     }

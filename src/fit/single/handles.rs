@@ -60,8 +60,6 @@ pub(crate) struct HandlesF32 {
     pub(crate) chords: Row,
     /// The steps' logarithms.
     logs: [Row; 3],
-    /// The lanes whose curves are asked for.
-    pub(crate) wanted: [bool; ROOM],
     /// Handles at the key that the interval starts with, towards the interval before it
     /// and towards this one.
     pub(crate) incoming: [Row; 3],
@@ -79,7 +77,6 @@ impl HandlesF32 {
         Self {
             chords: [0.0; ROOM],
             logs: [[0.0; ROOM]; 3],
-            wanted: [false; ROOM],
             incoming: [[0.0; ROOM]; 3],
             outgoing: [[0.0; ROOM]; 3],
             far: [0.0; ROOM],
@@ -119,6 +116,8 @@ pub(crate) struct FindCurves<'a> {
     pub(crate) lanes: &'a mut HandlesF32,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
+    /// Whether a lane has its curve already.
+    pub(crate) known: &'a [bool; ROOM],
     /// Sets the handles for which the range of f32's formulas is too short, in f64:
     /// [`HandlesF32::set_long`].
     pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
@@ -140,7 +139,7 @@ impl FindCurves<'_> {
         let (mut long_tangents, mut far_count) = ([0; ROOM], 0);
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let key = lane + 1;
-            if !own.wanted[lane..key + L::COUNT].contains(&true) {
+            if !self.known[lane..key + L::COUNT].contains(&false) {
                 continue;
             }
             let [before, after, to_end, kind] = weights.load::<L>(key);
@@ -176,7 +175,7 @@ impl FindCurves<'_> {
         let whole = &mut *self.lanes;
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let (own, next) = (lane + 1, lane + 2);
-            if !whole.wanted[own..own + L::COUNT].contains(&true) {
+            if !self.known[own..own + L::COUNT].contains(&false) {
                 continue;
             }
             let log = load3::<L>(&whole.logs, own);

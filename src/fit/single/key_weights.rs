@@ -9,9 +9,7 @@ use crate::simd::lanes::Lanes;
 /// A [`TangentWeights`] for the key that each interval of a block starts with.
 pub(crate) struct KeyWeights {
     rule: WeightRule,
-    /// The weights at a track's ends.
-    end: TangentWeights,
-    is_loop: bool,
+    ends: Ends,
     pub(crate) keys: [TangentWeights; ROOM],
 }
 
@@ -19,8 +17,7 @@ impl KeyWeights {
     pub(crate) fn new(rule: WeightRule, ends: Ends) -> Self {
         Self {
             rule,
-            end: WeightRule::end(ends),
-            is_loop: ends == Ends::Loop,
+            ends,
             keys: [UNKNOWN; ROOM],
         }
     }
@@ -39,10 +36,10 @@ impl KeyWeights {
         }
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
-            let end = match stretch.all {
-                1 => UNKNOWN,
-                _ if self.is_loop => continue,
-                _ => self.end,
+            let end = match (stretch.all, self.ends) {
+                (1, _) => UNKNOWN,
+                (_, Ends::Loop) => continue,
+                (_, ends) => WeightRule::end(ends),
             };
             if let Some(lane) = stretch.first() {
                 self.keys[lane] = end;
