@@ -3,8 +3,8 @@
 
 use std::marker::PhantomData;
 
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
-use crate::fit::double::intervals::Intervals;
+use crate::fit::double::handles::{HandleRule, Interval};
+use crate::fit::double::intervals::{Intervals, at, put};
 use crate::fit::single::handles::HandlesF32;
 use crate::math::quaternion::{log, normalised, step};
 use crate::math::ranges::FullRange;
@@ -65,10 +65,8 @@ impl Side {
         };
         for (i, lane) in lanes.enumerate() {
             let [from, to] = intervals.keys(lane);
-            for c in 0..4 {
-                side.from[c][i] = f64::from(from[c]);
-                side.to[c][i] = f64::from(to[c]);
-            }
+            put(&mut side.from, i, from.map(f64::from));
+            put(&mut side.to, i, to.map(f64::from));
             side.durations[i] = intervals.durations[lane];
         }
         side
@@ -76,11 +74,7 @@ impl Side {
 
     #[inline(always)]
     fn interval(&self, i: usize) -> Interval<f64> {
-        let [x0, y0, z0, w0] = &self.from;
-        let [x1, y1, z1, w1] = &self.to;
-        let from = normalised([x0[i], y0[i], z0[i], w0[i]]);
-        let to = normalised([x1[i], y1[i], z1[i], w1[i]]);
-        let step = step(from, to);
+        let step = step(normalised(at(&self.from, i)), normalised(at(&self.to, i)));
         Interval {
             duration: self.durations[i],
             step,
@@ -103,12 +97,10 @@ impl<R: HandleRule> InLanes for LongTangents<R> {
         } = self;
         for i in 0..AT_ONCE {
             let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
-            let Handles {
-                incoming: [x0, y0, z0],
-                outgoing: [x1, y1, z1],
-            } = found;
-            (incoming[0][i], incoming[1][i], incoming[2][i]) = (x0, y0, z0);
-            (outgoing[0][i], outgoing[1][i], outgoing[2][i]) = (x1, y1, z1);
+            for c in 0..3 {
+                incoming[c][i] = found.incoming[c];
+                outgoing[c][i] = found.outgoing[c];
+            }
         }
     }
 }
