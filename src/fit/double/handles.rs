@@ -28,28 +28,26 @@ impl InLanes for Steps<'_> {
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane, own.count) {
-                    put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
-                }
-            }
+            near.redo(lane, own.count, |j| {
+                put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
+            });
         }
     }
 }
 
 impl<D: Doubles> PrincipalRange<D> {
+    /// Calls `redo` for the lanes outside the principal range, among those from `lane` on and before
+    /// `end`; most vectors have none.
     #[inline(always)]
-    fn is_in_doubt(&self) -> bool {
-        !self.doubt.are_at_most(0.0)
-    }
-
-    /// The lanes outside the principal range, among those from `lane` on and before `end`.
-    #[inline(never)]
-    fn lanes(&self, lane: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
+    fn redo(&self, lane: usize, end: usize, redo: impl FnMut(usize)) {
+        if self.doubt.are_at_most(0.0) {
+            return;
+        }
         let mut doubts = [0.0; MOST];
         self.doubt.store(&mut doubts);
         let lanes = (lane..end).zip(doubts);
-        lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane))
+        let in_doubt = lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane));
+        in_doubt.for_each(redo);
     }
 }
 
@@ -159,16 +157,13 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
             let handles = R::handles(&mut near, [before, after]);
             store(&mut own.incoming, lane + 1, handles.incoming);
             store(&mut own.outgoing, lane + 1, handles.outgoing);
-            if near.is_in_doubt() {
+            near.redo(lane + 1, own.count, |j| {
                 // The context lanes of two neighbouring stretches do not share a key.
-                let is_key = |j: &usize| {
-                    let mut stretches = self.stretches.iter().map(Stretch::lanes);
-                    stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
-                };
-                for j in near.lanes(lane + 1, own.count).filter(is_key) {
+                let mut stretches = self.stretches.iter().map(Stretch::lanes);
+                if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&j)) {
                     own.handles_full_range::<R>(j);
                 }
-            }
+            });
         }
     }
 }
@@ -214,11 +209,7 @@ impl InLanes for BetweenHandles<'_> {
             let mut near = PrincipalRange::new();
             let middle = between(&mut near, first, step, last);
             own.store_product(lane, units::<L>(&own.from, lane), [first, middle, last]);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane, own.count) {
-                    own.between_full_range(j);
-                }
-            }
+            near.redo(lane, own.count, |j| own.between_full_range(j));
         }
     }
 }
@@ -312,13 +303,11 @@ impl InLanes for BetweenNeighbours<'_> {
             let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
             let base = product(units::<L>(&own.from, lane + 1), back);
             own.store_product(lane + 1, base, [before, log, after]);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane + 1, own.count) {
-                    let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
-                    let base = product(own.key(j), back);
-                    own.set_numbers(j, 0, &base);
-                }
-            }
+            near.redo(lane + 1, own.count, |j| {
+                let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
+                let base = product(own.key(j), back);
+                own.set_numbers(j, 0, &base);
+            });
         }
     }
 }
