@@ -2,7 +2,7 @@
 
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
-use crate::fit::double::intervals::{load, rounded};
+use crate::fit::double::intervals::{at, load, put, rounded, store};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
 use crate::math::quaternion::{
@@ -103,7 +103,7 @@ impl<L: Lanes> Factor<L> {
         let (before, after) = (odd - even, odd + even);
         let far = (before * before).larger(after * after);
         Self {
-            turn: exp_in_lanes::<L::Doubles, WHOLE>(scaled(vector, weight)),
+            turn: exp_in_lanes::<L, WHOLE>(scaled(vector, weight)),
             vector: rounded(vector),
             square: L::rounded(squared),
             powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
@@ -115,7 +115,7 @@ impl<L: Lanes> Factor<L> {
 /// The exponentials of half-rotation vectors by polynomials; lanes whose vector is too long for
 /// them are computed over the full range.
 #[inline(always)]
-fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
+fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Doubles; 4] {
     let squared = square(vector);
     let (limit, waves) = if SHORT {
         (SHORT_SQUARE, short_waves(squared))
@@ -126,10 +126,11 @@ fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     if squared.are_at_most(limit) {
         return turn;
     }
-    let mut turns = lanes(turn);
-    exp_beyond(limit, &lanes(vector), &mut turns);
-    let [x, y, z, w] = &turns;
-    [D::load(x), D::load(y), D::load(z), D::load(w)]
+    let (mut vectors, mut turns) = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
+    store(&mut vectors, 0, vector);
+    store(&mut turns, 0, turn);
+    exp_beyond(limit, &vectors, &mut turns);
+    load::<L, _, _>(&turns, 0)
 }
 
 /// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full
@@ -137,24 +138,12 @@ fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
 #[inline(never)]
 fn exp_beyond(limit: f64, vectors: &[[f64; MOST]; 3], turns: &mut [[f64; MOST]; 4]) {
     for lane in 0..MOST {
-        let vector = vectors.map(|lanes| lanes[lane]);
+        let vector = at(vectors, lane);
         let squared = square(vector);
         if squared > limit || squared.is_nan() {
-            for (lanes, component) in turns.iter_mut().zip(quaternion::exp(vector)) {
-                lanes[lane] = component;
-            }
+            put(turns, lane, quaternion::exp(vector));
         }
     }
-}
-
-/// Each vector's lanes.
-#[inline(always)]
-fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
-    let mut lanes = [[0.0; MOST]; N];
-    for (lanes, vector) in lanes.iter_mut().zip(vectors) {
-        vector.store(lanes);
-    }
-    lanes
 }
 
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.

@@ -11,7 +11,7 @@ use crate::curve::formula::squad::Squad;
 use crate::curve::formula::{Formula, NUMBERS, Numbers};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
-use crate::fit::double::intervals::rounded;
+use crate::fit::double::intervals::{load, put, rounded, store};
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
@@ -129,8 +129,9 @@ impl<F: Formula> Sampling for Directly<F> {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
+        let zero = L::Doubles::all(0.0);
         for lane in (0..block.whole()).step_by(L::COUNT) {
-            let mut numbers = [L::Doubles::all(0.0); NUMBERS];
+            let mut numbers = [zero; NUMBERS];
             for (own, lanes) in numbers.iter_mut().zip(&block.numbers) {
                 *own = L::Doubles::load(&lanes[lane..]);
             }
@@ -138,18 +139,20 @@ impl<F: Formula> Sampling for Directly<F> {
             let width = L::Doubles::load(&block.widths[lane..]);
             // One loop over all nodes: the formula is compiled once, and what does not change along
             // a curve is computed once.
-            let mut found = [[L::Doubles::all(0.0); 4]; 2 * MOST_PAIRS + 1];
-            let mut doubt = L::Doubles::all(0.0);
+            let mut found = [[zero; 4]; 2 * MOST_PAIRS + 1];
+            let mut doubt = zero;
             for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
                 let t = at + L::Doubles::all(nodes.offset(i)) * width;
-                *found = rotation::<F, _>(&numbers, t);
-                doubt = doubt + self::doubt(*found);
+                let [Near(x), Near(y), Near(z), Near(w)] = F::rotation(&numbers, Near(t));
+                *found = [x, y, z, w];
+                // NaN if any component is NaN or infinite, else 0.
+                doubt = doubt + (x + y + z + w) * zero;
             }
             if !doubt.are_at_most(0.0) {
                 let mut doubts = [0.0; MOST];
                 doubt.store(&mut doubts);
                 for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
-                    sample_full_range::<F, _, PAIRS>(block, lane + j, nodes, j, &mut found);
+                    sample_full_range::<F, L, PAIRS>(block, lane + j, nodes, j, &mut found);
                 }
             }
             let middle = found[0];
@@ -168,37 +171,23 @@ impl<F: Formula> Sampling for Directly<F> {
     }
 }
 
-#[inline(always)]
-fn rotation<F: Formula, R: Real>(numbers: &[R; NUMBERS], t: R) -> [R; 4] {
-    let [x, y, z, w] = F::rotation(numbers, Near(t));
-    [x.0, y.0, z.0, w.0]
-}
-
-/// NaN if any of a rotation's components is NaN or infinite, else 0.
-#[inline(always)]
-fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
-    (x + y + z + w) * R::all(0.0)
-}
-
 /// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
 /// into the `j`th lane of the vectors found.
 #[inline(never)]
-fn sample_full_range<F: Formula, D: Doubles, const PAIRS: usize>(
+fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
     j: usize,
-    found: &mut [[D; 4]],
+    found: &mut [[L::Doubles; 4]],
 ) {
     let numbers = block.numbers_of(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);
     for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-        let own: Quaternion = F::rotation(&numbers, at + nodes.offset(i) * width);
-        for (found, own) in found.iter_mut().zip(own) {
-            let mut lanes = [0.0; MOST];
-            found.store(&mut lanes);
-            lanes[j] = own;
-            *found = D::load(&lanes);
-        }
+        let mut lanes = [[0.0; MOST]; 4];
+        store(&mut lanes, 0, *found);
+        let t = at + nodes.offset(i) * width;
+        put(&mut lanes, j, F::rotation(&numbers, t));
+        *found = load::<L, _, _>(&lanes, 0);
     }
 }
