@@ -22,20 +22,15 @@ pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quate
     };
     // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
     let [x, y, z, _] = step(at, derivative);
-    let body = [x, y, z].map(|c| finite(2.0 * scale * c));
+    // Between keys at almost the same time velocities would overflow f32.
+    let largest = 0.25 * f64::from(f32::MAX);
+    let body = [x, y, z].map(|c| (2.0 * scale * c).clamp(-largest, largest));
     let [x, y, z] = match axes {
         Axes::Body => body,
         // This holds for accelerations too: ω × ω = 0.
         Axes::Parent => rotated(at, body),
     };
     [x, y, z, 0.0]
-}
-
-/// Limits a value to a quarter of f32's range: between keys at almost the same time velocities
-/// would overflow.
-fn finite(value: f64) -> f64 {
-    let largest = 0.25 * f64::from(f32::MAX);
-    value.clamp(-largest, largest)
 }
 
 /// Samples velocities or accelerations, curve by curve.
