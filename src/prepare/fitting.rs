@@ -3,10 +3,7 @@
 
 use std::ops::Range;
 
-use bytemuck::Zeroable;
-
 use crate::curve::options::Quantity;
-use crate::fit::constant_velocity::SteadyArcs;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::cut::{Cutter, Subcurve};
 use crate::fit::double::fit::{FitBlock, Tier, tier};
@@ -23,8 +20,6 @@ pub(crate) struct Fitting {
     quantity: Quantity,
     small_angle: Queue,
     full: Queue,
-    /// Tracks of two keys.
-    steady: SteadyArcs,
     cutter: Cutter,
     /// The spans as they were before the curves among them were cut.
     uncut: Spans,
@@ -59,7 +54,6 @@ impl Fitting {
             quantity,
             small_angle: Queue::new(Tier::SmallAngle),
             full: Queue::new(Tier::Full),
-            steady: SteadyArcs::default(),
             cutter: Cutter::new(shape, quantity),
             uncut: Spans::default(),
         }
@@ -125,14 +119,6 @@ impl Fitting {
         }
     }
 
-    /// Takes the only two keys of a track, which are joined at constant velocity.
-    pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
-        let (source, segment) = new_segment(prepared);
-        let segments = &mut prepared.segments.polynomials;
-        self.steady.push(keys, segment, segments);
-        source
-    }
-
     /// Takes a curve of any length as the next span. [`Fitting::finish`] fits it, and cuts it if
     /// necessary.
     pub(crate) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
@@ -148,7 +134,6 @@ impl Fitting {
                 run(block, &mut queue.spans, &mut self.cutter, prepared);
             }
         }
-        self.steady.fit(&mut prepared.segments.polynomials);
         self.cutter.cut(&mut prepared.segments.polynomials);
         prepared.put_subcurves(&self.cutter, &mut self.uncut);
         self.cutter.clear();
@@ -184,14 +169,6 @@ static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
 
 /// The source of a span whose curve the cutter fits; it has no segment yet.
 const UNTRIED: Source = Source::Segment(NONE);
-
-/// Adds a zeroed segment, and returns it as a source and by its place.
-pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
-    let segments = &mut prepared.segments.polynomials;
-    let place = segments.len();
-    segments.push(PolynomialSegment::zeroed());
-    (Source::Segment(place as u32), place)
-}
 
 impl Prepared {
     /// Adds `count` zeroed segments (at most two for each lane of a block), each as the source of

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use crate::curve::options::{Ends, InterpolationError, Quantity, Speed};
+use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::double::handles::{FramesHeld, Steps};
 use crate::fit::double::intervals::{Intervals, LANES, Stretch};
 use crate::math::canonical::round_quat;
@@ -290,8 +291,9 @@ impl SmoothPreparation {
             let source = if !holds_frame(lane) {
                 Source::Constant(NONE)
             } else if is_steady {
-                let keys = self.intervals.keys(lane);
-                self.fitting.take_steady(prepared, keys)
+                let segments = &mut prepared.segments.polynomials;
+                segments.push(arc_polynomial(self.intervals.keys(lane)));
+                Source::Segment(segments.len() as u32 - 1)
             } else if !self.holds(stretch, lane) {
                 self.take(prepared, stretch, lane..lane + 1);
                 continue;
