@@ -8,14 +8,14 @@ use bytemuck::Zeroable;
 use crate::curve::options::Quantity;
 use crate::fit::constant_velocity::SteadyBlock;
 use crate::fit::double::curve::Curve;
-use crate::fit::double::cut::{Cutter, Subcurve};
+use crate::fit::double::cut::Cutter;
 use crate::fit::double::fit::{FitBlock, Tier, tier};
 use crate::fit::double::intervals::{Intervals, LANES};
 use crate::fit::double::shape::Shape;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
-use crate::time::spans::{NONE, Part, Source, Spans};
+use crate::time::spans::{NONE, Source};
 
 /// Fits curves in blocks, whose memory is kept. A curve that is taken belongs to the next span,
 /// which is the first without a source.
@@ -27,8 +27,6 @@ pub(crate) struct Fitting {
     /// Made for the first track of two keys.
     steady: Option<Box<SteadyBlock>>,
     cutter: Cutter,
-    /// The spans as they were before the curves among them were cut.
-    uncut: Spans,
 }
 
 /// Curves of one tier that wait to fill a block.
@@ -62,7 +60,6 @@ impl Fitting {
             full: Queue::new(Tier::Full),
             steady: None,
             cutter: Cutter::new(shape, quantity),
-            uncut: Spans::default(),
         }
     }
 
@@ -159,7 +156,7 @@ impl Fitting {
             block.write(&mut prepared.segments.polynomials);
         }
         self.cutter.cut(&mut prepared.segments.polynomials);
-        prepared.put_subcurves(&self.cutter, &mut self.uncut);
+        prepared.put_subcurves(&self.cutter);
         self.cutter.clear();
     }
 }
@@ -217,71 +214,41 @@ impl Prepared {
     }
 
     /// Replaces the spans of curves that were cut by those of their parts.
-    fn put_subcurves(&mut self, cutter: &Cutter, uncut: &mut Spans) {
+    fn put_subcurves(&mut self, cutter: &Cutter) {
         let mut cut = cutter.subcurves();
-        let Some(first) = cut.first().map(|part| part.span) else {
+        if cut.is_empty() {
             return;
-        };
-        std::mem::swap(&mut self.spans, uncut);
-        self.spans.clear();
-        self.spans.extend(uncut, 0..first);
+        }
+        let uncut = std::mem::take(&mut self.spans);
+        self.spans.reserve(uncut.len() + cut.len());
         for part in 0..self.parts.len() {
-            let Part { spans, end, .. } = &self.parts[part];
-            let (spans, end) = (spans.clone(), *end);
-            if spans.end <= first {
-                continue;
-            }
-            let start = if spans.start > first {
-                self.spans.len()
-            } else {
-                spans.start
-            };
-            let mut next = spans.start.max(first);
-            while next < spans.end {
-                let to = cut
-                    .first()
-                    .map_or(spans.end, |part| part.span.min(spans.end));
-                self.spans.extend(uncut, next..to);
-                next = to;
-                if next < spans.end {
-                    next += 1;
-                    let is_last = next == spans.end;
-                    let end = if is_last { end } else { uncut.starts[next] };
-                    cut = self.put_first(cutter, cut, uncut, to, end);
+            let (spans, first_span) = (self.parts[part].spans.clone(), self.spans.len());
+            for span in spans.clone() {
+                let (start, key) = (uncut.starts[span], uncut.keys[span]);
+                let end = match span + 1 < spans.end {
+                    true => uncut.starts[span + 1],
+                    false => self.parts[part].end,
+                };
+                let own = cut.partition_point(|subcurve| subcurve.span <= span);
+                let (own, others) = cut.split_at(own);
+                if own.is_empty() {
+                    self.push_span(start, uncut.sources[span], key);
                 }
-            }
-            self.parts[part].spans = start..self.spans.len();
-        }
-    }
-
-    /// Adds the spans of the first curve's parts; the curve's own span ends at `end`. Returns the
-    /// parts of the other curves.
-    fn put_first<'c>(
-        &mut self,
-        cutter: &Cutter,
-        parts: &'c [Subcurve],
-        uncut: &Spans,
-        span: usize,
-        end: f64,
-    ) -> &'c [Subcurve] {
-        let (start, key) = (uncut.starts[span], uncut.keys[span]);
-        let count = (parts.iter())
-            .take_while(|part| part.span == parts[0].span)
-            .count();
-        let (own, others) = parts.split_at(count);
-        for part in own {
-            let (from, _) = part.piece.extent();
-            let start = start + (end - start) * from;
-            let key = if from == 0.0 { key } else { NONE };
-            let source = match part.segment {
-                Some(place) => Source::Segment(place as u32),
-                None => {
-                    self.exact.push(cutter.curve(part));
-                    Source::Exact(self.exact.len() as u32 - 1)
+                for subcurve in own {
+                    let (from, _) = subcurve.piece.extent();
+                    let key = if from == 0.0 { key } else { NONE };
+                    let source = match subcurve.segment {
+                        Some(place) => Source::Segment(place as u32),
+                        None => {
+                            self.exact.push(cutter.curve(subcurve));
+                            Source::Exact(self.exact.len() as u32 - 1)
+                        }
+                    };
+                    self.push_span(start + (end - start) * from, source, key);
                 }
-            };
-            self.push_span(start, source, key);
+                cut = others;
+            }
+            self.parts[part].spans = first_span..self.spans.len();
         }
-        others
     }
 }
