@@ -34,7 +34,8 @@ pub(crate) struct ClipData {
     parts: Vec<(u32, u32)>,
     /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
-    span: Option<(f64, f64)>,
+    /// When the first key of the set is, and the last.
+    pub(crate) time_span: Option<(f64, f64)>,
 }
 
 /// A part and the prepared group whose lists it points into.
@@ -191,7 +192,7 @@ impl ClipData {
             groups,
             parts,
             tracks,
-            span: set.time_span(),
+            time_span: set.time_span(),
         }
     }
 
@@ -205,8 +206,10 @@ impl ClipData {
         self.tracks.len() - 1
     }
 
-    pub(crate) fn time_span(&self) -> Option<(f64, f64)> {
-        self.span
+    /// The places of a track's parts, in order of time.
+    #[inline(always)]
+    fn places(&self, track: usize) -> &[(u32, u32)] {
+        &self.parts[self.tracks[track]..self.tracks[track + 1]]
     }
 
     /// The parts of one track that may contain any of `samples`, which are samples of the track
@@ -218,7 +221,7 @@ impl ClipData {
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
+        let all = self.places(track);
         let own = match timeline.ticks {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time_at(track, samples.start);
@@ -237,11 +240,9 @@ impl ClipData {
     /// The part of a track that has exactly one part.
     #[inline(always)]
     pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
-        let places = self.tracks[track]..self.tracks[track + 1];
-        if places.len() == 1 {
-            Some(self.part(self.parts[places.start]))
-        } else {
-            None
+        match self.places(track) {
+            &[only] => Some(self.part(only)),
+            _ => None,
         }
     }
 
@@ -251,12 +252,11 @@ impl ClipData {
         track: usize,
         copy: &TrackCopy,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = self.tracks[track]..self.tracks[track + 1];
-        let count = all.len();
+        let all = self.places(track);
         let backwards = copy.sign < 0.0;
-        (0..count).map(move |i| {
-            let place = if backwards { count - 1 - i } else { i };
-            self.part(self.parts[all.start + place])
+        (0..all.len()).map(move |i| {
+            let place = if backwards { all.len() - 1 - i } else { i };
+            self.part(all[place])
         })
     }
 
@@ -268,18 +268,13 @@ impl ClipData {
         samples: Range<usize>,
     ) -> impl Iterator<Item = TrackCopy> {
         let wrap = self.interpolation.wrap();
-        let span = match wrap.repeats() {
-            true => self.track_span(track),
-            false => None,
-        };
-        wrap.copies(span, timeline, samples)
+        wrap.copies(self.track_span(track), timeline, samples)
     }
 
     /// The first and the last key time of a track, if its wrap mode needs them.
     fn track_span(&self, track: usize) -> Option<(f64, f64)> {
-        let &first = self.parts.get(self.tracks[track])?;
-        let beyond = self.part(first).part.beyond.as_ref()?;
-        Some(beyond.span)
+        let first = self.part(*self.places(track).first()?);
+        Some(first.part.beyond.as_ref()?.span)
     }
 
     /// The timeline with explicit times folded into the time range of their track's keys, if the
