@@ -119,7 +119,7 @@ impl Prepare for ArcPreparation {
         let sources = (segments..segments + count as u32).map(Source::Segment);
         spans.sources.extend(sources);
         let spans = first_span..first_span + count;
-        prepared.push_part((index, track), &intervals, spans, [first_key, last_key]);
+        prepared.push_part(index, track.times, &intervals, spans, [first_key, last_key]);
         Ok(())
     }
 

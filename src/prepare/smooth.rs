@@ -115,7 +115,7 @@ impl Prepare for SmoothPreparation {
             held(last_key, self.interpolation.after),
         ];
         let part = prepared.parts.len();
-        prepared.push_part((index, track), &intervals, 0..0, held);
+        prepared.push_part(index, track.times, &intervals, 0..0, held);
         let looped = matches!(self.interpolation.ends, Ends::Loop);
         // Two keys are joined by constant velocity, whatever lies beside them.
         let alone = all == 1 && self.interpolation.method.interpolates;

@@ -38,7 +38,7 @@ impl Prepare for StepPreparation {
         prepared.constants.extend(keys.map(value));
         let first_span = prepared.spans.len();
         let spans = first_span..first_span + intervals.len();
-        prepared.push_part((index, track), &intervals, spans, [first, last]);
+        prepared.push_part(index, track.times, &intervals, spans, [first, last]);
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], Source::Constant(constant), NONE);
         }

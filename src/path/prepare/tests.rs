@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::simd::dispatch::tests::same_at_every_width;
+use crate::time::spans::Part;
 
 /// Of each span of each track when it starts, and the numbers that give its values.
 type Values = Vec<Vec<(u64, Vec<[u32; 4]>)>>;
