@@ -136,11 +136,17 @@ impl Fitting {
         source
     }
 
-    /// Takes a curve of any length as the next span. [`Fitting::finish`] fits it, and cuts it if
-    /// necessary.
-    pub(crate) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
-        self.cutter.push_whole(prepared.spans.sources.len(), curve);
-        UNTRIED
+    /// Takes a curve of any length as the next span, with this constant at its start.
+    /// [`Fitting::finish`] fits it, and cuts it if necessary; until then it has no segment.
+    pub(crate) fn take_curve(
+        &mut self,
+        prepared: &mut Prepared,
+        curve: Curve,
+        start: f64,
+        key: u32,
+    ) {
+        self.cutter.push_whole(prepared.spans.len(), curve);
+        prepared.push_span(start, Source::Segment(NONE), key);
     }
 
     /// Fits the curves that still wait, and replaces the spans of cut curves by those of their
@@ -187,9 +193,6 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
 static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
     coefficients: [[0.0; 4]; 11],
 }; 2 * LANES];
-
-/// The source of a span whose curve the cutter fits; it has no segment yet.
-const UNTRIED: Source = Source::Segment(NONE);
 
 /// Adds a zeroed segment, and returns it as a source and by its place.
 pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {

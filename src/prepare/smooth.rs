@@ -10,7 +10,7 @@ use crate::math::canonical::round_quat;
 use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
 use crate::method::{Given, Smooth};
-use crate::prepare::constant_speed::{Place, Waiting};
+use crate::prepare::constant_speed::{Waiting, retime};
 use crate::prepare::direct::Direct;
 use crate::prepare::fitting::Fitting;
 use crate::prepare::preparation::Prepare;
@@ -43,7 +43,7 @@ pub(crate) struct SmoothPreparation {
     /// Prepares curves straight from keys in f32, if method and options allow it.
     direct: Option<Box<Direct>>,
     /// Curves that are traversed at constant speed, until their whole track is there.
-    waiting: Waiting,
+    waiting: Vec<Waiting>,
     /// The frames' rate and start, if only intervals that contain a frame are wanted.
     frames: Option<(FrameRate, f64)>,
 }
@@ -64,7 +64,7 @@ impl SmoothPreparation {
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
-            waiting: Waiting::default(),
+            waiting: Vec::new(),
             frames: None,
         }
     }
@@ -170,7 +170,8 @@ impl Prepare for SmoothPreparation {
         if let Some(direct) = &mut self.direct {
             direct.finish(prepared, &mut self.fitting);
         }
-        self.waiting.finish(prepared, &mut self.fitting);
+        retime(prepared, &mut self.waiting, &mut self.fitting);
+        self.waiting.clear();
         self.fitting.finish(prepared);
     }
 }
@@ -258,15 +259,15 @@ impl SmoothPreparation {
     /// Lets the curves of a stretch wait until all of its track is there.
     fn wait(&mut self, stretch: &Stretch) {
         for (i, lane) in stretch.lanes().enumerate() {
-            let place = Place {
+            let quantity = self.interpolation.quantity;
+            let moves = !self.holds(stretch, lane);
+            let curve = || self.intervals.curve(lane, self.smooth.shape, quantity);
+            self.waiting.push(Waiting {
                 part: stretch.part,
                 start: self.intervals.starts[lane],
                 key: stretch.key_at(i),
-            };
-            let quantity = self.interpolation.quantity;
-            let moves = !self.holds(stretch, lane);
-            let curve = moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
-            self.waiting.push(place, curve);
+                curve: moves.then(curve),
+            });
         }
     }
 
