@@ -23,7 +23,7 @@ pub(crate) trait Prepare: Send {
         set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
-    ) -> Result<(), InterpolationError>;
+    );
 
     /// Finishes the segments of all intervals that were added.
     fn finish(&mut self, prepared: &mut Prepared);
@@ -34,18 +34,26 @@ pub(crate) trait Prepare: Send {
 }
 
 /// Prepares tracks by the implementation of [`Prepare`] for their method; its memory is reused.
-pub(crate) struct Preparation(Box<dyn Prepare>);
+pub(crate) struct Preparation {
+    interpolation: Interpolation,
+    prepare: Box<dyn Prepare>,
+}
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        Self(match *interpolation.method.curves {
-            Curves::Arcs(moving) if interpolation.is_by_formula() => {
-                Box::new(SmoothPreparation::new(interpolation, moving))
+        let prepare: Box<dyn Prepare> = match *interpolation.method.curves {
+            Curves::Arcs(_) if !interpolation.is_by_formula() => {
+                Box::new(ArcPreparation::new(interpolation.path))
             }
-            Curves::Arcs(_) => Box::new(ArcPreparation::new(interpolation)),
-            Curves::Steps => Box::new(StepPreparation(*interpolation)),
-            Curves::Smooth(smooth) => Box::new(SmoothPreparation::new(interpolation, smooth)),
-        })
+            Curves::Steps => Box::new(StepPreparation(interpolation.quantity)),
+            Curves::Arcs(smooth) | Curves::Smooth(smooth) => {
+                Box::new(SmoothPreparation::new(interpolation, smooth))
+            }
+        };
+        Self {
+            interpolation: *interpolation,
+            prepare,
+        }
     }
 
     /// From now on intervals without a sample of this timeline may be left out, which is done if
@@ -53,7 +61,7 @@ impl Preparation {
     /// other timeline.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        self.0.only_frames(match timeline.ticks {
+        self.prepare.only_frames(match timeline.ticks {
             Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
             _ => None,
         });
@@ -66,10 +74,21 @@ impl Preparation {
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), InterpolationError> {
+        let Interpolation {
+            method, path, ends, ..
+        } = self.interpolation;
+        // Steps have no path, and a method with a path of its own also defines the curve between
+        // opposite keys.
+        let has_path = !matches!(method.curves, Curves::Steps) && method.path.is_none();
         for (track, intervals) in intervals {
-            self.0.add(prepared, set, track, intervals)?;
+            let (_, keys) = set.times_and_keys(track);
+            ends.check(keys, track)?;
+            if has_path {
+                path.check(keys, intervals.clone(), track)?;
+            }
+            self.prepare.add(prepared, set, track, intervals);
         }
-        self.0.finish(prepared);
+        self.prepare.finish(prepared);
         Ok(())
     }
 }
@@ -139,12 +158,17 @@ mod tests {
             let times: Vec<f64> = (0..23)
                 .map(|i| f64::from(i) + uneven * f64::from(i % 2))
                 .collect();
-            let keys: Vec<Quat> = (0..23)
+            let mut keys: Vec<Quat> = (0..23)
                 .map(|i| {
                     let turn = step * (i as f32 + (i as f32).sin());
                     Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
                 })
                 .collect();
+            if track == 13 {
+                keys[7] = keys[6]; // no plane
+                keys[9] = Quat::IDENTITY; // half a turn to the next
+                keys[10] = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+            }
             set.push("", &times, &keys).unwrap();
         }
         for method in METHODS {

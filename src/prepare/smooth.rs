@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::curve::options::{Ends, InterpolationError, Quantity, Speed};
+use crate::curve::options::{Ends, Quantity, Speed};
 use crate::fit::double::handles::{FramesHeld, Steps};
 use crate::fit::double::intervals::{Intervals, LANES, Stretch};
 use crate::math::canonical::round_quat;
@@ -81,15 +81,8 @@ impl Prepare for SmoothPreparation {
         set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
-    ) -> Result<(), InterpolationError> {
+    ) {
         let track = set.track(index);
-        self.interpolation.ends.check(track.keys, index)?;
-        // A method with a path of its own also defines the curve between opposite keys.
-        if self.interpolation.method.path.is_none() {
-            self.interpolation
-                .path
-                .check(track.keys, intervals.clone(), index)?;
-        }
         let signs = self.interpolation.path.signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
@@ -162,7 +155,6 @@ impl Prepare for SmoothPreparation {
             }
             from = to;
         }
-        Ok(())
     }
 
     fn finish(&mut self, prepared: &mut Prepared) {

@@ -4,15 +4,14 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use crate::curve::options::{InterpolationError, Quantity};
-use crate::method::interpolation::Interpolation;
+use crate::curve::options::Quantity;
 use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
 use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 
-/// Prepares tracks whose keys are held.
-pub(crate) struct StepPreparation(pub(crate) Interpolation);
+/// Prepares tracks whose keys are held, for this quantity.
+pub(crate) struct StepPreparation(pub(crate) Quantity);
 
 impl Prepare for StepPreparation {
     fn add(
@@ -21,18 +20,13 @@ impl Prepare for StepPreparation {
         set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
-    ) -> Result<(), InterpolationError> {
+    ) {
         let track = set.track(index);
-        self.0.ends.check(track.keys, index)?;
         let first = prepared.constants.len() as u32;
         let last = first + intervals.len() as u32;
-        let stands_still = self.0.quantity != Quantity::Rotation;
-        let value = |key: &Quat| {
-            if stands_still {
-                [0.0; 4]
-            } else {
-                key.to_array()
-            }
+        let value = |key: &Quat| match self.0 {
+            Quantity::Rotation => key.to_array(),
+            _ => [0.0; 4],
         };
         let keys = track.keys[intervals.start..=intervals.end].iter();
         prepared.constants.extend(keys.map(value));
@@ -42,7 +36,6 @@ impl Prepare for StepPreparation {
         for (i, constant) in intervals.zip(first..last) {
             prepared.push_span(track.times[i], Source::Constant(constant), NONE);
         }
-        Ok(())
     }
 
     fn finish(&mut self, _: &mut Prepared) {}
