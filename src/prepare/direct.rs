@@ -4,8 +4,9 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::curve::options::Ends;
-use crate::fit::double::handles::Steps;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
 use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
@@ -18,15 +19,10 @@ use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::lane_lists::{List, fit};
 use crate::prepare::prepared::Prepared;
+use crate::prepare::smooth::CONTEXT;
+use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::NONE;
-
-/// If more than one in this many intervals of a block is left over, the whole block is computed in
-/// f64: in a block of its own each would bring two neighbours as context.
-const MOST_ALONE: usize = 3;
-
-/// The most spans that the lanes of a block become. A power of two, for a cheap modulo.
-const SPANS: usize = 2 * LANES;
 
 /// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
@@ -35,18 +31,13 @@ pub(crate) struct Direct {
     small_angle: SmallAngleLanes,
     whole: HandlesF32,
     /// The span and the segment that each lane becomes; the first of the two if it is cut.
-    spans: [u32; ROOM],
-    places: [u32; ROOM],
+    spans: [usize; ROOM],
+    places: [usize; ROOM],
     /// Lanes that are fitted whole by degree 10.
     usual: List,
     /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
     few_powers: List,
     halves: List,
-    /// 1 if a lane becomes two spans, else 0.
-    cut: [u32; ROOM],
-    /// The start times of new spans, in seconds, and the constants there.
-    starts: [f64; SPANS],
-    keys: [u32; SPANS],
     /// Lanes that f32 cannot prepare.
     left_over: List,
     /// Intervals that f32 cannot prepare wait here; made for the first one.
@@ -69,9 +60,6 @@ impl Direct {
             usual: List::new(),
             few_powers: List::new(),
             halves: List::new(),
-            cut: [0; ROOM],
-            starts: [0.0; SPANS],
-            keys: [NONE; SPANS],
             left_over: List::new(),
             rest: None,
             find_long: how.find_long,
@@ -88,9 +76,7 @@ impl Direct {
         });
         self.weights.bring(intervals, stretches);
         self.small_angle.look(&self.steps, stretches);
-        if self.small_angle.may_hold() {
-            (self.small_angle).prepare(intervals, &self.weights, stretches);
-        }
+        (self.small_angle).prepare(intervals, &self.weights, stretches);
         self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
         in_lanes(&mut FindHandles {
             lanes: &mut self.whole,
@@ -107,76 +93,38 @@ impl Direct {
         });
     }
 
-    /// Takes the curves in some lanes: they become the next spans, the first with the constant
-    /// `key` at its start.
+    /// Takes the curve in a lane: it becomes the next span, with the constant `key` at its start,
+    /// or the next two if it is split at its middle.
+    #[inline]
     pub(crate) fn take(
         &mut self,
         prepared: &mut Prepared,
         intervals: &Intervals,
-        lanes: Range<usize>,
+        lane: usize,
         key: u32,
     ) {
-        if self.small_angle.may_hold() {
-            for lane in lanes.clone().filter(|&lane| self.small_angle.holds[lane]) {
-                // A negative squared extent puts the lane on no list.
-                self.whole.energies[lane] = -1.0;
-            }
+        let start = intervals.starts[lane];
+        let (span, place) = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+        (self.spans[lane], self.places[lane]) = (span, place);
+        if self.small_angle.holds[lane] {
+            let segment = &mut prepared.segments.polynomials[place];
+            self.small_angle.write(lane, segment);
+            return;
         }
-        self.list(lanes.clone());
-        self.begin(prepared, intervals, lanes.clone(), key);
-        if self.small_angle.may_hold() {
-            for lane in lanes.filter(|&lane| self.small_angle.holds[lane]) {
-                let place = self.places[lane] as usize;
-                self.small_angle
-                    .write(lane, &mut prepared.segments.polynomials[place]);
-            }
-        }
-    }
-
-    /// Puts lanes on the list of the fit for their squared extent.
-    fn list(&mut self, lanes: Range<usize>) {
-        let energies = &self.whole.energies[lanes.clone()];
-        let [few, whole, direct] =
-            [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
-        let is_usual = |squared_extent: f32| squared_extent > few && squared_extent <= whole;
-        (self.usual).push_where(lanes.clone(), energies, is_usual);
-        let takes_few = |squared_extent: f32| squared_extent >= 0.0 && squared_extent <= few;
-        (self.few_powers).push_where(lanes.clone(), energies, takes_few);
-        let is_cut = |squared_extent: f32| squared_extent > whole && squared_extent <= direct;
-        for (cut, &squared_extent) in self.cut[lanes.clone()].iter_mut().zip(energies) {
-            *cut = u32::from(is_cut(squared_extent));
-        }
-        (self.halves).push_where(lanes.clone(), energies, is_cut);
-        let is_left = |squared_extent: f32| squared_extent > direct || squared_extent.is_nan();
-        (self.left_over).push_where(lanes, energies, is_left);
-    }
-
-    /// Adds the spans and the segments that lanes become.
-    fn begin(
-        &mut self,
-        prepared: &mut Prepared,
-        intervals: &Intervals,
-        lanes: Range<usize>,
-        key: u32,
-    ) {
-        let first_place = prepared.segments.polynomials.len() as u32;
-        let first_span = prepared.spans.sources.len() as u32;
-        let mut next = 0;
-        for (i, lane) in lanes.clone().enumerate() {
-            self.spans[lane] = first_span + next as u32;
-            self.places[lane] = first_place + next as u32;
-            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
-            let own = if key == NONE { NONE } else { key + i as u32 };
-            // Both halves are always written; the next lane overwrites the second if it is not cut.
-            let second = (next + 1) % SPANS;
-            (self.starts[next % SPANS], self.keys[next % SPANS]) = (start, own);
-            (self.starts[second], self.keys[second]) = (start + (end - start) * 0.5, NONE);
-            next += 1 + self.cut[lane] as usize;
-        }
-        let spans = &mut prepared.spans;
-        spans.starts.extend_from_slice(&self.starts[..next]);
-        spans.keys.extend_from_slice(&self.keys[..next]);
-        prepared.new_segments(next);
+        let squared_extent = self.whole.energies[lane];
+        let list = if squared_extent <= LONGEST_OF_FEW as f32 {
+            &mut self.few_powers
+        } else if squared_extent <= LONGEST_WHOLE as f32 {
+            &mut self.usual
+        } else if squared_extent <= LONGEST_DIRECT as f32 {
+            let middle = start + (intervals.ends[lane] - start) * 0.5;
+            prepared.push_segment(middle, PolynomialSegment::zeroed(), NONE);
+            &mut self.halves
+        } else {
+            // NaN comes here too.
+            &mut self.left_over
+        };
+        list.push(lane);
     }
 
     /// Fits the curves that were taken. Those left over wait, here or in `fitting`. `is_exact` says
@@ -184,7 +132,7 @@ impl Direct {
     pub(crate) fn fit(
         &mut self,
         prepared: &mut Prepared,
-        intervals: &mut Intervals,
+        intervals: &Intervals,
         stretches: &[Stretch],
         is_exact: bool,
         fitting: &mut Fitting,
@@ -193,14 +141,10 @@ impl Direct {
         fit(&WHOLE, &mut self.usual, numbers, places, prepared);
         fit(&FEW_POWERS, &mut self.few_powers, numbers, places, prepared);
         fit(&Halves, &mut self.halves, numbers, places, prepared);
-        let are_many = MOST_ALONE * self.left_over.count > intervals.count;
-        if are_many && !is_exact {
-            in_lanes(&mut Steps(intervals));
-            (self.smooth.curves)(intervals, stretches, self.ends);
-        }
-        if are_many || is_exact {
-            for lane in self.left_over.iter() {
-                fitting.queue(prepared, intervals, lane, self.spans[lane] as usize);
+        if is_exact {
+            for &lane in self.left_over.lanes() {
+                let lane = lane as usize;
+                fitting.take(prepared, intervals, lane, self.spans[lane]);
             }
         } else {
             self.leave(prepared, intervals, stretches, fitting);
@@ -208,7 +152,8 @@ impl Direct {
         self.left_over.clear();
     }
 
-    /// Moves intervals that are left over to `rest`, with their neighbours as context.
+    /// Moves intervals that are left over to `rest`, each run of them between its neighbours as
+    /// context.
     fn leave(
         &mut self,
         prepared: &mut Prepared,
@@ -216,21 +161,21 @@ impl Direct {
         stretches: &[Stretch],
         fitting: &mut Fitting,
     ) {
-        let mut left_over = self.left_over.iter().peekable();
+        let mut left_over = self.left_over.lanes();
         for stretch in stretches {
             let end = stretch.lanes().end;
-            while let Some(first) = left_over.next_if(|&lane| lane < end) {
-                let mut lanes = first..first + 1;
-                while lanes.end < end && left_over.next_if_eq(&lanes.end).is_some() {
-                    lanes.end += 1;
-                }
+            let own = left_over.partition_point(|&lane| (lane as usize) < end);
+            let (own, others) = left_over.split_at(own);
+            for run in own.chunk_by(|&lane, &next| lane + 1 == next) {
+                let lanes = run[0] as usize..run[0] as usize + run.len();
                 let new = || Box::new(Rest::new(self.smooth, self.ends));
                 let rest = self.rest.get_or_insert_with(new);
-                if !rest.has_room(lanes.len()) {
+                if rest.intervals.count + lanes.len() + CONTEXT > LANES {
                     rest.flush(prepared, fitting);
                 }
                 rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
             }
+            left_over = others;
         }
     }
 
@@ -246,7 +191,7 @@ impl Direct {
 struct Rest {
     intervals: Intervals,
     stretches: Vec<Stretch>,
-    spans: Vec<u32>,
+    spans: Vec<usize>,
     smooth: Smooth,
     ends: Ends,
 }
@@ -262,18 +207,13 @@ impl Rest {
         }
     }
 
-    /// Whether there is room for `count` consecutive intervals and their context.
-    fn has_room(&self, count: usize) -> bool {
-        self.intervals.count + count + 2 <= LANES
-    }
-
     /// Takes some intervals of a stretch, which become these spans; there must be room for them.
     fn push(
         &mut self,
         intervals: &Intervals,
         stretch: &Stretch,
         lanes: Range<usize>,
-        spans: &[u32],
+        spans: &[usize],
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
         self.stretches.push(Stretch {
@@ -294,18 +234,15 @@ impl Rest {
 
     /// Computes the curves of all intervals in f64, and queues them to be fitted.
     fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        if self.spans.is_empty() {
-            return;
-        }
-        in_lanes(&mut Steps(&mut self.intervals));
-        (self.smooth.curves)(&mut self.intervals, &self.stretches, self.ends);
-        let lanes = self.stretches.iter().flat_map(Stretch::lanes);
+        let (intervals, stretches) = (&mut self.intervals, &mut self.stretches);
+        self.smooth.find_curves(intervals, stretches, self.ends);
+        let lanes = stretches.iter().flat_map(Stretch::lanes);
         for (lane, &span) in lanes.zip(&self.spans) {
-            fitting.queue(prepared, &self.intervals, lane, span as usize);
+            fitting.take(prepared, intervals, lane, span);
         }
-        fitting.bring(prepared, &self.intervals);
-        self.intervals.clear();
-        self.stretches.clear();
+        fitting.bring(prepared, intervals);
+        intervals.clear();
+        stretches.clear();
         self.spans.clear();
     }
 }

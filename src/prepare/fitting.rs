@@ -1,24 +1,18 @@
-//! Fits curves into segments. Curves wait until they fill a block. Each becomes one span at once;
+//! Fits curves into segments. Curves wait until they fill a block. Each has one span at once;
 //! that span is replaced by several if the curve has to be cut.
-
-use std::ops::Range;
-
-use bytemuck::Zeroable;
 
 use crate::curve::options::Quantity;
 use crate::fit::constant_velocity::SteadyBlock;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::cut::Cutter;
 use crate::fit::double::fit::{FitBlock, Tier, tier};
-use crate::fit::double::intervals::{Intervals, LANES};
+use crate::fit::double::intervals::Intervals;
 use crate::fit::double::shape::Shape;
 use crate::prepare::prepared::Prepared;
-use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::{NONE, Source};
 
-/// Fits curves in blocks, whose memory is kept. A curve that is taken belongs to the next span,
-/// which is the first without a source.
+/// Fits curves in blocks, whose memory is kept.
 pub(crate) struct Fitting {
     shape: &'static Shape,
     quantity: Quantity,
@@ -63,27 +57,10 @@ impl Fitting {
         }
     }
 
-    /// Takes the curves in some lanes of `curves`: each becomes the next span, the first with the
-    /// constant `key` at its start. [`Fitting::bring`] must copy them before the lanes of `curves`
-    /// change.
+    /// Takes the curve in a lane of `curves`, which belongs to a span that has a segment.
+    /// [`Fitting::bring`] must copy it before the lanes of `curves` change.
     #[inline]
     pub(crate) fn take(
-        &mut self,
-        prepared: &mut Prepared,
-        curves: &Intervals,
-        lanes: Range<usize>,
-        key: u32,
-    ) {
-        (prepared.spans).begin(&curves.starts[lanes.clone()], key);
-        let first_span = prepared.new_segments(lanes.len());
-        for (span, lane) in (first_span..).zip(lanes) {
-            self.queue(prepared, curves, lane, span);
-        }
-    }
-
-    /// Takes, as [`Fitting::take`] does, the curve of a span that has its segment already.
-    #[inline]
-    pub(crate) fn queue(
         &mut self,
         prepared: &Prepared,
         curves: &Intervals,
@@ -123,17 +100,21 @@ impl Fitting {
         }
     }
 
-    /// Takes the only two keys of a track, which are joined at constant velocity.
-    pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
-        let (source, segment) = new_segment(prepared);
+    /// Takes the only two keys of a track, which are joined at constant velocity by the segment at
+    /// this place.
+    pub(crate) fn take_steady(
+        &mut self,
+        prepared: &mut Prepared,
+        keys: [[f32; 4]; 2],
+        place: usize,
+    ) {
         let new = || Box::new(SteadyBlock::new());
         let block = self.steady.get_or_insert_with(new);
-        block.push(keys, segment as u32);
+        block.push(keys, place as u32);
         if block.is_full() {
             in_lanes(&mut **block);
             block.write(&mut prepared.segments.polynomials);
         }
-        source
     }
 
     /// Takes a curve of any length as the next span, with this constant at its start.
@@ -188,34 +169,7 @@ fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepar
     block.clear();
 }
 
-/// Zeroed segments for curves that are not fitted yet. New segments are copied from this constant,
-/// all at once.
-static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
-    coefficients: [[0.0; 4]; 11],
-}; 2 * LANES];
-
-/// Adds a zeroed segment, and returns it as a source and by its place.
-pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
-    let segments = &mut prepared.segments.polynomials;
-    let place = segments.len();
-    segments.push(PolynomialSegment::zeroed());
-    (Source::Segment(place as u32), place)
-}
-
 impl Prepared {
-    /// Adds `count` zeroed segments (at most two for each lane of a block), each as the source of
-    /// the next span, and returns the first of these spans.
-    #[inline]
-    pub(crate) fn new_segments(&mut self, count: usize) -> usize {
-        let segments = &mut self.segments.polynomials;
-        let places = segments.len()..segments.len() + count;
-        segments.extend_from_slice(&ZERO[..count]);
-        let sources = &mut self.spans.sources;
-        let first_span = sources.len();
-        sources.extend(places.map(|place| Source::Segment(place as u32)));
-        first_span
-    }
-
     /// Replaces the spans of curves that were cut by those of their parts.
     fn put_subcurves(&mut self, cutter: &Cutter) {
         let mut cut = cutter.subcurves();

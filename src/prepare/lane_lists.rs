@@ -1,7 +1,5 @@
 //! Lists of a block's lanes, and the Hermite fit of the curves in them.
 
-use std::ops::Range;
-
 use bytemuck::Zeroable as _;
 
 use crate::fit::double::fit::{MOST, Samples};
@@ -15,13 +13,12 @@ use crate::simd::lanes::Lanes;
 
 /// A list of lanes.
 pub(crate) struct List {
-    pub(crate) count: usize,
+    count: usize,
     lanes: [u32; ROOM_FOR],
 }
 
-/// Room for all lanes of a block and the rest of the last vector. A power of two, for a cheap
-/// modulo.
-const ROOM_FOR: usize = 2 * LANES;
+/// Room for all lanes of a block and the rest of the last vector.
+const ROOM_FOR: usize = LANES + MOST;
 
 impl List {
     pub(crate) fn new() -> Self {
@@ -31,26 +28,16 @@ impl List {
         }
     }
 
-    /// Adds each of some lanes whose squared extent is wanted, without a branch, as its outcome
-    /// could not be predicted.
+    /// Adds a lane of the block.
     #[inline]
-    pub(crate) fn push_where(
-        &mut self,
-        lanes: Range<usize>,
-        energies: &[f32],
-        is_wanted: impl Fn(f32) -> bool,
-    ) {
-        let mut count = self.count;
-        for (lane, &squared_extent) in lanes.zip(energies) {
-            self.lanes[count % ROOM_FOR] = lane as u32;
-            count += usize::from(is_wanted(squared_extent));
-        }
-        self.count = count;
+    pub(crate) fn push(&mut self, lane: usize) {
+        self.lanes[self.count] = lane as u32;
+        self.count += 1;
     }
 
     /// The lanes.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
-        self.lanes[..self.count].iter().map(|&lane| lane as usize)
+    pub(crate) fn lanes(&self) -> &[u32] {
+        &self.lanes[..self.count]
     }
 
     /// Empties the list.
@@ -64,7 +51,7 @@ pub(crate) fn fit<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
     list: &mut List,
     curves: &CurveNumbers,
-    places: &[u32; ROOM],
+    places: &[usize; ROOM],
     prepared: &mut Prepared,
 ) {
     if list.count == 0 {
@@ -89,7 +76,7 @@ struct Fit<'a, F, const PAIRS: usize> {
     how: &'a F,
     list: &'a List,
     curves: &'a CurveNumbers,
-    places: &'a [u32; ROOM],
+    places: &'a [usize; ROOM],
     /// All segments, and two extra ones at the end.
     segments: &'a mut [PolynomialSegment],
 }
@@ -115,7 +102,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
             };
             let mut places = [self.segments.len() - 2; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
-                *place = self.places[lane as usize] as usize;
+                *place = self.places[lane as usize];
             }
             self.how.fit(&mut samples, &curves, &places, self.segments);
         }

@@ -87,11 +87,6 @@ impl SmallAngleLanes {
         }
     }
 
-    /// Whether any lane may have such a curve.
-    pub(crate) fn may_hold(&self) -> bool {
-        self.wanted > 0
-    }
-
     /// Writes a lane's coefficients to a segment.
     #[inline]
     pub(crate) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
