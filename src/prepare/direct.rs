@@ -7,21 +7,24 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 
 use crate::curve::options::Ends;
+use crate::fit::double::fit::{MOST, Samples};
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
-use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
-use crate::fit::single::hermite_fit::Halves;
+use crate::fit::single::handles::{
+    CurveNumbers, FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT,
+};
+use crate::fit::single::hermite_fit::{BetweenKeys, Halves, KeyFit};
 use crate::fit::single::key_steps::{FindSteps, KeySteps};
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
-use crate::prepare::lane_lists::{List, fit};
 use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::CONTEXT;
 use crate::shader::PolynomialSegment;
-use crate::simd::dispatch::in_lanes;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
 use crate::time::spans::NONE;
 
 /// Prepares the curves of a block straight from keys.
@@ -34,12 +37,12 @@ pub(crate) struct Direct {
     spans: [usize; ROOM],
     places: [usize; ROOM],
     /// Lanes that are fitted whole by degree 10.
-    usual: List,
+    usual: Vec<u32>,
     /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
-    few_powers: List,
-    halves: List,
+    few_powers: Vec<u32>,
+    halves: Vec<u32>,
     /// Lanes that f32 cannot prepare.
-    left_over: List,
+    left_over: Vec<u32>,
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
@@ -57,10 +60,10 @@ impl Direct {
             whole: HandlesF32::new(),
             spans: [0; ROOM],
             places: [0; ROOM],
-            usual: List::new(),
-            few_powers: List::new(),
-            halves: List::new(),
-            left_over: List::new(),
+            usual: Vec::new(),
+            few_powers: Vec::new(),
+            halves: Vec::new(),
+            left_over: Vec::new(),
             rest: None,
             find_long: how.find_long,
             smooth,
@@ -124,7 +127,7 @@ impl Direct {
             // NaN comes here too.
             &mut self.left_over
         };
-        list.push(lane);
+        list.push(lane as u32);
     }
 
     /// Fits the curves that were taken. Those left over wait, here or in `fitting`. `is_exact` says
@@ -142,7 +145,7 @@ impl Direct {
         fit(&FEW_POWERS, &mut self.few_powers, numbers, places, prepared);
         fit(&Halves, &mut self.halves, numbers, places, prepared);
         if is_exact {
-            for &lane in self.left_over.lanes() {
+            for &lane in &self.left_over {
                 let lane = lane as usize;
                 fitting.take(prepared, intervals, lane, self.spans[lane]);
             }
@@ -161,7 +164,7 @@ impl Direct {
         stretches: &[Stretch],
         fitting: &mut Fitting,
     ) {
-        let mut left_over = self.left_over.lanes();
+        let mut left_over = &self.left_over[..];
         for stretch in stretches {
             let end = stretch.lanes().end;
             let own = left_over.partition_point(|&lane| (lane as usize) < end);
@@ -183,6 +186,73 @@ impl Direct {
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
+        }
+    }
+}
+
+/// Fits the curves in the listed lanes into the segments at their places, and empties the list.
+fn fit<const PAIRS: usize>(
+    how: &impl KeyFit<PAIRS>,
+    lanes: &mut Vec<u32>,
+    curves: &CurveNumbers,
+    places: &[usize; ROOM],
+    prepared: &mut Prepared,
+) {
+    if lanes.is_empty() {
+        return;
+    }
+    let count = lanes.len();
+    lanes.resize(count.next_multiple_of(MOST), 0);
+    let segments = &mut prepared.segments.polynomials;
+    let all = segments.len();
+    // The lanes of the last vector that have no curve write to two extra segments.
+    segments.extend([PolynomialSegment::zeroed(); 2]);
+    in_lanes(&mut Fit::<_, PAIRS> {
+        how,
+        lanes,
+        count,
+        curves,
+        places,
+        segments,
+    });
+    segments.truncate(all);
+    lanes.clear();
+}
+
+struct Fit<'a, F, const PAIRS: usize> {
+    how: &'a F,
+    /// The listed lanes, and others up to whole vectors.
+    lanes: &'a [u32],
+    count: usize,
+    curves: &'a CurveNumbers,
+    places: &'a [usize; ROOM],
+    /// All segments, and two extra ones at the end.
+    segments: &'a mut [PolynomialSegment],
+}
+
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        // Made outside the loop, so that they are cleared only once.
+        let mut samples = Samples::<L, PAIRS>::all(L::all(0.0));
+        for i in (0..self.count).step_by(L::COUNT) {
+            let lanes = &self.lanes[i..i + L::COUNT];
+            let own = &lanes[..L::COUNT.min(self.count - i)];
+            let [starts, firsts, seconds, thirds, ends] = self.curves;
+            let start = L::gather_rotations(starts, lanes);
+            let [x1, y1, z1, _] = L::gather_rotations(firsts, lanes);
+            let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
+            let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
+            let curves = BetweenKeys {
+                start,
+                vectors: [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]],
+                end: L::gather_rotations(ends, lanes),
+            };
+            let mut places = [self.segments.len() - 2; MOST];
+            for (place, &lane) in places.iter_mut().zip(own) {
+                *place = self.places[lane as usize];
+            }
+            self.how.fit(&mut samples, &curves, &places, self.segments);
         }
     }
 }

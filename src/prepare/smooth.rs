@@ -54,16 +54,12 @@ pub(crate) struct SmoothPreparation {
 
 impl SmoothPreparation {
     pub(crate) fn new(interpolation: &Interpolation, smooth: Smooth) -> Self {
-        let path = interpolation.method.path.unwrap_or(interpolation.path);
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
         let direct = smooth.direct.filter(|_| suits);
         Self {
             direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends))),
-            interpolation: Interpolation {
-                path,
-                ..*interpolation
-            },
+            interpolation: *interpolation,
             smooth,
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
@@ -87,7 +83,9 @@ impl Prepare for SmoothPreparation {
         intervals: Range<usize>,
     ) {
         let track = set.track(index);
-        let signs = self.interpolation.path.signs(set, index);
+        let path = self.interpolation.method.path;
+        let path = path.unwrap_or(self.interpolation.path);
+        let signs = path.signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
