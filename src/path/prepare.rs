@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
@@ -318,8 +318,7 @@ impl Adding<'_> {
                     Kind::Vector => vectors::add(
                         prepared,
                         walk.track,
-                        Some(walk.path),
-                        Vec3::ZERO,
+                        walk.path,
                         follow.method,
                         self.interpolation,
                     ),

@@ -21,7 +21,7 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::Part;
 use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::Channel;
+use crate::tracks::vectors::{Channel, VectorTrack};
 
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
@@ -149,6 +149,13 @@ impl ClipData {
             Channel::Translation => Vec3::ZERO,
             Channel::Scale => Vec3::ONE,
         };
+        // Where a track without vectors is held.
+        let still = VectorTrack {
+            times: vec![0.0],
+            keys: vec![rest],
+            tangents: Vec::new(),
+            ups: Vec::new(),
+        };
         // As a velocity, a vector is refused where an output is for rotations only.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
@@ -158,8 +165,8 @@ impl ClipData {
         let batch = |first: usize| {
             let mut prepared = Prepared::new(&interpolation);
             for index in first..set.track_count().min(first + VECTOR_BATCH) {
-                let track = set.vectors(channel, index);
-                vectors::add(&mut prepared, index, track, rest, method, &interpolation);
+                let track = set.vectors(channel, index).unwrap_or(&still);
+                vectors::add(&mut prepared, index, track, method, &interpolation);
             }
             prepared
         };

@@ -18,22 +18,14 @@ use crate::time::spans::{NONE, Source};
 use crate::time::wrap::WrapMode;
 use crate::tracks::vectors::VectorTrack;
 
-/// Adds the vectors of the `index`th track; a track without vectors is held at `rest`.
+/// Adds the vectors of the `index`th track.
 pub(crate) fn add(
     prepared: &mut Prepared,
     index: usize,
-    track: Option<&VectorTrack>,
-    rest: Vec3,
+    track: &VectorTrack,
     method: VectorMethod,
     interpolation: &Interpolation,
 ) {
-    let still = VectorTrack {
-        times: vec![0.0],
-        keys: vec![rest],
-        tangents: Vec::new(),
-        ups: Vec::new(),
-    };
-    let track = track.unwrap_or(&still);
     let last = track.keys.len() - 1;
     let first_key = prepared.constants.len() as u32;
     let stored = |key: &Vec3| [canonical(key.x), canonical(key.y), canonical(key.z), 0.0];
