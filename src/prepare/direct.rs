@@ -20,7 +20,7 @@ use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
-use crate::prepare::prepared::Prepared;
+use crate::prepare::prepared::{Place, Prepared};
 use crate::prepare::smooth::CONTEXT;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -33,9 +33,8 @@ pub(crate) struct Direct {
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     whole: HandlesF32,
-    /// The span and the segment that each lane becomes; the first of the two if it is cut.
-    spans: [usize; ROOM],
-    places: [usize; ROOM],
+    /// Where the curve of each lane goes; of one that is split, the first half.
+    places: [Place; ROOM],
     /// Lanes that are fitted whole by degree 10.
     usual: Vec<u32>,
     /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
@@ -58,8 +57,10 @@ impl Direct {
             weights: KeyWeights::new(how.weights, ends),
             small_angle: SmallAngleLanes::new(),
             whole: HandlesF32::new(),
-            spans: [0; ROOM],
-            places: [0; ROOM],
+            places: [Place {
+                span: 0,
+                segment: 0,
+            }; ROOM],
             usual: Vec::new(),
             few_powers: Vec::new(),
             halves: Vec::new(),
@@ -107,10 +108,10 @@ impl Direct {
         key: u32,
     ) {
         let start = intervals.starts[lane];
-        let (span, place) = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
-        (self.spans[lane], self.places[lane]) = (span, place);
+        let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+        self.places[lane] = place;
         if self.small_angle.holds[lane] {
-            let segment = &mut prepared.segments.polynomials[place];
+            let segment = &mut prepared.segments.polynomials[place.segment];
             self.small_angle.write(lane, segment);
             return;
         }
@@ -147,7 +148,7 @@ impl Direct {
         if is_exact {
             for &lane in &self.left_over {
                 let lane = lane as usize;
-                fitting.take(prepared, intervals, lane, self.spans[lane]);
+                fitting.take(intervals, lane, self.places[lane]);
             }
         } else {
             self.leave(prepared, intervals, stretches, fitting);
@@ -176,7 +177,7 @@ impl Direct {
                 if rest.intervals.count + lanes.len() + CONTEXT > LANES {
                     rest.flush(prepared, fitting);
                 }
-                rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
+                rest.push(intervals, stretch, lanes.clone(), &self.places[lanes]);
             }
             left_over = others;
         }
@@ -195,7 +196,7 @@ fn fit<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
     lanes: &mut Vec<u32>,
     curves: &CurveNumbers,
-    places: &[usize; ROOM],
+    places: &[Place; ROOM],
     prepared: &mut Prepared,
 ) {
     if lanes.is_empty() {
@@ -225,7 +226,7 @@ struct Fit<'a, F, const PAIRS: usize> {
     lanes: &'a [u32],
     count: usize,
     curves: &'a CurveNumbers,
-    places: &'a [usize; ROOM],
+    places: &'a [Place; ROOM],
     /// All segments, and two extra ones at the end.
     segments: &'a mut [PolynomialSegment],
 }
@@ -250,7 +251,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
             };
             let mut places = [self.segments.len() - 2; MOST];
             for (place, &lane) in places.iter_mut().zip(own) {
-                *place = self.places[lane as usize];
+                *place = self.places[lane as usize].segment;
             }
             self.how.fit(&mut samples, &curves, &places, self.segments);
         }
@@ -261,7 +262,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
 struct Rest {
     intervals: Intervals,
     stretches: Vec<Stretch>,
-    spans: Vec<usize>,
+    places: Vec<Place>,
     smooth: Smooth,
     ends: Ends,
 }
@@ -271,19 +272,19 @@ impl Rest {
         Self {
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
-            spans: Vec::new(),
+            places: Vec::new(),
             smooth,
             ends,
         }
     }
 
-    /// Takes some intervals of a stretch, which become these spans; there must be room for them.
+    /// Takes some intervals of a stretch, whose curves go to these places; there must be room for them.
     fn push(
         &mut self,
         intervals: &Intervals,
         stretch: &Stretch,
         lanes: Range<usize>,
-        spans: &[usize],
+        places: &[Place],
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
         self.stretches.push(Stretch {
@@ -299,7 +300,7 @@ impl Rest {
             let context = lanes.start - 1..lanes.end + 1;
             self.intervals.push_from(intervals, context);
         }
-        self.spans.extend(spans);
+        self.places.extend(places);
     }
 
     /// Computes the curves of all intervals in f64, and queues them to be fitted.
@@ -307,12 +308,12 @@ impl Rest {
         let (intervals, stretches) = (&mut self.intervals, &mut self.stretches);
         self.smooth.find_curves(intervals, stretches, self.ends);
         let lanes = stretches.iter().flat_map(Stretch::lanes);
-        for (lane, &span) in lanes.zip(&self.spans) {
-            fitting.take(prepared, intervals, lane, span);
+        for (lane, &place) in lanes.zip(&self.places) {
+            fitting.take(intervals, lane, place);
         }
         fitting.bring(prepared, intervals);
         intervals.clear();
         stretches.clear();
-        self.spans.clear();
+        self.places.clear();
     }
 }

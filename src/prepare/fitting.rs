@@ -8,7 +8,7 @@ use crate::fit::double::cut::Cutter;
 use crate::fit::double::fit::{FitBlock, Tier, tier};
 use crate::fit::double::intervals::Intervals;
 use crate::fit::double::shape::Shape;
-use crate::prepare::prepared::Prepared;
+use crate::prepare::prepared::{Place, Prepared};
 use crate::simd::dispatch::in_lanes;
 use crate::time::spans::{NONE, Source};
 
@@ -30,8 +30,8 @@ struct Queue {
     block: Option<Box<FitBlock>>,
     /// The lanes of curves that are not copied into the block yet.
     lanes: Vec<u8>,
-    /// The spans of the curves: of those in the block, then of those in `lanes`.
-    spans: Vec<usize>,
+    /// Where the curves go: those in the block, then those in `lanes`.
+    places: Vec<Place>,
 }
 
 impl Queue {
@@ -40,7 +40,7 @@ impl Queue {
             tier,
             block: None,
             lanes: Vec::new(),
-            spans: Vec::new(),
+            places: Vec::new(),
         }
     }
 }
@@ -57,29 +57,20 @@ impl Fitting {
         }
     }
 
-    /// Takes the curve in a lane of `curves`, which belongs to a span that has a segment.
+    /// Takes the curve in a lane of `curves`, whose span and segment are there already.
     /// [`Fitting::bring`] must copy it before the lanes of `curves` change.
     #[inline]
-    pub(crate) fn take(
-        &mut self,
-        prepared: &Prepared,
-        curves: &Intervals,
-        lane: usize,
-        span: usize,
-    ) {
+    pub(crate) fn take(&mut self, curves: &Intervals, lane: usize, place: Place) {
         let queue = match tier(curves.energies[lane]) {
             Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {
                 let curve = curves.curve(lane, self.shape, self.quantity);
-                if let Source::Segment(place) = prepared.spans.sources[span] {
-                    self.cutter.push(span, curve, place as usize);
-                }
-                return;
+                return self.cutter.push(place.span, curve, place.segment);
             }
         };
         queue.lanes.push(lane as u8);
-        queue.spans.push(span);
+        queue.places.push(place);
     }
 
     /// Copies the curves that were taken into blocks, and fits the blocks that are full.
@@ -92,7 +83,7 @@ impl Fitting {
                 let (own, others) = lanes.split_at(block.room().min(lanes.len()));
                 block.push_from(curves, own);
                 if block.room() == 0 {
-                    run(block, &mut queue.spans, &mut self.cutter, prepared);
+                    run(block, &mut queue.places, &mut self.cutter, prepared);
                 }
                 lanes = others;
             }
@@ -100,17 +91,16 @@ impl Fitting {
         }
     }
 
-    /// Takes the only two keys of a track, which are joined at constant velocity by the segment at
-    /// this place.
+    /// Takes the only two keys of a track, which are joined at constant velocity.
     pub(crate) fn take_steady(
         &mut self,
         prepared: &mut Prepared,
         keys: [[f32; 4]; 2],
-        place: usize,
+        place: Place,
     ) {
         let new = || Box::new(SteadyBlock::new());
         let block = self.steady.get_or_insert_with(new);
-        block.push(keys, place as u32);
+        block.push(keys, place.segment as u32);
         if block.is_full() {
             in_lanes(&mut **block);
             block.write(&mut prepared.segments.polynomials);
@@ -135,7 +125,7 @@ impl Fitting {
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         for queue in [&mut self.small_angle, &mut self.full] {
             if let Some(block) = &mut queue.block {
-                run(block, &mut queue.spans, &mut self.cutter, prepared);
+                run(block, &mut queue.places, &mut self.cutter, prepared);
             }
         }
         if let Some(block) = &mut self.steady {
@@ -148,24 +138,22 @@ impl Fitting {
     }
 }
 
-/// Fits the curves of a block, which belong to the first of the `spans`.
-fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
-    let own = &spans[..block.count];
-    let sources = &prepared.spans.sources;
-    let places = own.iter().filter_map(|&span| match sources[span] {
-        Source::Segment(place) => Some(place as usize),
-        _ => None,
-    });
+/// Fits the curves of a block, which go to the first of the `places`.
+fn run(
+    block: &mut FitBlock,
+    places: &mut Vec<Place>,
+    cutter: &mut Cutter,
+    prepared: &mut Prepared,
+) {
+    let count = block.count;
     let segments = &mut prepared.segments.polynomials;
-    block.run(segments, places);
-    if !block.is_trusted() {
-        for (lane, &span) in own.iter().enumerate() {
-            if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), block.places[lane]);
-            }
+    block.run(segments, places.iter().map(|place| place.segment));
+    let is_trusted = block.is_trusted();
+    for (lane, place) in places.drain(..count).enumerate() {
+        if !is_trusted && !block.fits(lane, segments) {
+            cutter.push(place.span, block.curve(lane), place.segment);
         }
     }
-    spans.drain(..block.count);
     block.clear();
 }
 

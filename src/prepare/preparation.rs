@@ -26,7 +26,7 @@ pub(crate) trait Prepare: Send {
     );
 
     /// Finishes the segments of all intervals that were added.
-    fn finish(&mut self, prepared: &mut Prepared);
+    fn finish(&mut self, _prepared: &mut Prepared) {}
 
     /// From now on only intervals that contain a frame need segments, given the frames' rate and
     /// start; with `None` all need them.

@@ -28,6 +28,13 @@ pub(crate) struct Prepared {
     pub(crate) wrap: Wrap,
 }
 
+/// Where a curve goes: its span, and the segment of that.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) span: usize,
+    pub(crate) segment: usize,
+}
+
 impl Prepared {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
         Self {
@@ -155,18 +162,21 @@ impl Prepared {
         self.constants.len() as u32 - 1
     }
 
-    /// Adds a span with a segment of its own. Returns the places of both.
+    /// Adds a span with a segment of its own.
     #[inline]
     pub(crate) fn push_segment(
         &mut self,
         start: f64,
         segment: PolynomialSegment,
         key: u32,
-    ) -> (usize, usize) {
+    ) -> Place {
         let (span, place) = (self.spans.len(), self.segments.polynomials.len());
         self.segments.polynomials.push(segment);
         self.push_span(start, Source::Segment(place as u32), key);
-        (span, place)
+        Place {
+            span,
+            segment: place,
+        }
     }
 
     pub(crate) fn push_span(&mut self, start: f64, source: Source, key: u32) {

@@ -33,10 +33,6 @@ const STILL: [f32; 4] = [0.0; 4];
 /// The lanes of context that a stretch needs beside those of its intervals.
 pub(crate) const CONTEXT: usize = 2;
 
-/// No stretch with fewer intervals than this is begun at the end of a block, unless
-/// it is all that is left of its track.
-const SHORTEST: usize = 8;
-
 /// Prepares smooth curves; its blocks are made once for many tracks.
 pub(crate) struct SmoothPreparation {
     interpolation: Interpolation,
@@ -120,11 +116,11 @@ impl Prepare for SmoothPreparation {
         };
         let mut from = intervals.start;
         while from < intervals.end {
-            let left = intervals.end - from;
-            if self.intervals.count + context + left.min(SHORTEST) > LANES {
+            if self.intervals.count + context >= LANES {
                 self.flush(prepared);
             }
-            let to = from + left.min(LANES - context - self.intervals.count);
+            let room = LANES - context - self.intervals.count;
+            let to = intervals.end.min(from + room);
             if context > 0 {
                 self.push_context(track, signs, from.checked_sub(1), all - 1);
             }
@@ -286,14 +282,14 @@ impl SmoothPreparation {
                 };
                 prepared.push_span(start, Source::Constant(constant), NONE);
             } else if is_steady {
-                let (_, place) = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+                let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
                 let keys = self.intervals.keys(lane);
                 self.fitting.take_steady(prepared, keys, place);
             } else if let Some(direct) = &mut self.direct {
                 direct.take(prepared, &self.intervals, lane, key);
             } else {
-                let (span, _) = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
-                self.fitting.take(prepared, &self.intervals, lane, span);
+                let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+                self.fitting.take(&self.intervals, lane, place);
             }
         }
         let end = prepared.spans.len();

@@ -37,6 +37,4 @@ impl Prepare for StepPreparation {
             prepared.push_span(track.times[i], Source::Constant(constant), NONE);
         }
     }
-
-    fn finish(&mut self, _: &mut Prepared) {}
 }

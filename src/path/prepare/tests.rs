@@ -1,5 +1,7 @@
 //! Paths are followed together.
 
+use glam::Vec3;
+
 use super::*;
 use crate::simd::dispatch::tests::same_at_every_width;
 use crate::time::spans::Part;
