@@ -7,7 +7,6 @@ use crate::curve::options::Path;
 use crate::fit::arc_lanes::LANES;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
-use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
 use crate::shader::ArcSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -43,8 +42,20 @@ impl InLanes for ArcPreparation {
     }
 }
 
-impl Prepare for ArcPreparation {
-    fn add(
+impl ArcPreparation {
+    pub(crate) fn new(path: Path) -> Self {
+        Self {
+            path,
+            from: [[0.0; 4]; LANES],
+            to: [[0.0; 4]; LANES],
+            count: 0,
+            middles: [[0.0; 4]; LANES],
+            tangents: [[0.0; 4]; LANES],
+        }
+    }
+
+    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,
         set: &TrackSet,
@@ -85,33 +96,6 @@ impl Prepare for ArcPreparation {
         prepared.push_part(index, times, &intervals, spans, [first_key, last_key]);
     }
 
-    fn finish(&mut self, prepared: &mut Prepared) {
-        self.flush(prepared);
-    }
-}
-
-/// The middle of an arc between two keys that is longer than half a turn; it becomes two arcs.
-fn middle_of_long(keys: [[f32; 4]; 2]) -> Option<[f32; 4]> {
-    let [from, to] = keys.map(unit);
-    (dot(from, to) < 0.0).then(|| {
-        let sum: [f64; 4] = std::array::from_fn(|c| from[c] + to[c]);
-        let length = dot(sum, sum).sqrt();
-        sum.map(|component| round_f32(component / length))
-    })
-}
-
-impl ArcPreparation {
-    pub(crate) fn new(path: Path) -> Self {
-        Self {
-            path,
-            from: [[0.0; 4]; LANES],
-            to: [[0.0; 4]; LANES],
-            count: 0,
-            middles: [[0.0; 4]; LANES],
-            tangents: [[0.0; 4]; LANES],
-        }
-    }
-
     /// Takes intervals between these keys, none of more than half a turn.
     fn push(
         &mut self,
@@ -122,7 +106,7 @@ impl ArcPreparation {
     ) {
         while !intervals.is_empty() {
             if self.count == LANES {
-                self.flush(prepared);
+                self.finish(prepared);
             }
             let own = self.count..LANES.min(self.count + intervals.len());
             let (start, end) = (intervals.start, intervals.start + own.len());
@@ -137,17 +121,28 @@ impl ArcPreparation {
 
     fn push_arc(&mut self, prepared: &mut Prepared, from: [f32; 4], to: [f32; 4]) {
         if self.count == LANES {
-            self.flush(prepared);
+            self.finish(prepared);
         }
         (self.from[self.count], self.to[self.count]) = (from, to);
         self.count += 1;
     }
 
-    fn flush(&mut self, prepared: &mut Prepared) {
+    /// Finishes the segments of all intervals that wait.
+    pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         in_lanes(self);
         let count = std::mem::take(&mut self.count);
         let arcs = self.middles.iter().zip(&self.tangents);
         let arcs = arcs.map(|(&middle, &tangent)| ArcSegment { middle, tangent });
         prepared.segments.arcs.extend(arcs.take(count));
     }
+}
+
+/// The middle of an arc between two keys that is longer than half a turn; it becomes two arcs.
+fn middle_of_long(keys: [[f32; 4]; 2]) -> Option<[f32; 4]> {
+    let [from, to] = keys.map(unit);
+    (dot(from, to) < 0.0).then(|| {
+        let sum: [f64; 4] = std::array::from_fn(|c| from[c] + to[c]);
+        let length = dot(sum, sum).sqrt();
+        sum.map(|component| round_f32(component / length))
+    })
 }

@@ -1,5 +1,4 @@
-//! The trait by which key intervals become segments, and the choice of its implementation for a
-//! method.
+//! Prepares tracks in the way of their method: key intervals become segments.
 
 use std::ops::Range;
 
@@ -9,50 +8,38 @@ use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
-use crate::prepare::steps::StepPreparation;
-use crate::time::frame_rate::FrameRate;
+use crate::prepare::steps;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Makes segments from key intervals, in blocks that may hold intervals of several tracks.
-pub(crate) trait Prepare: Send {
-    /// Adds some intervals of the `index`th track of a set, as a part of their own.
-    fn add(
-        &mut self,
-        prepared: &mut Prepared,
-        set: &TrackSet,
-        index: usize,
-        intervals: Range<usize>,
-    );
-
-    /// Finishes the segments of all intervals that were added.
-    fn finish(&mut self, _prepared: &mut Prepared) {}
-
-    /// From now on only intervals that contain a frame need segments, given the frames' rate and
-    /// start; with `None` all need them.
-    fn only_frames(&mut self, _frames: Option<(FrameRate, f64)>) {}
-}
-
-/// Prepares tracks by the implementation of [`Prepare`] for their method; its memory is reused.
+/// Prepares tracks by an interpolation; its memory is reused.
 pub(crate) struct Preparation {
     interpolation: Interpolation,
-    prepare: Box<dyn Prepare>,
+    way: Way,
+}
+
+/// How intervals become segments: in blocks that may hold intervals of several tracks, but for
+/// steps, which have no segments.
+enum Way {
+    Steps,
+    Arcs(Box<ArcPreparation>),
+    Smooth(Box<SmoothPreparation>),
 }
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        let prepare: Box<dyn Prepare> = match *interpolation.method.curves {
+        let way = match *interpolation.method.curves {
+            Curves::Steps => Way::Steps,
             Curves::Arcs(_) if !interpolation.is_by_formula() => {
-                Box::new(ArcPreparation::new(interpolation.path))
+                Way::Arcs(Box::new(ArcPreparation::new(interpolation.path)))
             }
-            Curves::Steps => Box::new(StepPreparation(interpolation.quantity)),
             Curves::Arcs(smooth) | Curves::Smooth(smooth) => {
-                Box::new(SmoothPreparation::new(interpolation, smooth))
+                Way::Smooth(Box::new(SmoothPreparation::new(interpolation, smooth)))
             }
         };
         Self {
             interpolation: *interpolation,
-            prepare,
+            way,
         }
     }
 
@@ -61,10 +48,12 @@ impl Preparation {
     /// other timeline.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        self.prepare.only_frames(match timeline.ticks {
-            Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
-            _ => None,
-        });
+        if let Way::Smooth(smooth) = &mut self.way {
+            smooth.frames = match timeline.ticks {
+                Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
+                _ => None,
+            };
+        }
     }
 
     /// Prepares intervals of a set's tracks; each range of intervals becomes a part.
@@ -74,21 +63,27 @@ impl Preparation {
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), InterpolationError> {
-        let Interpolation {
-            method, path, ends, ..
-        } = self.interpolation;
+        let Self { interpolation, way } = self;
         // Steps have no path, and a method with a path of its own also defines the curve between
         // opposite keys.
-        let has_path = !matches!(method.curves, Curves::Steps) && method.path.is_none();
-        for (track, intervals) in intervals {
+        let has_path = !matches!(way, Way::Steps) && interpolation.method.path.is_none();
+        for (track, own) in intervals {
             let (_, keys) = set.times_and_keys(track);
-            ends.check(keys, track)?;
+            interpolation.ends.check(keys, track)?;
             if has_path {
-                path.check(keys, intervals.clone(), track)?;
+                interpolation.path.check(keys, own.clone(), track)?;
             }
-            self.prepare.add(prepared, set, track, intervals);
+            match way {
+                Way::Steps => steps::add(prepared, set, track, own, interpolation.quantity),
+                Way::Arcs(arcs) => arcs.add(prepared, set, track, own),
+                Way::Smooth(smooth) => smooth.add(prepared, set, track, own),
+            }
         }
-        self.prepare.finish(prepared);
+        match way {
+            Way::Steps => {}
+            Way::Arcs(arcs) => arcs.finish(prepared),
+            Way::Smooth(smooth) => smooth.finish(prepared),
+        }
         Ok(())
     }
 }

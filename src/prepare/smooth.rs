@@ -16,7 +16,6 @@ use crate::method::{Given, Smooth};
 use crate::prepare::constant_speed::{Waiting, retime};
 use crate::prepare::direct::Direct;
 use crate::prepare::fitting::Fitting;
-use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
@@ -45,7 +44,7 @@ pub(crate) struct SmoothPreparation {
     /// Curves that are traversed at constant speed, until their whole track is there.
     waiting: Vec<Waiting>,
     /// The frames' rate and start, if only intervals that contain a frame are wanted.
-    frames: Option<(FrameRate, f64)>,
+    pub(crate) frames: Option<(FrameRate, f64)>,
 }
 
 impl SmoothPreparation {
@@ -64,14 +63,9 @@ impl SmoothPreparation {
             frames: None,
         }
     }
-}
 
-impl Prepare for SmoothPreparation {
-    fn only_frames(&mut self, frames: Option<(FrameRate, f64)>) {
-        self.frames = frames;
-    }
-
-    fn add(
+    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,
         set: &TrackSet,
@@ -143,7 +137,8 @@ impl Prepare for SmoothPreparation {
         }
     }
 
-    fn finish(&mut self, prepared: &mut Prepared) {
+    /// Finishes the segments of all intervals that were added.
+    pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         self.flush(prepared);
         if let Some(direct) = &mut self.direct {
             direct.finish(prepared, &mut self.fitting);
@@ -152,9 +147,7 @@ impl Prepare for SmoothPreparation {
         self.waiting.clear();
         self.fitting.finish(prepared);
     }
-}
 
-impl SmoothPreparation {
     /// Adds an interval of a track as context. Where the track ends it is the one on the `other`
     /// side of a loop's seam, or an empty lane.
     fn push_context(
