@@ -233,10 +233,12 @@ impl ClipData {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time_at(track, samples.start);
                 let last = timeline.time_at(track, samples.end - 1);
+                // A part starts where the one before it ends.
+                let end = |&place: &(u32, u32)| self.part(place).part.end;
+                let from = all.partition_point(|place| end(place) < first);
+                let to = all.partition_point(|place| end(place) <= last) + 1;
                 // One more part on either side: a time within rounding of a boundary may lie on
                 // the other side of it.
-                let from = all.partition_point(|&place| self.part(place).part.end < first);
-                let to = all.partition_point(|&place| self.part(place).start() <= last);
                 &all[from.saturating_sub(1).min(all.len() - 1)..(to + 1).min(all.len())]
             }
             _ => all,
@@ -307,14 +309,6 @@ impl ClipData {
             prepared,
             part: &prepared.parts[part as usize],
         }
-    }
-}
-
-impl PartRef<'_> {
-    /// The start of its first span, in seconds.
-    fn start(self) -> f64 {
-        let starts = &self.prepared.spans.starts[self.part.spans.clone()];
-        starts.first().copied().unwrap_or(self.part.end)
     }
 }
 

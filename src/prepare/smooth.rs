@@ -219,9 +219,9 @@ impl SmoothPreparation {
     fn find_curves(&mut self) -> bool {
         if let Some(direct) = &mut self.direct {
             direct.find_curves(&self.intervals, &self.stretches);
-            let sides = [self.interpolation.before, self.interpolation.after];
-            let is_wanted = sides.into_iter().any(|side| self.goes_on(side)) || self.is_frozen();
-            if !is_wanted {
+            // Extrapolation needs the derivatives at the ends.
+            let Interpolation { before, after, .. } = self.interpolation;
+            if !self.goes_on(before) && !self.goes_on(after) {
                 return false;
             }
         }

@@ -32,7 +32,8 @@ pub(crate) fn add(
     prepared.constants.extend(track.keys.iter().map(stored));
     let first_span = prepared.spans.len();
     let curves = Curves::new(track, method, interpolation.ends);
-    let meets_keys = curves.meets_keys();
+    // A B-spline passes near its keys.
+    let meets_keys = method != VectorMethod::BSpline;
     let mut held = [first_key, first_key + last as u32];
     let mut lines = [NONE; 2];
     for i in 0..last {
