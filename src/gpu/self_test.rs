@@ -62,7 +62,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
             Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001]),
         ] {
             let timeline = frames
-                .resolve(clip.track_count(), clip.time_span())
+                .resolve(clip.track_count(), clip.time_span)
                 .expect("a few frames");
             let whole = Window::whole(clip.track_count(), timeline.len(), Layout::TrackMajor);
             let mut expected = vec![Quat::IDENTITY; whole.len()];

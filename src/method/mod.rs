@@ -46,7 +46,7 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::fit::double::handles::HandleRule;
+use crate::fit::double::handles::{HandleRule, Steps};
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
 use crate::fit::single::handles::HandlesF32;
@@ -55,6 +55,7 @@ use crate::math::quaternion::Vector;
 use crate::reference;
 use crate::reference::curve::Definition;
 use crate::shader::Form;
+use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
@@ -219,6 +220,12 @@ impl Smooth {
     const fn with(self, given: Given) -> Self {
         Self { given, ..self }
     }
+
+    /// Computes the curves of a block's intervals.
+    pub(crate) fn find_curves(&self, intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+        in_lanes(&mut Steps(intervals));
+        (self.curves)(intervals, stretches, ends);
+    }
 }
 
 /// How smooth a curve is where its segments meet. Keys with given tangents, tension or continuity
@@ -312,14 +319,10 @@ impl Eq for Method {}
 
 /// The error for a name that no method has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no method `{name}`; there are {}", method_names())]
+#[error("there is no method `{name}`; there are {}", METHODS.map(|own| own.name).join(", "))]
 pub struct UnknownMethod {
     /// The name given.
     pub name: String,
-}
-
-fn method_names() -> String {
-    METHODS.map(|method| method.name).join(", ")
 }
 
 impl FromStr for Method {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
@@ -23,7 +23,7 @@ use crate::path::schedule::Schedule;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
-use crate::time::spans::{NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
 
@@ -318,8 +318,7 @@ impl Adding<'_> {
                     Kind::Vector => vectors::add(
                         prepared,
                         walk.track,
-                        Some(walk.path),
-                        Vec3::ZERO,
+                        walk.path,
                         follow.method,
                         self.interpolation,
                     ),
@@ -379,15 +378,9 @@ impl Walk<'_> {
         if let Some(key) = prepared.spans.keys.get_mut(from) {
             *key = before;
         }
-        prepared.parts.push(Part {
-            track: self.track as u32,
-            first_key: 0,
-            spans: from..prepared.spans.len(),
-            end: self.path.times[self.path.times.len() - 1],
-            before,
-            after,
-            beyond: None,
-        });
+        let (times, spans) = (&self.path.times, from..prepared.spans.len());
+        let intervals = 0..times.len() - 1;
+        prepared.push_part(self.track, times, &intervals, spans, [before, after]);
     }
 }
 

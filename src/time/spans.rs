@@ -95,14 +95,6 @@ impl Spans {
         }
     }
 
-    /// Appends a range of other spans.
-    pub(crate) fn extend(&mut self, other: &Self, range: Range<usize>) {
-        self.starts.extend_from_slice(&other.starts[range.clone()]);
-        self.sources
-            .extend_from_slice(&other.sources[range.clone()]);
-        self.keys.extend_from_slice(&other.keys[range]);
-    }
-
     pub(crate) fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
         self.sources.reserve(count);

@@ -301,9 +301,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         ..Wanted::all(set)
     };
     let clip = ClipData::new(set, method.into(), wanted).unwrap();
-    let timeline = frames
-        .resolve(clip.track_count(), clip.time_span())
-        .unwrap();
+    let timeline = frames.resolve(clip.track_count(), clip.time_span).unwrap();
     let window = Window::whole(clip.track_count(), timeline.len(), layout);
     let [group] = &clip.groups[..] else {
         panic!("one group");

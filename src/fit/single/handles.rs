@@ -68,7 +68,7 @@ pub(crate) struct HandlesF32 {
     pub(crate) far: Row,
     pub(crate) numbers: CurveNumbers,
     /// The squared extent of each curve. It is above [`LONGEST_DIRECT`] where the f32 numbers do
-    /// not hold, and -1 where the small-angle cubic is taken instead.
+    /// not hold.
     pub(crate) energies: Row,
 }
 
